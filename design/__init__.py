@@ -1,0 +1,1 @@
+"""Controllers by pole placement, margins, the loop in simulation."""

@@ -1,0 +1,1 @@
+"""Pure numerics: signals, friction, simulation, fits."""

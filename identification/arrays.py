@@ -1,0 +1,16 @@
+"""The array types that every module shares."""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def frozen(values: Any) -> Array:
+    """Read-only float64 copy of `values`, so that no caller's array is ever changed."""
+    out = np.array(values, dtype=np.float64)
+    out.flags.writeable = False
+    return out

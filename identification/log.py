@@ -1,0 +1,82 @@
+"""Log: immutable signals of one continuous run, in SI units."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import Literal
+
+import numpy as np
+
+from identification.arrays import Array, frozen
+from identification.errors import BadLog
+
+RigKind = Literal["electro-pneumatic", "force", "motor"]
+
+
+@dataclass(frozen=True)
+class Rig:
+    """What a card says of the machine; areas [m^2], pressure [Pa], limits [V], stroke [m].
+
+    `force_per_command` [N/V] is the motor's k_a; `motion` "rotary" reads rad, N m and kg m^2.
+    """
+
+    kind: RigKind
+    area_p: float | None = None
+    area_n: float | None = None
+    supply_pressure: float | None = None
+    force_per_command: float | None = None
+    control_limit: float | None = None
+    stroke: tuple[float, float] | None = None
+    motion: Literal["linear", "rotary"] = "linear"
+
+
+@dataclass(frozen=True)
+class Log:
+    """Signals of one run by canonical name, each of shape (n,), with their time `t` [s].
+
+    `y` position [m], `F` applied force F_e [N], `u` command [V], `r` reference [m]; any further
+    name is a signal that effects may use. Arrays are read-only copies. Raises BadLog where the
+    lengths differ or `t` is missing.
+    """
+
+    name: str
+    signals: Mapping[str, Array]
+
+    def __post_init__(self) -> None:
+        signals = {key: frozen(values) for key, values in self.signals.items()}
+        if "t" not in signals:
+            raise BadLog(f"{self.name}: no time signal 't'; every log needs one")
+        lengths = {key: values.shape for key, values in signals.items()}
+        if len(set(lengths.values())) != 1 or signals["t"].ndim != 1:
+            raise BadLog(f"{self.name}: signals of different lengths {lengths}; all must be (n,)")
+        object.__setattr__(self, "signals", MappingProxyType(signals))
+
+    def __getitem__(self, key: str) -> Array:
+        if key not in self.signals:
+            have = ", ".join(self.signals)
+            raise BadLog(f"{self.name}: no signal {key!r} (has {have}); name its column in the card")
+        return self.signals[key]
+
+    def __contains__(self, key: object) -> bool:
+        return key in self.signals
+
+    def __len__(self) -> int:
+        return len(self.signals["t"])
+
+    @property
+    def h(self) -> float:
+        """Median sampling period [s]."""
+        return float(np.median(np.diff(self.signals["t"])))
+
+    @property
+    def duration(self) -> float:
+        """Time from the first to the last sample [s]."""
+        return float(self.signals["t"][-1] - self.signals["t"][0])
+
+    def with_signals(self, **signals: Array) -> "Log":
+        """The same log with these signals added or replaced."""
+        return replace(self, signals={**self.signals, **signals})
+
+    def part(self, start: int, stop: int) -> "Log":
+        """Samples `start` to `stop` (exclusive) as a log of its own."""
+        return replace(self, signals={k: v[start:stop] for k, v in self.signals.items()})

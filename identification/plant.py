@@ -1,0 +1,36 @@
+"""The plant as one value: mass with Karnopp friction, its actuator, and chosen effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+from identification.errors import BadModel
+from identification.karnopp import Karnopp
+
+
+@dataclass(frozen=True)
+class Actuator:
+    """Linear electro-pneumatic actuator dF/dt = k1 u - k2 v; k1 [N/(V s)], k2 [N/m]."""
+
+    k1: float
+    k2: float
+
+    def __post_init__(self) -> None:
+        if not (self.k1 > 0 and self.k2 >= 0):
+            raise BadModel(f"actuator k1 = {self.k1:g}, k2 = {self.k2:g}: need k1 > 0 and k2 >= 0")
+
+
+@dataclass(frozen=True)
+class Motor:
+    """Motor with negligible dynamics, F = k_a u; k_a [N/V] (paper, figure 1, upper part)."""
+
+    k_a: float
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Mass and friction, the actuator where the command is known, and effects by key."""
+
+    friction: Karnopp
+    actuator: Actuator | Motor | None = None
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
