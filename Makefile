@@ -1,0 +1,58 @@
+# make demo | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
+PYTHON ?= python3
+WORKERS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
+	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
+BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
+
+.PHONY: demo test environment lint types floors wheel tests bench format clean
+.NOTPARALLEL:
+
+demo: $(VENV)/.installed
+	$(BIN)/workbench demo
+
+test: lint types floors wheel tests
+
+environment: $(VENV)/.installed-dev
+
+$(VENV)/.installed: pyproject.toml constraints.txt
+	@$(PYTHON) -c '$(NEEDED)'
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(PIP) install --constraint constraints.txt hatchling
+	$(PIP) install --constraint constraints.txt --no-build-isolation --editable .
+	touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(PIP) install --constraint constraints.txt --no-build-isolation --editable '.[dev]'
+	touch $@
+
+lint: environment
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+types: environment
+	$(BIN)/mypy
+
+floors: environment
+	$(BIN)/lint-imports
+
+wheel: environment
+	$(BIN)/python tools/check_wheel.py
+
+tests: environment
+	$(BIN)/pytest -n $(WORKERS)
+
+bench: environment
+	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"
+	@set -e; for file in $(BENCHMARKS); do echo "== $$file"; $(BIN)/python $$file; done
+
+format: environment
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+	@test -z "$(wildcard notebooks/*.ipynb)" || $(BIN)/nbstripout $(wildcard notebooks/*.ipynb)
+
+clean:
+	rm -rf $(VENV) .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache build dist

@@ -1,0 +1,277 @@
+"""PID, PI and PD controllers as RST, from their gains and by pole placement."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import lsq_linear, minimize
+
+from design.place import solve_diophantine, solve_sylvester
+from design.polynomial import (
+    add,
+    check_period,
+    describe_root,
+    divide,
+    multiply,
+    roots,
+    trim,
+)
+from design.rst import RST, closed_loop, closed_loop_poles
+from design.specification import (
+    Tracking,
+    auxiliary_polynomial,
+    dominant_polynomial,
+    normalised_plant,
+    tracking_polynomial,
+)
+from identification.arrays import Array
+from identification.errors import BadSpecification
+
+Sampling = Literal["zoh", "tustin"]
+INTEGRATOR = np.array([1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class PIDGains:
+    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)), sampled by zero-order hold; k_R [N/m] for a
+    position loop with a force command, times T_i, T_d, eps [s]."""
+
+    k_R: float
+    T_i: float
+    T_d: float
+    eps: float
+
+
+@dataclass(frozen=True)
+class PID:
+    """A digital PID with filtered derivative, S = (1 - z^-1)(1 + s1 z^-1), deg R = 2.
+
+    gains: its parallel form, or None with the `reason`. exact: all closed-loop poles are as asked;
+    if not, the dominant ones are, and rst.P says where the others lie; note: the slowest of them,
+    where it is slower than the dominant ones, else None.
+    """
+
+    rst: RST
+    gains: PIDGains | None
+    reason: str | None
+    exact: bool
+    note: str | None = None
+
+
+def pid_to_rst(
+    k_R: float, T_i: float, T_d: float, eps: float, h: float, method: Sampling = "zoh"
+) -> RST:
+    """The PID k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)) on the error, sampled at h, as RST (T = R).
+
+    k_R [command/output unit], T_i, T_d, eps, h [s]. method: "zoh" (step-invariant, the paper's
+    rig forms: h z^-1/(T_i (1 - z^-1)) and T_d (1 - z^-1)/(eps (1 - e^(-h/eps) z^-1))) or "tustin"
+    (bilinear), for both terms. Raises BadSpecification where a time is not positive (T_d may be 0).
+    Source: paper, simulation section; its rig section for the sampled form.
+    """
+    integral, i_den = _integral(T_i, h, method)
+    derivative, d_den = _derivative(T_d, eps, h, method)
+    R = add(np.convolve(i_den, d_den), np.convolve(integral, d_den))
+    R = add(R, np.convolve(derivative, i_den)) * _gain("k_R", k_R)
+    return RST(R, np.convolve(i_den, d_den), R, h)
+
+
+def pi_to_rst(k_i: float, T_i: float, h: float, method: Sampling = "zoh") -> RST:
+    """The PI k_i (1 + 1/(T_i s)) on the error, sampled at h [s], as RST (T = R).
+
+    "zoh" gives the paper's C_F(z) = k_i (1 + h z^-1/(T_i (1 - z^-1))), k_i [V/N], T_i [s].
+    Raises BadSpecification where T_i or h is not positive. Source: paper, eq. (9).
+    """
+    integral, i_den = _integral(T_i, h, method)
+    R = add(i_den, integral) * _gain("k_i", k_i)
+    return RST(R, i_den, R, h)
+
+
+def pd_to_rst(k_d: float, T_d: float, eps: float, h: float, method: Sampling = "zoh") -> RST:
+    """The PD k_d (1 + T_d s/(eps s + 1)) on the error, sampled at h [s], as RST (T = R).
+
+    "zoh" gives the paper's C_y(z) = k_d (1 + T_d (1 - z^-1)/(eps (1 - e^(-h/eps) z^-1))),
+    k_d [N/m], T_d, eps [s]. Raises BadSpecification where eps or h is not positive or T_d < 0.
+    Source: paper, rig section.
+    """
+    derivative, d_den = _derivative(T_d, eps, h, method)
+    R = add(d_den, derivative) * _gain("k_d", k_d)
+    return RST(R, d_den, R, h)
+
+
+def pid_gains(controller: RST) -> PIDGains:
+    """The gains whose "zoh" form is the controller's R/S; the inverse of `pid_to_rst`.
+
+    Raises BadSpecification where R and S are not of PID form, the derivative filter is not
+    0 < e^(-h/eps) < 1, or k_R = 0, T_i <= 0 or T_d < 0.
+    """
+    R, S = controller.R / controller.S[0], controller.S / controller.S[0]
+    if S.size > 3 or R.size > 3 or abs(S.sum()) > 1e-9 * np.abs(S).sum():
+        raise BadSpecification(
+            f"deg R = {R.size - 1}, deg S = {S.size - 1}, S(1) = {S.sum():.3g}: a PID has degrees "
+            "of at most 2 and S(1) = 0"
+        )
+    r0, _, r2 = np.pad(R, (0, 3 - R.size)).tolist()
+    a = float(S[2]) if S.size == 3 else 0.0
+    if not 0 < a < 1:
+        raise BadSpecification(
+            f"the derivative filter has its pole at z = {a:.4g}: no eps gives e^(-h/eps) there; "
+            "keep the digital form, or move the auxiliary poles"
+        )
+    k_i = float(R.sum()) / (1 - a)
+    k_R = (r0 - r2 - a * k_i) / (1 - a)
+    eps = -controller.h / math.log(a)
+    if k_R == 0 or k_i == 0:
+        raise BadSpecification(f"k_R = {k_R:.4g}, k_i = {k_i:.4g}: no parallel form; both needed")
+    gains = PIDGains(k_R, controller.h * k_R / k_i, eps * (r0 / k_R - 1), eps)
+    if gains.T_i <= 0 or gains.T_d < 0:
+        raise BadSpecification(
+            f"T_i = {gains.T_i:.4g} s, T_d = {gains.T_d:.4g} s: a parallel PID needs T_i > 0 and "
+            "T_d >= 0; keep the digital form"
+        )
+    return gains
+
+
+def design_pid(
+    A: ArrayLike,
+    B: ArrayLike,
+    h: float,
+    *,
+    dominant: Sequence[float],
+    auxiliary: ArrayLike = (),
+    T: Tracking = "R",
+) -> PID:
+    """The digital PID that places the closed-loop poles, or only the dominant ones.
+
+    A, B: plant in ascending powers of z^-1, h [s]. dominant: (w_n [rad/s], zeta). auxiliary:
+    values of z, at most 2 for a plant of order 2 or less, where all poles are placed. For other
+    plants the dominant pair is placed exactly and the rest by least squares on their polynomial;
+    if that is unstable, by a search for the smallest radius. T: see `tracking_polynomial`.
+
+    Raises BadSpecification where the poles cannot be placed or the loop would be unstable, naming
+    the pole. Source: our own for higher orders; Landau & Zito, section 3.2 for order 2.
+    """
+    h = check_period(h)
+    A, B = normalised_plant(A, B)
+    P_d, P_a = dominant_polynomial(dominant, h), auxiliary_polynomial(auxiliary, h)
+    if B[0] != 0.0:
+        raise BadSpecification(
+            f"B[0] = {B[0]:g}: the PID would act on an output that its own command moves at once; "
+            "put the computing delay into B (a leading 0)"
+        )
+    exact = A.size <= 3 and B.size <= 3
+    if exact:
+        R, S = _place_all(A, B, P_d, P_a, h)
+    else:
+        R, S = _place_dominant(A, B, P_d, P_a, h)
+    P = trim(closed_loop(A, B, RST(R, S, R, h)), 1e-14)
+    others = P_a if exact else divide(P, P_d)[0]
+    rst = RST(R, S, tracking_polynomial(T, R, B, P_d, others), h, P)
+    slowest = complex(closed_loop_poles(A, B, rst)[0])
+    text = f"{describe_root(slowest, h)}, |z| = {abs(slowest):.4g}"
+    if abs(slowest) >= 1:
+        raise BadSpecification(
+            "no PID found with these dominant poles keeps the loop stable: its best leaves a pole "
+            f"at {text}; choose slower or better damped dominant poles, or design an RST"
+        )
+    slow = not exact and abs(slowest) > float(np.abs(roots(P_d)).max()) + 1e-6
+    note = f"slower than the dominant poles: {text}; ask for slower ones" if slow else None
+    try:
+        return PID(rst, pid_gains(rst), None, exact, note)
+    except BadSpecification as error:
+        return PID(rst, None, str(error), exact, note)
+
+
+def _place_all(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tuple[Array, Array]:
+    """R and S of a PID for a plant of order 2 or less: every pole as asked."""
+    most = A.size + B.size - 4
+    if P_a.size - 1 > most:
+        raise BadSpecification(
+            f"{P_a.size - 1} auxiliary poles asked, a PID on this plant places {most} besides the "
+            "dominant ones; give fewer, or design an RST"
+        )
+    return solve_diophantine(A, B, np.convolve(P_d, P_a), H_S=INTEGRATOR, h=h)
+
+
+def _place_dominant(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tuple[Array, Array]:
+    """R and S of a PID for any plant: dominant poles exact, the other two freedoms used.
+
+    With S = (1 - z^-1)(1 + s1 z^-1) the closed loop is P_d Q, and Q is linear in s1 and in the
+    multiple t of P_d in R.
+    """
+    fixed, R_0 = _with_dominant(A, B, P_d, np.array([1.0]), h)
+    moved, R_1 = _with_dominant(A, B, P_d, np.array([0.0, 1.0]), h)
+    n = max(fixed.size, moved.size, B.size, P_a.size)
+    Q_0, Q_1, Q_2, goal = (np.pad(c, (0, n - c.size)) for c in (fixed, moved, B, P_a))
+
+    size = 1.0 / float(np.abs(B).max())
+
+    def radius(x: Array, upper: float) -> float:
+        s1, t = (float(value) for value in x)
+        outside = max(s1 - upper, -0.999 - s1, 0.0)
+        z = roots(Q_0 + s1 * Q_1 + t * size * Q_2)
+        return float(np.abs(z).max(initial=0.0)) + 1e3 * outside
+
+    freedom = np.stack([Q_1, Q_2 * size], axis=1)
+    limits = ([-0.95, -np.inf], [-0.1, np.inf])
+    x = np.asarray(lsq_linear(freedom, goal - Q_0, limits).x, dtype=np.float64)
+    # -s1 = e^(-h/eps) >= 0.1 is a derivative filter; any other stable one is the last resort.
+    for upper, wanted in ((-0.1, float(np.abs(roots(P_d)).max())), (0.999, 1 - 1e-9)):
+        if radius(x, upper) > wanted:
+            x = _least(partial(radius, upper=upper), x, max(1.0, float(np.abs(Q_0).max())))
+    s1, t = float(x[0]), float(x[1]) * size
+    return add(R_0 + s1 * R_1, t * P_d), np.convolve(INTEGRATOR, np.array([1.0, s1]))
+
+
+def _with_dominant(A: Array, B: Array, P_d: Array, filter_: Array, h: float) -> tuple[Array, Array]:
+    """(Q, R) with A (1 - z^-1) filter_ + B R = P_d Q, deg R <= 1."""
+    open_loop = multiply(A, INTEGRATOR, filter_)
+    R, Q, sound = solve_sylvester(P_d, -B, open_loop)
+    if not sound:
+        raise BadSpecification(
+            f"a dominant pole {describe_root(complex(roots(P_d)[0]), h)} lies at a zero of the "
+            "plant, where feedback is blind; move it"
+        )
+    return Q, R
+
+
+def _least(radius: Callable[[Array], float], x: Array, scale: float) -> Array:
+    """The (s1, t) of the smallest radius found: a coarse grid, then its best points refined."""
+    sizes = scale * np.geomspace(1e-4, 1e2, 13)
+    grid = [np.array([s, t]) for s in np.linspace(-0.9, 0.0, 7) for t in (*-sizes, 0.0, *sizes)]
+    starts = [x, *sorted(grid, key=radius)[:4]]
+    found = [minimize(radius, s, method="Nelder-Mead", options={"maxiter": 300}) for s in starts]
+    return np.asarray(min(found, key=lambda result: float(result.fun)).x, dtype=np.float64)
+
+
+def _gain(name: str, value: float) -> float:
+    if not (math.isfinite(value) and value != 0):
+        raise BadSpecification(f"{name} = {value:g}, must be finite and not 0")
+    return value
+
+
+def _integral(T_i: float, h: float, method: Sampling) -> tuple[Array, Array]:
+    """Numerator and denominator of 1/(T_i s) sampled at h."""
+    h = check_period(h)
+    if not (math.isfinite(T_i) and T_i > 0):
+        raise BadSpecification(f"T_i = {T_i:g} s, must be finite and > 0; without it, use a PD")
+    if method not in get_args(Sampling):
+        raise BadSpecification(f"method {method!r} unknown; choose one of {get_args(Sampling)}")
+    rise = np.array([0.0, 1.0]) if method == "zoh" else np.array([0.5, 0.5])
+    return rise * (h / T_i), INTEGRATOR
+
+
+def _derivative(T_d: float, eps: float, h: float, method: Sampling) -> tuple[Array, Array]:
+    """Numerator and denominator of T_d s/(eps s + 1) sampled at h."""
+    h = check_period(h)
+    if not (math.isfinite(T_d) and T_d >= 0 and math.isfinite(eps) and eps > 0):
+        raise BadSpecification(f"T_d = {T_d:g} s, eps = {eps:g} s: need T_d >= 0 and eps > 0")
+    if method not in get_args(Sampling):
+        raise BadSpecification(f"method {method!r} unknown; choose one of {get_args(Sampling)}")
+    if method == "zoh":
+        return INTEGRATOR * (T_d / eps), np.array([1.0, -math.exp(-h / eps)])
+    gain = 2 * T_d / (2 * eps + h)
+    return INTEGRATOR * gain, np.array([1.0, (h - 2 * eps) / (2 * eps + h)])

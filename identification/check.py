@@ -1,0 +1,138 @@
+"""Refusals: what a log cannot be if it is to say anything on friction, each with its own error.
+
+Rows in the messages count as in the file: the caller says which row the first sample has.
+"""
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog
+from identification.log import Log, Rig
+
+SHORTEST = 100
+"""Samples that a run needs at least; below that no parameter of nine is better than a guess."""
+
+# Share of the exchanged work below which F is refused. The shipped sets and simulated loops lie
+# above +0.4; sensor delays in motion that springs or inertia rule stay within 0.15.
+_WRONG_SIGN = -0.3
+# Swapped logs lie below -0.02, with an F less than 0.8 times as rough as y (true ones: 0.9 to 13).
+_SWAPPED = -0.01
+_MUCH_SMOOTHER = 0.7
+_BLOCKS = 10_000
+
+
+def check(log: Log, rig: Rig, first_row: int = 1) -> None:
+    """Pass a log that can be what its card says.
+
+    Raises BadLog, one line each, where the log is too short, time repeats or goes back, a value
+    is not finite, the position is constant or beyond the stroke, the force has the wrong sign, or
+    force and position are swapped.
+    """
+    check_time(log, first_row)
+    _check_finite(log, first_row)
+    if "y" in log:
+        _check_position(log, rig)
+    if "y" in log and "F" in log:
+        _check_work(log)
+
+
+def check_time(log: Log, first_row: int = 1) -> None:
+    """Pass a log of at least `SHORTEST` samples whose time is finite and increases."""
+    if len(log) < SHORTEST:
+        raise BadLog(
+            f"{log.name}: {len(log)} samples, at least {SHORTEST} needed; give a longer run"
+        )
+    t = log["t"]
+    if not np.all(np.isfinite(t)):
+        row = first_row + int(np.flatnonzero(~np.isfinite(t))[0])
+        raise BadLog(f"{log.name}: time in row {row} is not a number; remove the row")
+    wrong = np.flatnonzero(np.diff(t) <= 0)
+    if wrong.size:
+        k = int(wrong[0])
+        what = "repeats" if t[k + 1] == t[k] else "goes back"
+        raise BadLog(
+            f"{log.name}: time {what} in row {first_row + k + 1} ({t[k]:.9g} s, then "
+            f"{t[k + 1]:.9g} s; {wrong.size} such rows), it must increase; give one run a file"
+        )
+
+
+def _check_finite(log: Log, first_row: int) -> None:
+    for name, values in log.signals.items():
+        bad = np.flatnonzero(~np.isfinite(values))
+        if bad.size:
+            raise BadLog(
+                f"{log.name}: signal {name!r} is NaN or infinite in {bad.size} rows, first in row "
+                f"{first_row + int(bad[0])}; cut the log there or repair the column"
+            )
+
+
+def _check_position(log: Log, rig: Rig) -> None:
+    y = log["y"]
+    if np.ptp(y) == 0.0:
+        raise BadLog(
+            f"{log.name}: position is constant ({y[0]:g} m in all {len(log)} rows), motion needed; "
+            "check the column of y and the sensor"
+        )
+    if rig.stroke is None:
+        return
+    low, high = rig.stroke
+    slack = 0.2 * (high - low)
+    if y.min() < low - slack or y.max() > high + slack:
+        raise BadLog(
+            f"{log.name}: position runs from {y.min():g} to {y.max():g} m, the card's stroke is "
+            f"{low:g} to {high:g} m; check unit and gain of y, and that y and F are not swapped"
+        )
+
+
+def _check_work(log: Log) -> None:
+    work = work_share(log["y"], log["F"])
+    if work is None or work > _SWAPPED:
+        return
+    found = f"{log.name}: over closed paths the applied force takes out {-work:.0%} of the work"
+    roughness = _path(log["F"]) / max(_path(log["y"]), 1e-12)
+    if roughness < (1.0 if work < _WRONG_SIGN else _MUCH_SMOOTHER):
+        raise BadLog(
+            f"{found} and F is smoother than y, so force and position look swapped; "
+            "exchange the columns of F and y in the card"
+        )
+    if work < _WRONG_SIGN:
+        raise BadLog(
+            f"{found}, which friction can only consume, so F or y has the wrong sign; give its "
+            "column gain = -1, or check which chamber is which"
+        )
+
+
+def work_share(y: Array, F: Array) -> float | None:
+    """Work of `F` over the closed part of the path, as a share of the work exchanged there.
+
+    Between the first and the last passage of mid-stroke every force of position alone (spring,
+    weight) does no work, and friction makes the rest positive: +1 for friction alone, about 0
+    where inertia or springs rule. `None` where the motion does not come back. White noise of the
+    sensors does not bias it, since it is uncorrelated between y and F.
+    """
+    y, F = _blocks(y), _blocks(F)
+    above = y > 0.5 * (y.min() + y.max())
+    passages = np.flatnonzero(above[1:] != above[:-1])
+    if passages.size < 2:
+        return None
+    last = passages[0::2][-1] if passages.size > 2 else passages[1]
+    path = slice(int(passages[0]), int(last) + 2)
+    step = np.diff(y[path])
+    force = 0.5 * (F[path][1:] + F[path][:-1])
+    force = force - force.mean()
+    exchanged = float(np.sum(np.abs(force * step)))
+    return float(np.sum(force * step)) / exchanged if exchanged > 0 else None
+
+
+def _path(values: Array) -> float:
+    """Length of the way that a signal goes, in units of its range: how rough it is."""
+    values = _blocks(values)
+    width = float(np.ptp(values))
+    return float(np.sum(np.abs(np.diff(values)))) / width if width > 0 else 0.0
+
+
+def _blocks(values: Array) -> Array:
+    """Means of equal blocks, at most `_BLOCKS` of them, which takes out most sensor noise."""
+    size = max(1, len(values) // _BLOCKS)
+    count = len(values) // size
+    return np.asarray(values[: count * size].reshape(count, size).mean(axis=1), dtype=np.float64)

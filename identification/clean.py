@@ -1,0 +1,220 @@
+"""Stages Log -> Log: missing samples, an even clock, F_e (7), filters A/B/C, velocity (5).
+
+`prepare` runs them in order and says in `remarks` what it changed. A run of missing values is
+never invented: it is refused (`check`).
+"""
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arrays import Array
+from identification.check import SHORTEST, check_time
+from identification.check import check as check
+from identification.errors import BadLog, BadSpecification
+from identification.log import Log, Rig
+
+LONGEST_REPAIR = 3
+"""Missing samples in a row that are interpolated; a longer run is refused."""
+
+LONGEST_GAP = 5.0
+"""Sampling periods between two samples above which a log is cut in two."""
+
+_EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
+_MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
+
+
+class Repaired(NamedTuple):
+    """A log without missing samples, and what was filled in."""
+
+    log: Log
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Runs on an even clock, and in `remarks` what had to be done for it, a line each."""
+
+    runs: tuple[Log, ...]
+    remarks: tuple[str, ...]
+
+
+def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
+    """The log repaired, checked and on an even clock; its runs have one sampling period.
+
+    Raises BadLog as `repair`, `check` and `even_clock` do.
+    """
+    log, remarks = repair(log, first_row)
+    check(log, rig, first_row)
+    runs = even_clock(log)
+    if len(runs) == 1 and runs[0] is log:
+        return Prepared(runs, remarks)
+    lost = log.duration - sum(run.duration for run in runs)
+    text = f"{log.name}: uneven clock, resampled every {log.h:.6g} s"
+    if len(runs) > 1 or lost > LONGEST_GAP * log.h:
+        text += f", in {len(runs)} runs; {lost:.3g} s in gaps or short runs left out"
+    return Prepared(runs, (*remarks, text))
+
+
+def repair(log: Log, first_row: int = 1) -> Repaired:
+    """Isolated missing samples (NaN or infinite) filled by linear interpolation in time.
+
+    first_row: the file's row of the first sample, for the messages. Raises BadLog where more
+    than `LONGEST_REPAIR` are missing in a row, where they are at an end of the log, or where a
+    column misses more than 1 %.
+    """
+    check_time(log, first_row)
+    filled: dict[str, Array] = {}
+    remarks = []
+    for name, values in log.signals.items():
+        missing = ~np.isfinite(values)
+        count = int(missing.sum())
+        if count == 0:
+            continue
+        _refuse_runs(f"{log.name}: signal {name!r}", missing, first_row)
+        filled[name] = np.interp(log["t"], log["t"][~missing], values[~missing])
+        remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
+    return Repaired(log.with_signals(**filled) if filled else log, tuple(remarks))
+
+
+def _refuse_runs(what: str, missing: NDArray[np.bool_], first_row: int) -> None:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], missing.astype(np.int8), [0]))))
+    starts, lengths = edges[0::2], edges[1::2] - edges[0::2]
+    longest = int(np.argmax(lengths))
+    at = f"row {first_row + int(starts[longest])}"
+    if lengths[longest] > LONGEST_REPAIR:
+        raise BadLog(
+            f"{what} is NaN or infinite for {lengths[longest]} rows from {at}, at most "
+            f"{LONGEST_REPAIR} in a row are interpolated; cut the log there"
+        )
+    if missing[0] or missing[-1]:
+        where = first_row if missing[0] else first_row + len(missing) - 1
+        raise BadLog(f"{what} is NaN or infinite in row {where}, an end of the log; cut it off")
+    if missing.mean() > _MANY:
+        raise BadLog(
+            f"{what} is NaN or infinite in {missing.mean():.0%} of the rows, first in row "
+            f"{first_row + int(starts[0])}, at most {_MANY:.0%} are interpolated; check the sensor"
+        )
+
+
+def even_clock(log: Log) -> tuple[Log, ...]:
+    """The log as runs on an even clock, cut at gaps longer than `LONGEST_GAP` periods.
+
+    A run that is even to 1e-3 of its period is passed on as it is, bit for bit; any other is
+    resampled at the log's median period. The command `u` and two-valued signals are held (the
+    last value at the middle of the new period); the rest follows a piecewise cubic that keeps
+    monotone stretches monotone, so that a step neither rings nor spreads over more than one
+    sample. Runs under `SHORTEST` samples are left out. Raises BadLog where none is left.
+    """
+    t, h = log["t"], log.h
+    cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
+    borders = [0, *(int(cut) for cut in cuts), len(log)]
+    runs = []
+    for start, stop in pairwise(borders):
+        if stop - start < 2:
+            continue
+        run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
+        run = run if _is_even(run["t"]) else _resample(run, h)
+        if len(run) >= SHORTEST:
+            runs.append(run)
+    if not runs:
+        raise BadLog(
+            f"{log.name}: {len(cuts)} gaps leave no run of {SHORTEST} samples at {h:.4g} s; "
+            "log without gaps"
+        )
+    return tuple(runs)
+
+
+def _is_even(t: Array) -> bool:
+    grid = np.linspace(t[0], t[-1], len(t))
+    return bool(np.max(np.abs(t - grid)) <= _EVEN * (t[-1] - t[0]) / (len(t) - 1))
+
+
+def _resample(log: Log, h: float) -> Log:
+    from scipy.interpolate import PchipInterpolator
+
+    t = log["t"]
+    grid = t[0] + h * np.arange(int(np.floor((t[-1] - t[0]) / h + 1e-6)) + 1)
+    held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
+    signals: dict[str, Array] = {"t": grid}
+    for name, values in log.signals.items():
+        if name == "t":
+            continue
+        if name == "u" or np.all((values == values.min()) | (values == values.max())):
+            signals[name] = values[held]
+        else:
+            signals[name] = np.asarray(PchipInterpolator(t, values)(np.minimum(grid, t[-1])))
+    return Log(log.name, signals)
+
+
+def applied_force(log: Log, rig: Rig) -> Array | None:
+    """The applied force F_e [N] by the rig's kind, shape (n,); `None` where the rig cannot tell.
+
+    "electro-pneumatic": S_p P_p - S_n P_n - (S_p - S_n) P_s. "force": F, plus S_p P_p and minus
+    S_n P_n for each chamber whose area and pressure are known. "motor": k_a u. Source: eq. (7).
+    """
+    if rig.kind == "motor":
+        return None if rig.force_per_command is None else rig.force_per_command * log["u"]
+    S_p, S_n = rig.area_p or 0.0, rig.area_n or 0.0
+    if rig.kind == "force":
+        F = log["F"]
+        F = F + S_p * log["p_p"] if S_p and "p_p" in log else F
+        return F - S_n * log["p_n"] if S_n and "p_n" in log else F
+    return S_p * log["p_p"] - S_n * log["p_n"] - (S_p - S_n) * (rig.supply_pressure or 0.0)
+
+
+def velocity(y: Array, h: float, N_d: int = 5) -> Array:
+    """Least-squares slope over the last `N_d` positions [m/s], shape of `y`.
+
+    y: position [m], shape (n,), filtered by A; h: sampling period [s]. Before the log the body is
+    taken to rest at y[0]. Causal: it lags by (N_d - 1)/2 samples. Source: paper, eq. (5).
+    """
+    if N_d < 2 or h <= 0:
+        raise BadSpecification(
+            f"velocity: N_d = {N_d}, h = {h:g} s; need N_d >= 2, h > 0"
+        )
+    j = np.arange(N_d) - 0.5 * (N_d - 1)
+    slope = Filter(tuple(float(w) for w in j[::-1] / (h * np.sum(j**2))))
+    return apply_filter(slope, y)
+
+
+@dataclass(frozen=True)
+class Filter:
+    """Discrete filter b(z^-1)/a(z^-1), a[0] = 1."""
+
+    b: tuple[float, ...]
+    a: tuple[float, ...] = (1.0,)
+
+
+RIG_A = Filter((0.5,), (1.0, -0.5))
+"""The rig's filter A, 0.5/(1 - 0.5 z^-1)."""
+
+RIG_C = Filter((0.2,), (1.0, -0.8))
+"""The rig's filter C, 0.2/(1 - 0.8 z^-1)."""
+
+
+def fir_lowpass(cutoff: float, h: float, order: int = 40) -> Filter:
+    """Windowed FIR low-pass of `order`, `cutoff` [Hz] (6 dB), sampling period `h` [s].
+
+    Simulation A, B, C: 5 Hz; rig B: 10 Hz; order 40. Raises BadSpecification where the cut-off is
+    not below half the sampling rate.
+    """
+    from scipy.signal import firwin
+
+    if not 0 < cutoff < 0.5 / h:
+        raise BadSpecification(f"cut-off {cutoff:g} Hz, must lie between 0 and {0.5 / h:g} Hz")
+    return Filter(tuple(float(b) for b in firwin(order + 1, cutoff, fs=1.0 / h)))
+
+
+def apply_filter(filt: Filter, x: Array) -> Array:
+    """`x` through the filter, causal, settled on x[0] at the start; shape of `x`."""
+    from scipy.signal import lfilter, lfilter_zi
+
+    x = np.asarray(x, dtype=np.float64)
+    if len(filt.b) == 1 and len(filt.a) == 1:
+        return filt.b[0] * x
+    out, _ = lfilter(filt.b, filt.a, x, zi=lfilter_zi(filt.b, filt.a) * x[0])
+    return np.asarray(out, dtype=np.float64)

@@ -1,0 +1,72 @@
+"""What an identification gives: estimates with intervals, and the reason where there is none."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from identification.arrays import Array
+from identification.karnopp import Karnopp
+from identification.plant import Actuator
+
+Drive = Literal["command", "force"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter: value, unit, standard deviation, 95 % interval [low, high].
+
+    `value` is None where the log does not identify it: `reason` then says why, and `assumed` is
+    the value that simulations use in its place.
+    """
+
+    value: float | None
+    unit: str
+    sd: float | None = None
+    low: float | None = None
+    high: float | None = None
+    reason: str | None = None
+    assumed: float | None = None
+
+
+@dataclass(frozen=True)
+class LogFit:
+    """How the fitted model follows one log, free run over the whole of it or in `windows`.
+
+    start: first position [m], velocity [m/s] and force [N] of the free run; position_rms [m] and,
+    where the run is driven by the command, force_rms [N]; chi_square per compared value.
+    """
+
+    log: str
+    start: tuple[float, float, float]
+    position_rms: float
+    force_rms: float | None
+    chi_square: float
+
+
+@dataclass(frozen=True)
+class KarnoppFit:
+    """The nine parameters and the actuator, identified from one or more logs.
+
+    friction: all nine, those that the logs do not tell at the value assumed for simulation;
+    estimates: the nine (and "k1", "k2" where the command is logged) by name; covariance: of the
+    names in `free`, in that order; noise_y [m], noise_F [N]: standard deviations found in the
+    residual; `chi_square` near 1 says that the model leaves nothing but noise, `adequate` that
+    the search found such a fit; `stiffness` [N/m] couples a force-driven run to the measured
+    position (0: none); `remarks`: one line each on what was noticed.
+    """
+
+    friction: Karnopp
+    actuator: Actuator | None
+    estimates: Mapping[str, Estimate]
+    free: tuple[str, ...]
+    covariance: Array
+    drive: Drive
+    stiffness: float
+    noise_y: float
+    noise_F: float
+    chi_square: float
+    adequate: bool
+    logs: tuple[LogFit, ...]
+    breakaways: tuple[int, int]
+    evaluations: int
+    remarks: tuple[str, ...]

@@ -1,0 +1,244 @@
+"""Repair, checks, even clock, F_e, velocity and filters."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.arrays import Array
+from identification.check import work_share
+from identification.clean import (
+    RIG_A,
+    RIG_C,
+    applied_force,
+    apply_filter,
+    check,
+    even_clock,
+    fir_lowpass,
+    prepare,
+    repair,
+    velocity,
+)
+from identification.errors import BadLog, BadSpecification
+from identification.log import Log, Rig
+
+RIG = Rig(kind="force", stroke=(-0.2, 0.2))
+
+
+def sliding_log(n: int = 2000, h: float = 0.01, t: Array | None = None) -> Log:
+    """A body of 1 kg driven to and fro at 0.5 Hz against 10 N of Coulomb friction."""
+    t = h * np.arange(n) if t is None else t
+    w = np.pi
+    y, v = 0.1 * np.sin(w * t), 0.1 * w * np.cos(w * t)
+    return Log("run", {"t": t, "y": y, "F": 10.0 * np.sign(v) - 0.1 * w**2 * np.sin(w * t)})
+
+
+def test_a_sound_log_passes_and_stays_bit_identical() -> None:
+    log = sliding_log()
+    check(log, RIG)
+    prepared = prepare(log, RIG)
+    assert prepared.runs[0] is log
+    assert prepared.remarks == ()
+
+
+@pytest.mark.parametrize("start", [0.0, -3.0, 1e6])
+def test_rounded_even_clock_is_not_touched(start: float) -> None:
+    t = start + np.round(0.001 * np.arange(500), 6)
+    assert even_clock(sliding_log(t=t))[0]["t"] is not None
+    assert np.array_equal(even_clock(sliding_log(t=t))[0]["t"], t)
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**31), st.floats(1e-4, 1.0), st.floats(0.01, 0.45))
+def test_jittered_clock_becomes_even_and_keeps_lines_and_range(
+    seed: int, h: float, jitter: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    t = h * (np.arange(300) + rng.uniform(-jitter, jitter, 300))
+    values = rng.normal(size=300)
+    log = Log("run", {"t": t, "y": 3.0 * t - 1.0, "F": values})
+    (run,) = even_clock(log)
+    assert np.ptp(np.diff(run["t"])) < 1e-9 * h * 300
+    assert run["t"][0] == t[0]
+    assert t[-1] - h < run["t"][-1] + 1e-5 * h
+    np.testing.assert_allclose(run["y"], 3.0 * run["t"] - 1.0, atol=1e-9 * h * 300)
+    assert values.min() <= run["F"].min()
+    assert run["F"].max() <= values.max()
+
+
+def test_step_does_not_ring_and_command_is_held() -> None:
+    rng = np.random.default_rng(1)
+    t = 0.01 * (np.arange(400) + rng.uniform(-0.3, 0.3, 400))
+    step = np.where(t < 2.0, 0.0, 1.0)
+    steps3 = step + np.where(t < 3.0, 0.0, 1.0)
+    (run,) = even_clock(Log("run", {"t": t, "y": steps3, "u": steps3, "on": step}))
+    assert set(run["u"]) == {0.0, 1.0, 2.0}
+    assert set(run["on"]) == {0.0, 1.0}
+    assert np.all(np.diff(run["y"]) >= 0.0)
+    assert np.sum((run["y"] % 1.0) != 0.0) <= 4
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.sets(st.integers(1, 8), max_size=5))
+def test_gaps_cut_the_log_and_short_runs_are_left_out(cuts: set[int]) -> None:
+    h, t = 0.01, 0.01 * np.arange(1000)
+    for cut in cuts:
+        t[cut * 105 :] += 20 * h
+    runs = even_clock(sliding_log(t=t))
+    assert len(runs) == len(cuts) + 1
+    assert sum(len(run) for run in runs) == 1000
+
+
+def test_runs_all_too_short_are_refused() -> None:
+    t = 0.01 * np.arange(300) + 0.5 * (np.arange(300) // 50)
+    with pytest.raises(BadLog, match="leave no run of 100 samples"):
+        even_clock(sliding_log(t=t))
+
+
+def test_gap_and_jitter_are_remarked() -> None:
+    rng = np.random.default_rng(2)
+    t = 0.01 * (np.arange(1000) + rng.uniform(-0.2, 0.2, 1000))
+    t[500:] += 0.3
+    prepared = prepare(sliding_log(t=t), RIG)
+    assert len(prepared.runs) == 2
+    assert "uneven clock" in prepared.remarks[0]
+    assert "2 runs" in prepared.remarks[0]
+
+
+def test_isolated_nan_is_filled_and_remarked() -> None:
+    log = sliding_log()
+    y = log["y"].copy()
+    y[[100, 500, 501]] = np.nan
+    repaired, remarks = repair(log.with_signals(y=y))
+    np.testing.assert_allclose(repaired["y"], log["y"], atol=1e-4)
+    assert remarks == ("run: 3 isolated missing samples of 'y' interpolated",)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        (range(40, 44), "NaN or infinite for 4 rows from row 42"),
+        ([0], "row 2, an end of the log"),
+        ([1999], "row 2001, an end of the log"),
+        (range(10, 1900, 20), "in 5% of the rows, first in row 12"),
+    ],
+)
+def test_runs_of_nan_are_refused_with_their_row(rows: list[int], message: str) -> None:
+    log = sliding_log()
+    for bad in (np.nan, np.inf):
+        F = log["F"].copy()
+        F[list(rows)] = bad
+        with pytest.raises(BadLog, match=message):
+            repair(log.with_signals(F=F), first_row=2)
+
+
+def test_time_that_goes_back_or_repeats_is_refused_with_its_row() -> None:
+    t = 0.01 * np.arange(200)
+    t[50] = t[49]
+    with pytest.raises(BadLog, match="time repeats in row 52"):
+        check(sliding_log(t=t), RIG, first_row=2)
+    t[50] = t[40]
+    with pytest.raises(BadLog, match="time goes back in row 51"):
+        check(sliding_log(t=t), RIG)
+    t[50] = np.nan
+    with pytest.raises(BadLog, match="time in row 51 is not a number"):
+        check(sliding_log(t=t), RIG)
+
+
+def test_too_short_constant_and_out_of_stroke_are_refused() -> None:
+    log = sliding_log()
+    with pytest.raises(BadLog, match="99 samples, at least 100"):
+        check(log.part(0, 99), RIG)
+    with pytest.raises(BadLog, match="position is constant"):
+        check(log.with_signals(y=np.full(len(log), 0.1)), RIG)
+    with pytest.raises(BadLog, match="stroke"):
+        check(log.with_signals(y=1000.0 * log["y"]), RIG)
+
+
+def test_wrong_sign_and_swap_are_told_apart() -> None:
+    log = sliding_log(n=4000)
+    no_stroke = Rig(kind="force")
+    with pytest.raises(BadLog, match="wrong sign"):
+        check(log.with_signals(F=-log["F"]), no_stroke)
+    with pytest.raises(BadLog, match="look swapped"):
+        check(Log("run", {"t": log["t"], "y": log["F"], "F": log["y"]}), no_stroke)
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.0, 100.0), st.floats(0.0, 1000.0), st.floats(-50.0, 50.0), st.integers(0, 2**31))
+def test_springs_masses_and_offsets_are_not_refused(
+    m: float, k: float, F_0: float, seed: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    t = 0.002 * np.arange(5000)
+    y = np.zeros_like(t)
+    acc = np.zeros_like(t)
+    for f, a, phase in zip(
+        rng.uniform(0.2, 3, 4), rng.normal(size=4), rng.uniform(0, 6, 4), strict=True
+    ):
+        w = 2 * np.pi * f
+        y += 0.05 * a * np.sin(w * t + phase)
+        acc -= 0.05 * a * w**2 * np.sin(w * t + phase)
+    F = m * acc + k * y + F_0 + 2.0 * np.sign(np.gradient(y, t)) + rng.normal(0, 0.1, t.size)
+    check(Log("run", {"t": t, "y": y + rng.normal(0, 1e-5, t.size), "F": F}), Rig(kind="force"))
+
+
+def test_work_share_is_one_for_pure_friction_and_none_without_return() -> None:
+    t = np.linspace(0.0, 10.0, 5000)
+    y = np.sin(t)
+    share = work_share(y, np.sign(np.cos(t)))
+    assert share is not None
+    assert share > 0.9
+    assert work_share(t, np.ones_like(t)) is None
+
+
+def test_applied_force_of_each_rig() -> None:
+    n = 5
+    p_p, p_n = np.linspace(2e5, 3e5, n), np.linspace(4e5, 1e5, n)
+    F, u = np.arange(n, dtype=float), np.linspace(-1, 1, n)
+    log = Log("run", {"t": F, "p_p": p_p, "p_n": p_n, "F": F, "u": u})
+    pneumatic = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=5e5)
+    expected = 12.6e-4 * p_p - 10e-4 * p_n - 2.6e-4 * 5e5
+    np.testing.assert_allclose(applied_force(log, pneumatic), expected, rtol=1e-12)
+    np.testing.assert_allclose(
+        applied_force(log, Rig("force", area_n=2e-4)), F - 2e-4 * p_n, rtol=1e-12
+    )
+    np.testing.assert_allclose(
+        applied_force(log, Rig("force", area_p=3e-4)), F + 3e-4 * p_p, rtol=1e-12
+    )
+    np.testing.assert_allclose(applied_force(log, Rig("motor", force_per_command=7.0)), 7.0 * u)
+    assert applied_force(log, Rig("motor")) is None
+
+
+@given(st.floats(-5, 5), st.floats(-5, 5), st.integers(2, 9))
+def test_velocity_of_a_line_is_its_slope(slope: float, start: float, N_d: int) -> None:
+    y = start + slope * 0.01 * np.arange(50)
+    v = velocity(y, 0.01, N_d)
+    assert v.shape == y.shape
+    assert v[0] == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(v[N_d:], slope, atol=1e-9)
+
+
+def test_velocity_is_the_least_squares_slope() -> None:
+    y = np.random.default_rng(0).normal(size=30)
+    v = velocity(y, 0.5, 5)
+    for k in range(5, 30):
+        slope = np.polyfit(0.5 * np.arange(5), y[k - 4 : k + 1], 1)[0]
+        assert v[k] == pytest.approx(slope, abs=1e-9)
+    with pytest.raises(BadSpecification):
+        velocity(y, 0.5, 1)
+
+
+def test_filters_pass_a_constant_and_match_their_difference_equations() -> None:
+    x = np.random.default_rng(0).normal(size=40) + 3.0
+    out = apply_filter(RIG_A, x)
+    np.testing.assert_allclose(out[1:], 0.5 * out[:-1] + 0.5 * x[1:], rtol=1e-12)
+    assert out[0] == pytest.approx(x[0])
+    out = apply_filter(RIG_C, x)
+    np.testing.assert_allclose(out[1:], 0.8 * out[:-1] + 0.2 * x[1:], rtol=1e-12)
+    low = fir_lowpass(5.0, 1e-3)
+    assert len(low.b) == 41
+    assert sum(low.b) == pytest.approx(1.0)
+    np.testing.assert_allclose(apply_filter(low, np.full(90, 2.0)), 2.0)
+    with pytest.raises(BadSpecification, match="cut-off"):
+        fir_lowpass(600.0, 1e-3)

@@ -1,0 +1,44 @@
+"""The wheel holds our three packages and the cards, and nothing else."""
+
+import zipfile
+from pathlib import Path, PurePosixPath
+
+import pytest
+
+from tools.check_wheel import ROOT, build_wheel
+
+
+@pytest.fixture(scope="module")
+def names(tmp_path_factory: pytest.TempPathFactory) -> list[PurePosixPath]:
+    wheel = build_wheel(tmp_path_factory.mktemp("wheel"))
+    with zipfile.ZipFile(wheel) as archive:
+        return [PurePosixPath(name) for name in archive.namelist()]
+
+
+def test_top_level(names: list[PurePosixPath]) -> None:
+    top = {path.parts[0] for path in names}
+    info = {name for name in top if name.endswith(".dist-info")}
+    assert top - info == {"workbench", "identification", "design"}
+    assert len(info) == 1
+    assert not [path for path in names if "__pycache__" in path.parts]
+
+
+def test_every_module_is_there(names: list[PurePosixPath]) -> None:
+    for package in ("workbench", "identification", "design"):
+        in_tree = {p.relative_to(ROOT).as_posix() for p in (ROOT / package).rglob("*.py")}
+        assert in_tree <= {str(path) for path in names}
+
+
+def test_cards_are_there_and_no_python_among_them(names: list[PurePosixPath]) -> None:
+    held = {path.relative_to("workbench/_datasets") for path in names if "_datasets" in path.parts}
+    cards = {PurePosixPath(p.relative_to(ROOT / "datasets")) for p in _cards()}
+    assert cards <= held
+    assert not [path for path in held if path.suffix == ".py"]
+
+
+def test_licence_is_there(names: list[PurePosixPath]) -> None:
+    assert any(path.name == "LICENSE" for path in names)
+
+
+def _cards() -> list[Path]:
+    return sorted(ROOT.glob("datasets/*/card.toml"))

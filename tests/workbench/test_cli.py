@@ -1,0 +1,216 @@
+"""The command line: lazy, and every error one line with its exit status."""
+
+import errno
+import os
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from types import ModuleType
+
+import click
+import pytest
+
+from identification.errors import BadLog, NotIdentifiable, UserError
+from workbench import cli, commands
+
+HEAVY = ("numpy", "scipy", "numba", "pandas", "matplotlib", "pyarrow", "h5py", "rich", "pydantic")
+Fail = Callable[[BaseException | int | None], None]
+
+
+def buffered() -> dict[str, str]:
+    """This environment, with standard output buffered as for a user."""
+    return {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}
+
+
+def shell(*arguments: str) -> subprocess.CompletedProcess[str]:
+    """The command line in a process of its own."""
+    command = [sys.executable, "-m", "workbench", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
+
+
+@pytest.fixture
+def outcome(monkeypatch: pytest.MonkeyPatch) -> Iterator[Fail]:
+    """Sets how the command `probe` ends: by an error, or with a status."""
+    ends: list[BaseException | int | None] = [None]
+
+    @click.command()
+    @click.option("--size", type=int)
+    def command(size: int | None) -> int | None:
+        if isinstance(ends[0], BaseException):
+            raise ends[0]
+        return ends[0]
+
+    module = ModuleType("workbench.commands.probe")
+    module.__dict__["command"] = command
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    monkeypatch.setitem(cli.COMMANDS, "probe", "A command of the tests.")
+
+    def set_end(end: BaseException | int | None) -> None:
+        ends[0] = end
+
+    yield set_end
+
+
+def test_table_and_folder_agree() -> None:
+    (folder,) = commands.__path__
+    modules = {p.stem for p in Path(folder).glob("*.py") if not p.stem.startswith("_")}
+    assert modules == set(cli.COMMANDS)
+
+
+def test_every_command_shows_help_with_an_example() -> None:
+    group = cli.cli
+    with group.make_context("workbench", [], resilient_parsing=True) as ctx:
+        for name in cli.COMMANDS:
+            command = group.get_command(ctx, name)
+            assert command is not None
+            shown = command.get_help(click.Context(command, parent=ctx, info_name=name))
+            assert f"workbench {name}" in shown.split("Usage:")[1].partition("\n")[2], name
+
+
+def test_help_imports_nothing_numeric() -> None:
+    code = (
+        "import sys; from workbench.cli import main; main(['--help']);"
+        f"print('loaded:', sorted(set({HEAVY!r}) & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.endswith("loaded: []\n")
+    for name, help_line in cli.COMMANDS.items():
+        assert name in done.stdout
+        assert help_line in done.stdout
+
+
+def test_help_is_quick() -> None:
+    def seconds() -> float:
+        start = time.perf_counter()
+        assert shell("--help").returncode == 0
+        return time.perf_counter() - start
+
+    # The best of several, because colleagues share the machine.
+    assert min(seconds() for _ in range(6)) < 0.5
+
+
+def test_no_command_shows_help(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main([]) == 0
+    assert "Commands:" in capsys.readouterr().out
+
+
+def test_version(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["--version"]) == 0
+    assert capsys.readouterr().out.startswith("workbench 0.")
+
+
+@pytest.mark.parametrize("status", [0, 1, None])
+def test_returned_status_is_the_exit_status(outcome: Fail, status: int | None) -> None:
+    outcome(status)
+    assert cli.main(["probe"]) == (status or 0)
+
+
+@pytest.mark.parametrize(
+    ("error", "status", "line"),
+    [
+        (UserError("a: no column 'y'"), 2, "error: a: no column 'y'"),
+        (BadLog("run 3:\n  t goes\r\nback\x1b[1m"), 2, "error: run 3: t goes back\ufffd[1m"),
+        (NotIdentifiable("F_sn"), 1, "refused: F_sn"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (click.Abort(), 130, "interrupted"),
+        (click.FileError("a.csv", "gone"), 2, "error: Could not open file 'a.csv': gone"),
+        (IsADirectoryError(errno.EISDIR, "Is a directory", "x"), 2, "error: x: Is a directory"),
+        (OSError("truncated file"), 2, "error: truncated file"),
+    ],
+)
+def test_error_is_one_line(
+    outcome: Fail,
+    capsys: pytest.CaptureFixture[str],
+    error: BaseException,
+    status: int,
+    line: str,
+) -> None:
+    outcome(error)
+    assert cli.main(["probe"]) == status
+    assert capsys.readouterr() == ("", line + "\n")
+
+
+@pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES, errno.EROFS])
+def test_disk_error_says_what_to_do(
+    outcome: Fail, capsys: pytest.CaptureFixture[str], number: int
+) -> None:
+    outcome(OSError(number, "what the system says", "runs/x"))
+    assert cli.main(["probe"]) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("error: runs/x: what the system says; ")
+    assert "--out" in shown
+    assert shown.count("\n") == 1
+
+
+def test_fault_names_its_place_and_hides_the_traceback(
+    outcome: Fail, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("WORKBENCH_DEBUG", raising=False)
+    outcome(ZeroDivisionError("by\nzero"))
+    assert cli.main(["probe"]) == 3
+    shown = capsys.readouterr().err
+    assert shown.startswith("fault of ours: ZeroDivisionError: by zero (in workbench.cli, line ")
+    assert shown.count("\n") == 1
+
+
+@pytest.mark.parametrize("way", ["option", "variable"])
+def test_debug_shows_the_traceback(
+    outcome: Fail, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, way: str
+) -> None:
+    monkeypatch.setenv("WORKBENCH_DEBUG", "1" if way == "variable" else "0")
+    outcome(ZeroDivisionError("by zero"))
+    assert cli.main(["--debug", "probe"] if way == "option" else ["probe"]) == 3
+    assert "Traceback" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "found"),
+    [
+        (["idntify"], "No such command 'idntify'. Did you mean 'identify'?"),
+        (["xyzzy"], "No such command 'xyzzy'. See 'workbench --help'."),
+        (["probe", "--siz", "3"], "'--size'"),
+        (["probe", "--size", "three"], "'three' is not a valid integer"),
+        (["probe", "extra"], "See 'workbench probe --help'."),
+    ],
+)
+def test_usage_error_is_one_line(
+    outcome: Fail, capsys: pytest.CaptureFixture[str], arguments: list[str], found: str
+) -> None:
+    assert cli.main(arguments) == 2
+    shown = capsys.readouterr().err
+    assert shown.startswith("error: ")
+    assert found in shown
+    assert shown.count("\n") == 1
+
+
+def test_announced_command_without_a_module_is_a_fault(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(cli.COMMANDS, "absent", "No module holds it.")
+    assert cli.main(["absent"]) == 3
+    assert "No module named 'workbench.commands.absent'" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
+def test_full_standard_output_is_one_line() -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "workbench", "--help"]
+        done = subprocess.run(
+            command, stdout=full, stderr=subprocess.PIPE, env=buffered(), text=True, check=False
+        )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: No space left on device")
+    assert done.stderr.count("\n") == 1
+
+
+def test_reader_that_goes_away_is_no_error() -> None:
+    command = [sys.executable, "-m", "workbench", "--help"]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, env=buffered()) as process:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        process.stdout.close()
+        assert process.stderr.read() == b""
+    assert process.returncode == cli.BROKEN_PIPE

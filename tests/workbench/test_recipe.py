@@ -1,0 +1,129 @@
+"""Recipes: from TOML to values, and their contradictions."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
+from identification.errors import BadCard
+from identification.plant import Actuator, Motor
+from workbench.card import load_card
+from workbench.recipe import PD, PID, RST, ForcePI, Recipe
+
+HEAD = '[card]\nname = "a"\n[rig]\nkind = "force"\n'
+RECIPE = """
+[recipe]
+duration_s = 2.0
+h_s = 1e-3
+noise_F = 0.01
+seed = 7
+actuator = { k1 = 19530.0, k2 = 10405.0 }
+friction = { m = 1, F_cp = 12, F_cn = 15, F_vp = 300, F_vn = 200, dv_p = 0.04, dv_n = -0.04, F_sp = 20.6, F_sn = -23 }
+reference = { kind = "steps", levels = [0.0, 0.1], dwell_s = 0.5 }
+effects.spring = { k = 3.0 }
+loop = { position = { kind = "PD", k_d = 200.0, T_d = 0.1, eps = 0.2 }, force = { k_i = 0.02, T_i = 0.05 } }
+"""  # noqa: E501
+
+
+def recipe(folder: Path, text: str) -> Recipe:
+    path = folder / "card.toml"
+    path.write_text(HEAD + text, encoding="utf-8")
+    found = load_card(path).recipe
+    assert found is not None
+    return found
+
+
+def test_a_recipe_is_read_whole(tmp_path: Path) -> None:
+    found = recipe(tmp_path, RECIPE)
+    assert found.plant.friction.F_sn == -23.0
+    assert found.plant.actuator == Actuator(19530.0, 10405.0)
+    assert found.plant.effects["spring"]["k"] == 3.0
+    assert found.reference == Steps((0.0, 0.1), 0.5)
+    assert found.loop is not None
+    assert found.loop.position == PD(200.0, 0.1, 0.2)
+    assert found.loop.force == ForcePI(0.02, 0.05)
+    assert (found.seed, found.noise_F, found.noise_y) == (7, 0.01, 0.0)
+    assert len(found.t) == 2001
+    assert found.t[-1] == pytest.approx(2.0)
+    assert np.all(np.diff(found.t) > 0)
+
+
+def test_a_recipe_s_card_reads_the_log_it_makes(tmp_path: Path) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text(HEAD + RECIPE, encoding="utf-8")
+    card = load_card(path)
+    assert {name: spec.unit for name, spec in card.signals.items()} == {
+        "t": "s",
+        "r": "m",
+        "y": "m",
+        "F": "N",
+        "u": "V",
+    }
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ('{ kind = "ramps", amplitude = 0.1, rate = 0.02 }', Ramps(0.1, 0.02)),
+        ('{ kind = "random_steps", amplitude = 0.1, dwell_s = 2 }', RandomSteps(0.1, 2.0)),
+        (
+            '{ kind = "multisine", amplitude = 0.1, low_hz = 0.1, high_hz = 3, lines = 9 }',
+            Multisine(0.1, 0.1, 3.0, 9),
+        ),
+        (
+            '{ kind = "sum", parts = [{ kind = "ramps", amplitude = 1, rate = 1 }] }',
+            Sum((Ramps(1.0, 1.0),)),
+        ),
+    ],
+)
+def test_every_reference(tmp_path: Path, text: str, value: object) -> None:
+    old = '{ kind = "steps", levels = [0.0, 0.1], dwell_s = 0.5 }'
+    assert recipe(tmp_path, RECIPE.replace(old, text)).reference == value
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ('{ kind = "PID", k_R = 9, T_d = 0.1, T_i = 1, eps = 0.2 }', PID(9.0, 0.1, 1.0, 0.2)),
+        ('{ kind = "RST", R = [1, 2], S = [1], T = [3] }', RST((1.0, 2.0), (1.0,), (3.0,))),
+    ],
+)
+def test_every_position_controller(tmp_path: Path, text: str, value: object) -> None:
+    old = '{ kind = "PD", k_d = 200.0, T_d = 0.1, eps = 0.2 }'
+    loop = recipe(tmp_path, RECIPE.replace(old, text)).loop
+    assert loop is not None
+    assert loop.position == value
+
+
+def test_open_loop_by_command_and_motor(tmp_path: Path) -> None:
+    lines = [line for line in RECIPE.splitlines() if not line.startswith(("loop", "actuator"))]
+    text = "\n".join([*lines, 'drive = "command"', "motor = { k_a = 35.15 }"])
+    found = recipe(tmp_path, text)
+    assert found.loop is None
+    assert found.drive == "command"
+    assert found.plant.actuator == Motor(35.15)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("noise_F", "noise_f", "[recipe] unknown key 'noise_f'; did you mean 'noise_F'?"),
+        ("T_d", "t_d", "unknown key 't_d'; did you mean 'T_d'?"),
+        ("dwell_s", "dwell", "unknown key 'dwell'; did you mean 'dwell_s'?"),
+        ('"steps"', '"step"', "'step'"),
+        ("F_sn = -23", "F_sn = 23", "F_sn = 23 N, must be negative"),
+        ("m = 1,", "m = 0,", "m = 0 kg, must be > 0"),
+        ("actuator = { k1 = 19530.0, k2 = 10405.0 }", "", "one of 'actuator' and 'motor'"),
+        ("seed = 7", 'drive = "command"', "needs a 'loop'"),
+        (", force = { k_i = 0.02, T_i = 0.05 }", "", "needs loop.force with an actuator"),
+        ("h_s = 1e-3", "h_s = 0", "[recipe.h_s] 0: "),
+    ],
+)
+def test_contradictions_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text(HEAD + RECIPE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(BadCard) as caught:
+        load_card(path)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)

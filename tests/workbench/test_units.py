@@ -1,0 +1,72 @@
+"""Units: known conversions, wrong dimensions, and that a round trip is exact."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from identification.errors import BadCard
+from workbench.units import Motion, Scale, scale
+
+
+@pytest.mark.parametrize(
+    ("unit", "signal", "motion", "factor"),
+    [
+        ("mm", "y", "linear", 1e-3),
+        ("inch", "y", "linear", 0.0254),
+        ("bar", "p_p", "linear", 1e5),
+        ("psi", "p_n", "linear", 6894.757293168),
+        ("min", "t", "linear", 60.0),
+        ("ms", "t", "linear", 1e-3),
+        ("kip", "F", "linear", 4448.2216152605),
+        ("lb", "F", "linear", 4.4482216152605),
+        ("lbf", "F", "linear", 4.4482216152605),
+        ("lb ft", "F", "rotary", 1.3558179483314),
+        ("deg", "y", "rotary", 0.017453292519943),
+        ("mV", "u", "linear", 1e-3),
+        ("mA", "u", "linear", 1e-3),
+        ("%", "u", "linear", 1e-2),
+        ("1", "u", "linear", 1.0),
+        ("inch/s", "velocity", "linear", 0.0254),
+    ],
+)
+def test_known_conversions(unit: str, signal: str, motion: Motion, factor: float) -> None:
+    found = scale(unit, signal, motion)
+    assert found.factor == pytest.approx(factor, rel=1e-10)
+    assert found.shift == 0.0
+
+
+def test_temperature_has_an_offset() -> None:
+    found = scale("degC", "temperature")
+    assert found == Scale(1.0, pytest.approx(273.15))
+    assert scale("degF", "temperature").factor == pytest.approx(5 / 9)
+
+
+@pytest.mark.parametrize(
+    ("unit", "signal", "message"),
+    [
+        ("bar", "y", "signals.y: unit 'bar' is not a length such as m, mm or inch"),
+        ("mm", "F", "is not a force"),
+        ("kg", "F", "is not a force"),
+        ("m", "t", "is not a time"),
+        ("N", "p_p", "is not a pressure"),
+        ("m", "u", "is not a command"),
+        ("deg", "y", "is not a length"),
+        ("furlung", "y", "unit 'furlung' is unknown"),
+        ("m m)", "y", "is unknown"),
+        ("3 mm", "y", "is unknown"),
+        ("dBm", "power", "not linear"),
+    ],
+)
+def test_wrong_units_are_refused(unit: str, signal: str, message: str) -> None:
+    with pytest.raises(BadCard) as caught:
+        scale(unit, signal)
+    assert message in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@given(
+    st.sampled_from(["mm", "cm", "km", "inch", "um"]), st.floats(-1e6, 1e6, allow_subnormal=False)
+)
+def test_lengths_scale_by_their_prefix(unit: str, value: float) -> None:
+    sizes = {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "inch": 0.0254, "um": 1e-6}
+    assert value * scale(unit, "y").factor == pytest.approx(value * sizes[unit], rel=1e-12)

@@ -1,0 +1,293 @@
+"""Cards: what a machine is and how its logs are to be read (CONTRACT, "Card").
+
+Beyond the contract's example a card may say (all optional, all additive):
+
+    [card]   title, licence, citation, url, notes = ["a trap", ...]
+    [file]   format = "csv" | "parquet" | "mat" | "hdf5" | "json"   # default: by content
+             header = false      # csv; default: a first line that is not all numbers is one
+             skip_rows = 15      # rows dropped before the header, or before the data without one
+             delimiter, decimal, comment = "#", encoding = "utf-8"  # default: found by looking
+             rows = "data"       # json key, HDF5 group or MAT struct ("a.b") that holds the signals
+    [signals] a column number counts from 0; unit is that of the signal once offset and gain are
+             out of it: column = gain * signal + offset; bits = 16, signed = true reads a column
+             logged as unsigned as two's complement; a scalar beside the rows is a constant signal
+    [rig]    kind = "force": areas and pressures given as well make F_e = F + S_p p_p - S_n p_n
+    [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
+    [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
+    [recipe] see workbench/recipe.py
+"""
+
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, Literal
+
+from pydantic import Field, ValidationError, model_validator
+
+from identification.errors import BadCard, BadModel
+from identification.log import Rig, RigKind
+from workbench.recipe import Positive, Recipe, RecipeSection, Section
+
+Format = Literal["csv", "parquet", "mat", "hdf5", "json"]
+
+_NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
+    "electro-pneumatic": ("t", "y", "p_p", "p_n"),
+    "force": ("t", "y", "F"),
+    "motor": ("t", "y", "u"),
+}
+
+
+class About(Section):
+    """`[card]`: name of the set and where it comes from."""
+
+    name: str = Field(pattern=r"^[\w.-]+$")
+    title: str = ""
+    source: str = ""
+    licence: str = ""
+    citation: str = ""
+    url: str = ""
+    notes: tuple[str, ...] = ()
+
+
+class FileSpec(Section):
+    """`[file]`: how the bytes are laid out; `None` means found by looking."""
+
+    format: Format | None = None
+    header: bool | None = None
+    skip_rows: int = Field(default=0, ge=0)
+    delimiter: str | None = Field(default=None, min_length=1, max_length=1)
+    decimal: Literal[".", ","] | None = None
+    comment: str = "#"
+    rows: str | None = None
+    encoding: str = "utf-8"
+
+
+class SignalSpec(Section):
+    """One signal: column = gain * signal + offset, the signal being in `unit`."""
+
+    column: str | int
+    unit: str
+    gain: float = 1.0
+    offset: float = 0.0
+    bits: int | None = Field(default=None, ge=2, le=52)
+    signed: bool = False
+
+    @model_validator(mode="after")
+    def _invertible(self) -> "SignalSpec":
+        if self.gain == 0.0:
+            raise ValueError("gain must not be 0")
+        if self.signed and self.bits is None:
+            raise ValueError("signed = true needs bits")
+        return self
+
+
+class RigSection(Section):
+    """`[rig]` as a card writes it."""
+
+    kind: RigKind
+    area_p_m2: Positive | None = None
+    area_n_m2: Positive | None = None
+    supply_pressure_pa: float | None = None
+    force_per_command: float | None = None
+    control_limit_v: Positive | None = None
+    stroke_m: tuple[float, float] | None = None
+    motion: Literal["linear", "rotary"] = "linear"
+
+    @model_validator(mode="after")
+    def _complete(self) -> "RigSection":
+        if self.kind == "electro-pneumatic":
+            for key in ("area_p_m2", "area_n_m2", "supply_pressure_pa"):
+                if getattr(self, key) is None:
+                    raise ValueError(f'kind = "electro-pneumatic" needs {key!r} for eq. (7)')
+        if self.stroke_m and self.stroke_m[0] >= self.stroke_m[1]:
+            raise ValueError("stroke_m must be [low, high]")
+        return self
+
+    def value(self) -> Rig:
+        """The rig."""
+        return Rig(
+            kind=self.kind,
+            area_p=self.area_p_m2,
+            area_n=self.area_n_m2,
+            supply_pressure=self.supply_pressure_pa,
+            force_per_command=self.force_per_command,
+            control_limit=self.control_limit_v,
+            stroke=self.stroke_m,
+            motion=self.motion,
+        )
+
+
+class FileEntry(Section):
+    """`[[files]]`: one file of the set, where to fetch it, and what of the rig differs for it."""
+
+    name: str
+    url: str | None = None
+    sha256: str | None = Field(default=None, pattern=r"^[0-9a-f]{64}$")
+    rig: dict[str, Any] = Field(default_factory=dict)
+
+
+class _CardFile(Section):
+    card: About
+    rig: RigSection
+    signals: dict[str, SignalSpec] = Field(default_factory=dict)
+    file: FileSpec = FileSpec()
+    files: tuple[FileEntry, ...] = ()
+    split: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    recipe: RecipeSection | None = None
+
+
+@dataclass(frozen=True)
+class Card:
+    """A card as read: `signals` by canonical name, `files` the set, `split` its named groups."""
+
+    path: Path
+    about: About
+    signals: Mapping[str, SignalSpec]
+    file: FileSpec
+    files: tuple[FileEntry, ...]
+    split: Mapping[str, tuple[str, ...]]
+    recipe: Recipe | None
+    rigs: Mapping[str, Rig]
+
+    @property
+    def name(self) -> str:
+        """The set's name, which is also its folder under WORKBENCH_DATA."""
+        return self.about.name
+
+    def rig(self, file: str = "") -> Rig:
+        """The rig, with what `[[files]]` says of the file of that name."""
+        return self.rigs.get(file, self.rigs[""])
+
+
+def load_card(path: Path) -> Card:
+    """The card in the file `path`.
+
+    Raises BadCard, one line: what was found, in which key, what is needed; an unknown key comes
+    with the nearest right one.
+    """
+    raw = _read_toml(path)
+    try:
+        parsed = _CardFile.model_validate(raw)
+        rigs = {"": parsed.rig.value()}
+        for number, entry in enumerate(parsed.files):
+            if entry.rig:
+                merged = _CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
+                rigs[entry.name] = merged.value()
+                _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
+        recipe = parsed.recipe.value() if parsed.recipe else None
+    except ValidationError as error:
+        raise BadCard(f"{path}: {explain(error)}") from None
+    except BadModel as error:
+        raise BadCard(f"{path}: [recipe] {error}") from None
+    signals = parsed.signals or (_recipe_signals(parsed.rig) if recipe else {})
+    _need_signals(path, parsed.rig, signals, "[rig]")
+    _check_split(path, parsed)
+    return Card(
+        path=path,
+        about=parsed.card,
+        signals=MappingProxyType(signals),
+        file=parsed.file,
+        files=parsed.files,
+        split=MappingProxyType(parsed.split),
+        recipe=recipe,
+        rigs=MappingProxyType(rigs),
+    )
+
+
+def _read_toml(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except FileNotFoundError:
+        raise BadCard(f"{path}: no such card; give a path or the name of a shipped card") from None
+    except IsADirectoryError:
+        raise BadCard(f"{path}: is a directory; give the card.toml in it") from None
+    except UnicodeDecodeError:
+        raise BadCard(f"{path}: is not UTF-8 text, so no card; give a TOML file") from None
+    except OSError as error:
+        raise BadCard(f"{path}: cannot be read ({error.strerror}); check its rights") from None
+    except tomllib.TOMLDecodeError as error:
+        raise BadCard(f"{path}: is not TOML: {error}; correct that line") from None
+
+
+def explain(error: ValidationError) -> str:
+    """The first of pydantic's errors in one line, by the names that the card uses."""
+    first = error.errors(include_url=False)[0]
+    where = ".".join(str(part) for part in first["loc"] if part != "function-before")
+    table = f"[{where}] " if where else ""
+    kind, found = first["type"], first.get("input")
+    if kind == "unknown_key":
+        key = str(first["msg"])
+        return f"{table}unknown key {key!r}{nearest(key, _keys_at(first['loc']))}"
+    if kind == "missing":
+        parent = ".".join(str(part) for part in first["loc"][:-1])
+        return f"{f'[{parent}] ' if parent else ''}has no {first['loc'][-1]!r}; add it"
+    message = " ".join(str(first["msg"]).removeprefix("Value error, ").split())
+    shown = "" if isinstance(found, Mapping) else f"{' '.join(repr(found).split())[:60]}: "
+    return f"{table}{shown}{message[:1].lower()}{message[1:]}"
+
+
+def nearest(key: str, known: Iterable[str]) -> str:
+    """The end of a message on an unknown name: the nearest known one, and what there is."""
+    names = [str(name) for name in known]
+    lowered = {name.lower(): name for name in reversed(names)}
+    close = get_close_matches(key.lower(), lowered, n=1, cutoff=0.5)
+    guess = f"; did you mean {lowered[close[0]]!r}?" if close else ";"
+    listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
+    return f"{guess} (there is: {listed or 'nothing'})"
+
+
+def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
+    """Keys of the section that stands at `loc`, found by walking the sections' fields."""
+    sections: list[type[Section]] = [_CardFile]
+    for part in loc:
+        found = [s.model_fields[str(part)].annotation for s in sections if part in s.model_fields]
+        if found:
+            sections = [inner for annotation in found for inner in _sections_in(annotation)]
+        elif isinstance(part, str):
+            sections = [s for s in sections if _tag(s) == part] or sections
+    return [key for section in sections for key in section.model_fields]
+
+
+def _sections_in(annotation: Any) -> list[type[Section]]:
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        return [annotation]
+    parts = getattr(annotation, "__args__", ())
+    return [section for part in parts for section in _sections_in(part)]
+
+
+def _tag(section: type[Section]) -> str | None:
+    field = section.model_fields.get("kind")
+    tags = [str(tag) for tag in getattr(field.annotation, "__args__", ())] if field else []
+    return tags[0] if len(tags) == 1 else None
+
+
+def _recipe_signals(rig: RigSection) -> dict[str, SignalSpec]:
+    linear = rig.motion == "linear"
+    position, force = ("m", "N") if linear else ("rad", "N m")
+    units = {"t": "s", "r": position, "y": position, "F": force, "u": "V"}
+    return {name: SignalSpec(column=name, unit=unit) for name, unit in units.items()}
+
+
+def _need_signals(
+    path: Path, rig: RigSection, signals: Mapping[str, SignalSpec], where: str
+) -> None:
+    for name in _NEEDED_SIGNALS[rig.kind]:
+        if name not in signals:
+            others = [key for key in signals if key not in _NEEDED_SIGNALS[rig.kind]]
+            raise BadCard(
+                f"{path}: {where} kind = {rig.kind!r} needs signals.{name}{nearest(name, others)}"
+            )
+
+
+def _check_split(path: Path, parsed: _CardFile) -> None:
+    known = [entry.name for entry in parsed.files]
+    for group, names in parsed.split.items():
+        for name in names:
+            if known and name not in known:
+                raise BadCard(f"{path}: [split] {group} names {name!r}{nearest(name, known)}")
+    both = set(parsed.split.get("train", ())) & set(parsed.split.get("test", ()))
+    if both:
+        raise BadCard(f"{path}: [split] {min(both)!r} is in train and in test; keep it in one")

@@ -1,0 +1,149 @@
+"""The command line: one group that imports a command only to run it, and what an error becomes."""
+
+import errno
+import importlib
+import os
+import sys
+import traceback
+from collections.abc import Sequence
+
+import click
+
+from identification.errors import NotIdentifiable, UserError
+
+COMMANDS = {
+    "demo": "Run the whole chain on a shipped recipe and write a report.",
+    "identify": "Find friction, plant and actuator of a machine from its logs.",
+    "predict": "Predict force and position of a log by a model.",
+    "design": "Design PID and RST controllers for a model.",
+    "validate": "Check a design on a plant in simulation.",
+    "simulate": "Make the log of a recipe, its truth beside it.",
+}
+OURS = ("workbench", "identification", "design")
+BROKEN_PIPE = 141
+ADVICE = {
+    errno.ENOSPC: "; free some space, or choose another folder with --out",
+    errno.EDQUOT: "; free some space, or choose another folder with --out",
+    errno.EACCES: "; check its rights, or choose another folder with --out",
+    errno.EPERM: "; check its rights, or choose another folder with --out",
+    errno.EROFS: "; choose another folder with --out",
+}
+
+
+class LazyGroup(click.Group):
+    """The commands of `COMMANDS`; each is imported from `workbench.commands` when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
+        if cmd_name not in COMMANDS:
+            raise click.NoSuchCommand(cmd_name, possibilities=COMMANDS, ctx=ctx)
+        command = importlib.import_module(f"workbench.commands.{cmd_name}").command
+        if not isinstance(command, click.Command):
+            raise TypeError(f"workbench.commands.{cmd_name}.command is no click.Command")
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, invoke_without_command=True)
+@click.version_option(package_name="servo-workbench", message="%(prog)s %(version)s")
+@click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of a fault.")
+@click.pass_context
+def cli(ctx: click.Context) -> None:
+    """A log of a positioning servo goes in, a re-tuned controller comes out.
+
+    Example: workbench demo
+    """
+    if ctx.invoked_subcommand is None:
+        click.echo(ctx.get_help())
+
+
+def one_line(text: str) -> str:
+    """The text on one line, without characters that a terminal would obey."""
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in _folded(text))
+
+
+def verdict(error: BaseException) -> tuple[int, str]:
+    """Exit status and message (empty: say nothing) of an error that ended a command."""
+    match error:
+        case BrokenPipeError():
+            return BROKEN_PIPE, ""
+        case KeyboardInterrupt() | click.Abort():
+            return 130, "interrupted"
+        case NotIdentifiable():
+            return 1, f"refused: {error}"
+        case UserError():
+            return 2, f"error: {error}"
+        case click.UsageError(ctx=click.Context() as ctx):
+            return 2, f"error: {error.format_message()} See '{ctx.command_path} --help'."
+        case click.ClickException():
+            return 2, f"error: {error.format_message()}"
+        case OSError():
+            return 2, f"error: {_os_message(error)}"
+        case _:
+            kind = type(error).__name__
+            where = f"in {_place(error)}; --debug shows the traceback"
+            return 3, f"fault of ours: {kind}: {error} ({where})"
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Exit status of the command line `argv`, by default the arguments of this process."""
+    arguments = tuple(sys.argv[1:] if argv is None else argv)
+    try:
+        return _run(arguments)
+    except (Exception, KeyboardInterrupt) as error:
+        status, message = verdict(error)
+        if status == 3 and _debug(arguments):
+            traceback.print_exception(error)
+    _flush_or_drop()
+    if message:
+        click.echo(one_line(message), err=True)
+    return status
+
+
+def _run(arguments: Sequence[str]) -> int:
+    """Exit status of a command that ends without an error."""
+    try:
+        with cli.make_context("workbench", list(arguments)) as ctx:
+            status = cli.invoke(ctx)
+    except click.exceptions.Exit as stop:
+        status = stop.exit_code
+    sys.stdout.flush()
+    return int(status or 0)
+
+
+def _debug(arguments: Sequence[str]) -> bool:
+    return "--debug" in arguments or os.environ.get("WORKBENCH_DEBUG", "0") not in ("", "0")
+
+
+def _flush_or_drop() -> None:
+    """Flush standard output; where nobody takes it, drop it, or Python complains at its end."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def _folded(text: str) -> str:
+    return " ".join(text.split())
+
+
+def _os_message(error: OSError) -> str:
+    if error.strerror is None:
+        return str(error)
+    place = "" if error.filename is None else f"{error.filename}: "
+    return f"{place}{error.strerror}{ADVICE.get(error.errno or 0, '')}"
+
+
+def _place(error: BaseException) -> str:
+    """Module and line of the last frame in our packages."""
+    place = "an unknown place"
+    for frame, line in traceback.walk_tb(error.__traceback__):
+        module = str(frame.f_globals.get("__name__"))
+        if module.partition(".")[0] in OURS:
+            place = f"{module}, line {line}"
+    return place

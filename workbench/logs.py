@@ -1,0 +1,146 @@
+"""Log files read by their card: canonical signals in SI, the applied force F_e among them."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arrays import Array
+from identification.clean import Prepared, applied_force, check, prepare, repair
+from identification.errors import BadCard, BadLog
+from identification.log import Log
+from workbench.card import Card, SignalSpec
+from workbench.tables import damaged, read_table
+from workbench.units import scale
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """What tells a log file from every other: name, sha256 of its bytes, rows read from it."""
+
+    file: str
+    sha256: str
+    rows: int
+
+    def as_json(self) -> dict[str, str | int]:
+        """The fingerprint as results carry it."""
+        return asdict(self)
+
+
+def read_log(path: Path, card: Card) -> Log:
+    """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
+
+    Isolated missing samples are interpolated. A `kind = "force"` rig with pressures keeps the
+    force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or its
+    content is not what the card says.
+    """
+    raw, first_row = _read_signals(path, card)
+    log = _with_force(repair(raw, first_row).log, path, card)
+    check(log, card.rig(path.name), first_row)
+    return log
+
+
+def read_runs(path: Path, card: Card) -> Prepared:
+    """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
+    raw, first_row = _read_signals(path, card)
+    repaired = repair(raw, first_row)
+    log = _with_force(repaired.log, path, card)
+    prepared = prepare(log, card.rig(path.name), first_row)
+    return Prepared(prepared.runs, (*repaired.remarks, *prepared.remarks))
+
+
+def fingerprint(path: Path, log: Log) -> Fingerprint:
+    """Name, sha256 and rows of the file from which `log` was read."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+    return Fingerprint(path.name, digest.hexdigest(), len(log))
+
+
+def _with_force(log: Log, path: Path, card: Card) -> Log:
+    rig = card.rig(path.name)
+    F = applied_force(log, rig)
+    if F is None:
+        return log
+    if "F" in log and F is not log["F"]:
+        log = log.with_signals(F_logged=log["F"])
+    return log.with_signals(F=F)
+
+
+def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
+    """The card's signals in SI as they stand in the file, and the number of the first row."""
+    if not card.signals:
+        raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
+    table = read_table(path, card.file)
+    signals = {}
+    for name, spec in card.signals.items():
+        where = f"{path}, signals.{name}"
+        try:
+            raw = table.column(spec.column, where)
+        except BadLog:
+            raise
+        except Exception as error:  # columns are read late, so damage may show only here
+            raise damaged(path, card.file.format or "data", error) from error
+        numbers = _numbers(raw, f"{path}: column {spec.column!r}", table.first_row)
+        signals[name] = _to_si(numbers, name, spec, card, path)
+    return Log(path.name, _same_length(signals, path)), table.first_row
+
+
+def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:
+    """Raw values as float64; raises BadLog naming the row of the first that is no number."""
+    if raw.dtype.kind in "fiub":
+        return np.asarray(raw, dtype=np.float64)
+    if raw.dtype.kind not in "OUS":
+        what = "dates" if raw.dtype.kind in "Mm" else f"of type {raw.dtype}"
+        raise BadLog(f"{where} is {what}, numbers needed; log numbers (time in seconds)")
+    out = np.empty(len(raw))
+    for k, value in enumerate(raw):
+        out[k] = _number(value, f"{where}, row {first_row + k}")
+    return out
+
+
+def _number(value: object, where: str) -> float:
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    if text is None or text == "":
+        return float("nan")
+    if isinstance(text, str) and text.strip().lower() in ("true", "false"):
+        return float(text.strip().lower() == "true")
+    if isinstance(text, str | int | float | np.generic):
+        try:
+            return float(text)
+        except ValueError:
+            pass
+    shown = " ".join(repr(text).split())[:40]
+    raise BadLog(f"{where}: {shown} is not a number; correct it or leave the field empty")
+
+
+def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -> Array:
+    rig = card.rig(path.name)
+    if spec.bits is not None and spec.signed:
+        values = np.where(values >= 2.0 ** (spec.bits - 1), values - 2.0**spec.bits, values)
+    if spec.offset != 0.0:
+        values = values - spec.offset
+    if spec.gain != 1.0:
+        values = values / spec.gain
+    try:
+        factor, shift = scale(spec.unit, name, rig.motion)
+    except BadCard as error:
+        raise BadCard(f"{card.path}: {error}") from None
+    if factor != 1.0:
+        values = values * factor
+    return values + shift if shift != 0.0 else values
+
+
+def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
+    """The signals at the length of `t`, single values spread; others raise BadLog."""
+    length = len(signals["t"])
+    for name, values in signals.items():
+        if len(values) not in (1, length):
+            raise BadLog(
+                f"{path}: signal {name!r} has {len(values)} values and t {length}; "
+                "all signals of a run need one length"
+            )
+    return {k: v if len(v) == length else np.full(length, v[0]) for k, v in signals.items()}

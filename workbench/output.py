@@ -1,0 +1,195 @@
+"""What every command writes and shows: folders written whole, strict JSON, tables, progress."""
+
+import errno
+import itertools
+import json
+import math
+import secrets
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import fields, is_dataclass
+from datetime import datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import click
+
+from identification.errors import UserError
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+Advance = Callable[[float], None]
+PIPED_WIDTH = 120
+
+
+class BadOutput(UserError):
+    """A place where results cannot be written."""
+
+
+class OutputFolder:
+    """Results that appear whole when the `with` block ends, or not at all where it raises.
+
+    `path` is where the block writes; `final`, after the block, is where the results lie: `out`,
+    or runs/<now>-<command>. In an `out` that exists, files of the same name are replaced one by
+    one at the end and others stay. Raises BadOutput where `out` cannot be such a folder.
+    """
+
+    def __init__(self, command: str, out: Path | None = None, *, now: datetime) -> None:
+        default = Path("runs") / f"{now:%Y%m%d-%H%M%S}-{command}"
+        self._default = out is None
+        self.final = default if out is None else out
+        self._inside = not self._default and self.final.is_dir()
+        home = self.final if self._inside else self.final.parent
+        self.path = home / f".{self.final.name}.{secrets.token_hex(4)}.part"
+        self._made: list[Path] = []
+
+    def __enter__(self) -> Self:
+        if not self._default and self.final.exists() and not self._inside:
+            raise BadOutput(f"--out {self.final} is a file; name a folder, new or existing")
+        home = self.path.parent
+        self._made = [p for p in (home, *home.parents) if not p.exists()]
+        try:
+            self.path.mkdir(parents=True)
+        except BaseException:
+            self._clear()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        try:
+            if kind is None:
+                self._publish()
+        finally:
+            self._clear()
+
+    def write_json(self, name: str, result: object) -> Path:
+        """Path of the file that now holds `result` as strict JSON."""
+        return self.write_text(name, dumps(result) + "\n")
+
+    def write_text(self, name: str, text: str) -> Path:
+        """Path of the file that now holds `text`."""
+        target = self.path / name
+        target.write_text(text, encoding="utf-8")
+        return target
+
+    def _publish(self) -> None:
+        if self._inside:
+            self._replace_files()
+        elif self._default:
+            self._rename_to_free_name()
+        else:
+            self.path.rename(self.final)
+
+    def _replace_files(self) -> None:
+        new = sorted(p.relative_to(self.path) for p in self.path.rglob("*") if p.is_file())
+        for name in new:
+            if (self.final / name).is_dir():
+                raise BadOutput(f"{self.final / name} is a folder; a result needs that name")
+        for name in new:
+            (self.final / name).parent.mkdir(parents=True, exist_ok=True)
+            (self.path / name).replace(self.final / name)
+
+    def _rename_to_free_name(self) -> None:
+        """Two runs of one second get two folders, also where they end together."""
+        first = self.final
+        for number in itertools.count(2):
+            try:
+                self.path.rename(self.final)
+                return
+            except OSError as error:
+                if error.errno not in (errno.ENOTEMPTY, errno.EEXIST):
+                    raise
+            self.final = first.with_name(f"{first.name}-{number}")
+
+    def _clear(self) -> None:
+        shutil.rmtree(self.path, ignore_errors=True)
+        for folder in self._made:
+            with suppress(OSError):
+                folder.rmdir()
+
+
+def output_options(command: Command) -> Command:
+    """The options of every command: `as_json: bool` (--json) and `out: Path | None` (--out)."""
+    options = (
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        click.option(
+            "--out",
+            type=click.Path(path_type=Path),
+            metavar="DIR",
+            help="Folder for the results.  [default: runs/<time>-<command>]",
+        ),
+        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def strict(value: object) -> object:
+    """The value as plain JSON types; NaN and infinity become None.
+
+    Takes dataclasses, mappings, sequences, arrays, dates and paths. Raises TypeError on others.
+    """
+    match value:
+        case None | bool() | int() | str():
+            return value
+        case float():
+            return float(value) if math.isfinite(value) else None
+        case Mapping():
+            return {str(key): strict(entry) for key, entry in value.items()}
+        case Path():
+            return str(value)
+        case datetime():
+            return value.isoformat()
+        case _ if is_dataclass(value):
+            return {field.name: strict(getattr(value, field.name)) for field in fields(value)}
+        case Sequence() if not isinstance(value, bytes):
+            return [strict(entry) for entry in value]
+        case _ if hasattr(value, "tolist"):
+            return strict(value.tolist())
+        case _:
+            raise TypeError(f"{type(value).__name__} has no form in JSON")
+
+
+def dumps(result: object) -> str:
+    """The result as strict JSON text, in ASCII."""
+    return json.dumps(strict(result), indent=2, allow_nan=False)
+
+
+def emit(result: object, as_json: bool, table: Callable[[], object]) -> None:
+    """Print `result` as JSON, or what `table()` returns: a text or anything rich can show."""
+    if as_json:
+        click.echo(dumps(result))
+        return
+    from rich.console import Console
+
+    # No markup: "[m/s]" is a unit here, not a style.
+    width = None if sys.stdout.isatty() else PIPED_WIDTH
+    console = Console(markup=False, highlight=False, emoji=False, width=width)
+    with console.capture() as shown:
+        console.print(table())
+    click.echo(shown.get(), nl=False)
+
+
+@contextmanager
+def progress(label: str, total: float | None = None, *, as_json: bool = False) -> Iterator[Advance]:
+    """A function that advances a bar on standard error; mute without a terminal or with JSON.
+
+    total: what the advances add up to; None shows that something goes on.
+    """
+    if as_json or not sys.stderr.isatty():
+        yield lambda _step: None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(label, total=total)
+        yield lambda step: bar.advance(task, step)

@@ -1,0 +1,332 @@
+"""A recipe: plant, loop, reference, noise and seed from which `workbench simulate` makes a log.
+
+Values only. In a card it stands under `[recipe]`; levels and amplitudes are in m (rad) where the
+loop is closed and in V where `drive = "command"`; noise is a standard deviation in SI.
+
+    [recipe]
+    duration_s = 40.0
+    h_s = 1e-3
+    seed = 1
+    noise_F = 1e-2
+    noise_y = 1e-5
+    drive = "loop"                          # or "command": reference is u, open loop
+    friction = { m = 1.0, F_cp = 12.0, ... }            # the nine
+    actuator = { k1 = 19530.0, k2 = 10405.0 }           # or motor = { k_a = 35.15 }
+    reference = { kind = "steps", levels = [0.0, 0.1], dwell_s = 5.0 }
+    effects.stribeck = { F_s = 5.0, v_s = 0.02 }        # effect key -> its parameters
+    [recipe.loop]
+    position = { kind = "PID", k_R = 1754.0, T_d = 0.018, T_i = 0.072, eps = 0.2 }
+    force = { k_i = 0.02, T_i = 0.05 }                  # none with a motor: the force is exact
+    control_limit_v = 5.0
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from identification.arrays import Array
+from identification.excitation import Multisine, Ramps, RandomSteps, ReferenceSpec, Steps, Sum
+from identification.karnopp import Karnopp
+from identification.plant import Actuator, Motor, Plant
+
+
+@dataclass(frozen=True)
+class PD:
+    """k_d (1 + T_d s/(eps s + 1)); k_d [N/m], times [s]."""
+
+    k_d: float
+    T_d: float
+    eps: float
+
+
+@dataclass(frozen=True)
+class PID:
+    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)); k_R [N/m], times [s]."""
+
+    k_R: float
+    T_d: float
+    T_i: float
+    eps: float
+
+
+@dataclass(frozen=True)
+class RST:
+    """Polynomials in z^-1: S(z^-1) F_ref = T(z^-1) r - R(z^-1) y."""
+
+    R: tuple[float, ...]
+    S: tuple[float, ...]
+    T: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class ForcePI:
+    """The force loop C_F = k_i (1 + 1/(T_i s)); k_i [V/N], T_i [s]."""
+
+    k_i: float
+    T_i: float
+
+
+@dataclass(frozen=True)
+class LoopSpec:
+    """Position controller, force controller (`None` for a motor) and limit of the command [V]."""
+
+    position: PD | PID | RST
+    force: ForcePI | None = None
+    control_limit: float | None = None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """Everything that makes a log but the code; `loop` is `None` where `drive` is "command".
+
+    `reference` is r [m] in the loop, and the command u [V] without it. Noise: standard deviations
+    of force [N], position [m], pressures [Pa]. duration, h in s.
+    """
+
+    plant: Plant
+    duration: float
+    h: float
+    loop: LoopSpec | None
+    reference: ReferenceSpec
+    noise_F: float = 0.0
+    noise_y: float = 0.0
+    noise_p: float = 0.0
+    seed: int = 0
+    drive: Literal["loop", "command"] = "loop"
+
+    @property
+    def t(self) -> Array:
+        """Sampling instants [s], from 0 to the duration."""
+        return self.h * np.arange(round(self.duration / self.h) + 1, dtype=np.float64)
+
+
+class Section(BaseModel):
+    """A table of a card: unknown keys are refused with the nearest right one."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _known_keys(cls, values: object) -> object:
+        if isinstance(values, Mapping):
+            for key in values:
+                if key not in cls.model_fields:
+                    raise PydanticCustomError("unknown_key", "{key}", {"key": str(key)})
+        return values
+
+
+Positive = Annotated[float, Field(gt=0)]
+NotNegative = Annotated[float, Field(ge=0)]
+
+
+class StepsSection(Section):
+    """`Steps` as a card writes it."""
+
+    kind: Literal["steps"]
+    levels: tuple[float, ...] = Field(min_length=1)
+    dwell_s: Positive
+
+    def value(self) -> Steps:
+        """The specification."""
+        return Steps(self.levels, self.dwell_s)
+
+
+class RandomStepsSection(Section):
+    """`RandomSteps` as a card writes it."""
+
+    kind: Literal["random_steps"]
+    amplitude: Positive
+    dwell_s: Positive
+
+    def value(self) -> RandomSteps:
+        """The specification."""
+        return RandomSteps(self.amplitude, self.dwell_s)
+
+
+class RampsSection(Section):
+    """`Ramps` as a card writes it."""
+
+    kind: Literal["ramps"]
+    amplitude: Positive
+    rate: Positive
+
+    def value(self) -> Ramps:
+        """The specification."""
+        return Ramps(self.amplitude, self.rate)
+
+
+class MultisineSection(Section):
+    """`Multisine` as a card writes it."""
+
+    kind: Literal["multisine"]
+    amplitude: Positive
+    low_hz: Positive
+    high_hz: Positive
+    lines: int = Field(default=20, ge=1)
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "MultisineSection":
+        if self.high_hz <= self.low_hz:
+            raise ValueError("high_hz must be above low_hz")
+        return self
+
+    def value(self) -> Multisine:
+        """The specification."""
+        return Multisine(self.amplitude, self.low_hz, self.high_hz, self.lines)
+
+
+class SumSection(Section):
+    """`Sum` as a card writes it."""
+
+    kind: Literal["sum"]
+    parts: "tuple[ReferenceSection, ...]" = Field(min_length=1)
+
+    def value(self) -> Sum:
+        """The specification."""
+        return Sum(tuple(part.value() for part in self.parts))
+
+
+ReferenceSection = Annotated[
+    StepsSection | RandomStepsSection | RampsSection | MultisineSection | SumSection,
+    Field(discriminator="kind"),
+]
+
+
+class PDSection(Section):
+    """`PD` as a card writes it."""
+
+    kind: Literal["PD"]
+    k_d: Positive
+    T_d: NotNegative
+    eps: Positive
+
+    def value(self) -> PD:
+        """The controller."""
+        return PD(self.k_d, self.T_d, self.eps)
+
+
+class PIDSection(Section):
+    """`PID` as a card writes it."""
+
+    kind: Literal["PID"]
+    k_R: Positive
+    T_d: NotNegative
+    T_i: Positive
+    eps: Positive
+
+    def value(self) -> PID:
+        """The controller."""
+        return PID(self.k_R, self.T_d, self.T_i, self.eps)
+
+
+class RSTSection(Section):
+    """`RST` as a card writes it."""
+
+    kind: Literal["RST"]
+    R: tuple[float, ...] = Field(min_length=1)
+    S: tuple[float, ...] = Field(min_length=1)
+    T: tuple[float, ...] = Field(min_length=1)
+
+    def value(self) -> RST:
+        """The controller."""
+        return RST(self.R, self.S, self.T)
+
+
+class ForceSection(Section):
+    """`ForcePI` as a card writes it."""
+
+    k_i: Positive
+    T_i: Positive
+
+
+class LoopSection(Section):
+    """`LoopSpec` as a card writes it."""
+
+    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")]
+    force: ForceSection | None = None
+    control_limit_v: Positive | None = None
+
+    def value(self) -> LoopSpec:
+        """The loop."""
+        force = ForcePI(self.force.k_i, self.force.T_i) if self.force else None
+        return LoopSpec(self.position.value(), force, self.control_limit_v)
+
+
+class FrictionSection(Section):
+    """The nine parameters; signs are checked by `Karnopp`."""
+
+    m: float
+    F_cp: float
+    F_cn: float
+    F_vp: float
+    F_vn: float
+    dv_p: float
+    dv_n: float
+    F_sp: float
+    F_sn: float
+
+
+class ActuatorSection(Section):
+    """The linear electro-pneumatic actuator."""
+
+    k1: Positive
+    k2: NotNegative
+
+
+class MotorSection(Section):
+    """The motor without dynamics."""
+
+    k_a: float
+
+
+class RecipeSection(Section):
+    """`[recipe]` of a card."""
+
+    duration_s: Positive
+    h_s: Positive
+    friction: FrictionSection
+    reference: ReferenceSection
+    actuator: ActuatorSection | None = None
+    motor: MotorSection | None = None
+    effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+    loop: LoopSection | None = None
+    drive: Literal["loop", "command"] = "loop"
+    noise_F: NotNegative = 0.0
+    noise_y: NotNegative = 0.0
+    noise_p: NotNegative = 0.0
+    seed: int = Field(default=0, ge=0)
+
+    @model_validator(mode="after")
+    def _consistent(self) -> "RecipeSection":
+        if (self.actuator is None) == (self.motor is None):
+            raise ValueError("needs one of 'actuator' and 'motor'")
+        if (self.drive == "loop") != (self.loop is not None):
+            raise ValueError("needs a 'loop' where drive is \"loop\", and none otherwise")
+        if self.loop and (self.loop.force is None) != (self.actuator is None):
+            raise ValueError("needs loop.force with an actuator, and none with a motor")
+        return self
+
+    def value(self) -> Recipe:
+        """The recipe; raises BadModel where a parameter has the wrong sign."""
+        drive = (
+            Actuator(self.actuator.k1, self.actuator.k2)
+            if self.actuator
+            else Motor(self.motor.k_a if self.motor else 0.0)
+        )
+        plant = Plant(Karnopp(**self.friction.model_dump()), drive, self.effects)
+        return Recipe(
+            plant=plant,
+            duration=self.duration_s,
+            h=self.h_s,
+            loop=self.loop.value() if self.loop else None,
+            reference=self.reference.value(),
+            noise_F=self.noise_F,
+            noise_y=self.noise_y,
+            noise_p=self.noise_p,
+            seed=self.seed,
+            drive=self.drive,
+        )

@@ -1,0 +1,181 @@
+"""Text tables: delimiter, decimal sign and header found by looking, numbers read by Arrow."""
+
+import csv
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.errors import BadLog
+from workbench.card import FileSpec
+
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_DELIMITERS = (";", "\t", ",", " ")
+_LOOK = 65536  # characters looked at to find the layout
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """Columns of a text file, as `tables.Table` has them."""
+
+    names: tuple[str, ...]
+    fetch: Callable[[int], NDArray[Any]]
+    first_row: int
+    headed: bool
+
+
+@dataclass(frozen=True)
+class _Layout:
+    delimiter: str
+    decimal: str
+
+
+def read_text_table(path: Path, spec: FileSpec) -> TextTable:
+    """The columns of a text file, its layout as the card says, else as the file looks.
+
+    Raises BadLog where the file is not text, has no rows, or a row has the wrong number of fields.
+    """
+    text = _decode(path, spec.encoding)
+    lines = text[:_LOOK].splitlines()
+    start = spec.skip_rows
+    while start < len(lines) and _skipped(lines[start], spec.comment):
+        start += 1
+    lines = lines[start:] if len(text) <= _LOOK else lines[start:-1]
+    if not lines:
+        raise BadLog(f"{path}: no rows after line {start}; check skip_rows in the card")
+    layout = _layout([line for line in lines[1:40] if not _skipped(line, spec.comment)], spec)
+    first = _split(lines[0], layout)
+    headed = spec.header if spec.header is not None else not all(map(_is_number, first))
+    names = tuple(first) if headed else tuple(str(k) for k in range(len(first)))
+    body = _body(text, start + int(headed), spec, layout)
+    if not body.strip():
+        raise BadLog(f"{path}: has a header but no rows; log some data")
+    first_row = start + int(headed) + 1
+    columns = _parse(path, body, layout, len(names), first_row)
+    return TextTable(names, columns, first_row, headed)
+
+
+def _decode(path: Path, encoding: str) -> str:
+    content = path.read_bytes()
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        encoding = "utf-16"
+    try:
+        text = content.decode(encoding)
+    except LookupError:
+        raise BadLog(f"{path}: encoding {encoding!r} is unknown; write it as 'latin-1'") from None
+    except UnicodeDecodeError as error:
+        line = content[: error.start].count(b"\n") + 1
+        what = "is not text" if b"\0" in content[:_LOOK] else f"is not {encoding} text"
+        raise BadLog(
+            f"{path}: {what} (byte 0x{content[error.start]:02x} in line {line}); give a CSV file, "
+            'or name its encoding in the card, [file] encoding = "latin-1"'
+        ) from None
+    if "\0" in text:
+        raise BadLog(f"{path}: is a binary file, not text; give its format in the card's [file]")
+    return text.removeprefix("\ufeff")
+
+
+def _skipped(line: str, comment: str) -> bool:
+    return not line.strip() or bool(comment and line.lstrip().startswith(comment))
+
+
+def _layout(lines: list[str], spec: FileSpec) -> _Layout:
+    """The delimiter that makes most fields numbers in lines of equal length, and the decimal."""
+    best, most = ",", -1.0
+    for delimiter in (spec.delimiter,) if spec.delimiter else _DELIMITERS:
+        rows = [_split(line, _Layout(delimiter, ".")) for line in lines]
+        widths = [len(row) for row in rows]
+        if not widths or max(widths) == 1:
+            continue
+        width = max(set(widths), key=widths.count)
+        fields = [field for row in rows for field in row]
+        share = sum(map(_is_number, fields)) / len(fields) + widths.count(width) / len(widths)
+        if share > most:
+            best, most = delimiter, share
+    best = spec.delimiter or best
+    fields = [field for line in lines for field in _split(line, _Layout(best, "."))]
+    comma = best != "," and any(map(_DECIMAL_COMMA.fullmatch, fields))
+    return _Layout(best, spec.decimal or ("," if comma else "."))
+
+
+def _split(line: str, layout: _Layout) -> list[str]:
+    if layout.delimiter == " ":
+        return line.split()
+    fields = next(csv.reader([line.rstrip("\r\n")], delimiter=layout.delimiter), [])
+    return [field.strip() for field in fields]
+
+
+def _is_number(field: str) -> bool:
+    return not field or _NUMBER.fullmatch(field) is not None
+
+
+def _body(text: str, start: int, spec: FileSpec, layout: _Layout) -> str:
+    """The rows' text from line `start`, comments left out, one delimiter between fields."""
+    at = 0
+    for _ in range(start):
+        at = text.find("\n", at) + 1
+        if at == 0:
+            return ""
+    body = text[at:]
+    if spec.comment and spec.comment in body:
+        kept = (line for line in body.splitlines() if not line.lstrip().startswith(spec.comment))
+        body = "\n".join(kept)
+    if layout.delimiter == " ":
+        body = "\n".join(" ".join(line.split()) for line in body.splitlines())
+    return body
+
+
+def _parse(
+    path: Path, body: str, layout: _Layout, width: int, first_row: int
+) -> Callable[[int], NDArray[Any]]:
+    import pyarrow as pa
+    from pyarrow import csv as arrow
+
+    content = body.encode("utf-8")
+    wrong: list[tuple[int, int]] = []
+
+    def note(row: Any) -> str:
+        wrong.append((int(row.number or 0), int(row.actual_columns)))
+        return "skip"
+
+    names = [str(k) for k in range(width)]
+    parse = arrow.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=note)
+    read = arrow.ReadOptions(column_names=names, use_threads=False)
+
+    def load(kind: Any, wanted: list[str]) -> Any:
+        convert = arrow.ConvertOptions(
+            column_types=dict.fromkeys(names, kind),
+            decimal_point=layout.decimal,
+            include_columns=wanted,
+        )
+        found = arrow.read_csv(pa.BufferReader(content), read, parse, convert)
+        if wrong:
+            row, fields = wrong[0]
+            raise BadLog(
+                f"{path}: row {first_row + row - 1} has {fields} fields, {width} needed "
+                f"({len(wrong)} such rows); correct or remove it"
+            )
+        return found
+
+    try:
+        numbers = load(pa.float64(), names)
+    except pa.ArrowInvalid:
+        numbers = None
+
+    def fetch(number: int) -> NDArray[Any]:
+        if numbers is not None:
+            return np.asarray(numbers.column(number).to_numpy())
+        try:
+            return np.asarray(load(pa.float64(), [names[number]]).column(0).to_numpy())
+        except pa.ArrowInvalid:
+            column = load(pa.string(), [names[number]]).column(0).to_pylist()
+        if layout.decimal == ",":
+            column = [None if value is None else value.replace(",", ".") for value in column]
+        return np.asarray(column, dtype=object)
+
+    return fetch

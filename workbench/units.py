@@ -1,0 +1,90 @@
+"""Units of a card's signals: from what is written to SI, and what dimension a signal must have."""
+
+from functools import cache
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+
+from identification.errors import BadCard
+
+if TYPE_CHECKING:
+    import pint
+
+Motion = Literal["linear", "rotary"]
+
+_POSITION = {"linear": "m", "rotary": "rad"}
+_FORCE = {"linear": "N", "rotary": "N m"}
+_NAMES = {
+    "s": "a time such as s, ms or min",
+    "m": "a length such as m, mm or inch",
+    "rad": "an angle such as rad, deg or turn",
+    "Pa": "a pressure such as Pa, bar or psi",
+    "N": "a force such as N, kN, lbf or kip",
+    "N m": "a torque such as N m or lbf ft",
+    "V": "a command such as V, mA or 1 (duty)",
+}
+# Logs of forces are often in pounds: as a force they are read as pounds-force.
+_POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
+
+
+class Scale(NamedTuple):
+    """SI value = factor * value + shift."""
+
+    factor: float
+    shift: float
+
+
+def si_unit(signal: str, motion: Motion) -> str | None:
+    """The SI unit a canonical signal has, `None` for an extra, which may have any."""
+    table = {"t": "s", "y": _POSITION[motion], "r": _POSITION[motion], "p_p": "Pa", "p_n": "Pa"}
+    return {**table, "F": _FORCE[motion], "u": "V"}.get(signal)
+
+
+def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
+    """Factor and shift from `unit` to SI for a signal of this name.
+
+    The command `u` may be a voltage, a current or a pure number (duty). A temperature becomes
+    kelvin. Raises BadCard where the unit is unknown or of the wrong dimension; the caller says
+    in which file.
+    """
+    need = si_unit(signal, motion)
+    if unit == need:
+        return Scale(1.0, 0.0)
+    if need in ("N", "N m"):
+        unit = " ".join(_POUNDS.get(word, word) for word in unit.split())
+    for target in ("V", "A", "1") if signal == "u" else (need,):
+        found = _convert(unit, target)
+        if found is not None:
+            return found
+    raise BadCard(f"signals.{signal}: unit {unit!r} is not {_NAMES[need or '']}")
+
+
+def _convert(unit: str, target: str | None) -> Scale | None:
+    """The affine map from `unit` to `target` (to its own SI base where None); None if unlike."""
+    import pint  # its registry takes longer than all the rest of a short command
+
+    registry = _registry()
+    try:
+        parsed = registry.Unit("dimensionless" if unit.strip() in ("", "1") else unit)
+        base = registry.Unit("dimensionless" if target == "1" else target) if target else None
+        points = [_to_si(value, parsed, base) for value in (0.0, 1.0, 2.0)]
+    except pint.DimensionalityError:
+        return None
+    except Exception as error:  # pint raises tokenizer and attribute errors on odd text
+        raise BadCard(f"unit {unit!r} is unknown; write it as in 'mm', 'bar', 'N m'") from error
+    shift, factor = points[0], points[1] - points[0]
+    if not np.isclose(points[2], 2.0 * factor + shift) or factor == 0.0:
+        raise BadCard(f"unit {unit!r} is not linear; log in a linear unit")
+    return Scale(factor, shift)
+
+
+def _to_si(value: float, unit: "pint.Unit", base: "pint.Unit | None") -> float:
+    quantity = _registry().Quantity(value, unit)
+    return float((quantity.to(base) if base is not None else quantity.to_base_units()).magnitude)
+
+
+@cache
+def _registry() -> "pint.UnitRegistry[float]":
+    import pint
+
+    return pint.UnitRegistry(autoconvert_offset_to_baseunit=True)
