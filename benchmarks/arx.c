@@ -25,23 +25,3 @@ void covariance_pass(const double *y, const double *u, size_t n, double *out)
     for (int k = 0; k < 21; k++)
         out[k] = c[k];
 }
-
-/* The same by blocks that stay in cache: one vectorised sum for each entry. */
-void covariance_blocks(const double *y, const double *u, size_t n, double *out)
-{
-    const size_t block = 2048;
-    for (int k = 0; k < 21; k++)
-        out[k] = 0.0;
-    for (size_t s = 4; s < n; s += block) {
-        const size_t m = s + block < n ? block : n - s;
-        const double *z[6] = {y + s, y + s - 1, y + s - 2, y + s - 3, u + s - 3, u + s - 4};
-        int at = 0;
-        for (int i = 0; i < 6; i++)
-            for (int j = i; j < 6; j++) {
-                double sum = 0.0;
-                for (size_t t = 0; t < m; t++)
-                    sum += z[i][t] * z[j][t];
-                out[at++] += sum;
-            }
-    }
-}

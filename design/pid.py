@@ -126,7 +126,10 @@ def pid_gains(controller: RST) -> PIDGains:
     eps = -controller.h / math.log(a)
     if k_R == 0 or k_i == 0:
         raise BadSpecification(f"k_R = {k_R:.4g}, k_i = {k_i:.4g}: no parallel form; both needed")
-    gains = PIDGains(k_R, controller.h * k_R / k_i, eps * (r0 / k_R - 1), eps)
+    derivative = r0 / k_R - 1
+    if abs(derivative) < 1e-6:  # rounding of a PI
+        derivative = 0.0
+    gains = PIDGains(k_R, controller.h * k_R / k_i, eps * derivative, eps)
     if gains.T_i <= 0 or gains.T_d < 0:
         raise BadSpecification(
             f"T_i = {gains.T_i:.4g} s, T_d = {gains.T_d:.4g} s: a parallel PID needs T_i > 0 and "
@@ -187,7 +190,7 @@ def design_pid(
 
 def _place_all(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tuple[Array, Array]:
     """R and S of a PID for a plant of order 2 or less: every pole as asked."""
-    most = A.size + B.size - 4
+    most = A.size - 1  # then S keeps its degree 2
     if P_a.size - 1 > most:
         raise BadSpecification(
             f"{P_a.size - 1} auxiliary poles asked, a PID on this plant places {most} besides the "

@@ -91,7 +91,7 @@ def solve_sylvester(a: Array, b: Array, P: Array) -> tuple[Array, Array, bool]:
     if n_r == 0:
         return np.zeros(1), P / a[0], True
     n_s = max(b.size - 1, P.size - n_r)
-    b_scale = math.ldexp(1.0, math.frexp(float(np.abs(a).max() / np.abs(b).max()))[1])
+    b_scale = math.ldexp(1.0, math.frexp(float(np.abs(a).max()) / float(np.abs(b).max()))[1])
     b = b * b_scale
     target = np.zeros(n_s + n_r)
     target[: P.size] = P

@@ -109,16 +109,21 @@ def roots(c: Array) -> ComplexArray:
     return np.asarray(found, dtype=np.complex128)
 
 
+def root_values(z: ArrayLike, name: str = "poles") -> ComplexArray:
+    """z as one row of complex numbers; raises BadSpecification where they are not numbers."""
+    try:
+        return np.atleast_1d(np.asarray(z, dtype=np.complex128)).ravel()
+    except (TypeError, ValueError):
+        raise BadSpecification(f"{name}: not numbers; give values of z") from None
+
+
 def from_roots(z: ArrayLike, name: str = "poles") -> Array:
     """The real polynomial prod(1 - z_k z^-1); a root at 0 adds nothing.
 
     z: roots, complex ones with their conjugates, shape (n,). Raises BadSpecification where one
     is not finite or a conjugate is missing.
     """
-    try:
-        values = np.atleast_1d(np.asarray(z, dtype=np.complex128)).ravel()
-    except (TypeError, ValueError):
-        raise BadSpecification(f"{name}: not numbers; give values of z") from None
+    values = root_values(z, name)
     if not np.all(np.isfinite(values)):
         raise BadSpecification(f"{name}: NaN or infinite value; give finite values of z")
     upper = np.sort_complex(values[values.imag > 0])

@@ -15,6 +15,7 @@ from design.polynomial import (
     common_roots,
     describe_root,
     multiply,
+    root_error,
     roots,
 )
 from design.specification import (
@@ -111,10 +112,13 @@ def design_rst(
     R, S = solve_diophantine(A, B_minus, np.convolve(P_d, P_a), H_R=H_R, H_S=H_S, h=h)
     S = np.convolve(S, B_plus)
     R, S = R / S[0], S / S[0]
-    check_cancelled(common_roots(S, B, distance=1e-6), h)
+    P = multiply(P_d, P_a, B_plus)
+    # A zero of B in S is cancelled only if it is a closed-loop pole; else S is just large.
+    shared = [z for z in common_roots(S, B, distance=1e-6) if root_error(P, complex(z)) < 1e-9]
+    check_cancelled(np.array(shared, dtype=np.complex128), h)
     B_m, A_m = reference_model(model, h)
     forward = tracking_polynomial(T, R, B_minus, P_d, P_a)
-    controller = RST(R, S, forward, h, multiply(P_d, P_a, B_plus), B_m, A_m)
+    controller = RST(R, S, forward, h, P, B_m, A_m)
     for z in closed_loop_poles(A, B, controller)[:1]:
         if abs(z) >= 1:
             raise BadSpecification(

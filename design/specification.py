@@ -18,6 +18,7 @@ from design.polynomial import (
     from_roots,
     leading_zeros,
     root_error,
+    root_values,
     roots,
     second_order,
 )
@@ -27,6 +28,7 @@ from identification.errors import BadSpecification
 Tracking = Literal["all-poles", "keep-dominant", "unit-static", "R"]
 LEAST_DAMPING = 0.1  # of a plant zero that the controller may cancel
 NEAREST_TO_ONE = 1e-12
+LEAST = 1e-150
 
 
 def normalised_plant(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
@@ -36,6 +38,11 @@ def normalised_plant(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
         raise BadSpecification("A[0] = 0: not a causal plant; write it as 1 + a1 z^-1 + ...")
     if leading_zeros(b) == b.size:
         raise BadSpecification("B is all zero: the command does not move the output")
+    if np.abs(b).max() < LEAST * np.abs(a).max() or abs(a[0]) < LEAST * np.abs(a).max():
+        raise BadSpecification(
+            f"A[0] = {a[0]:.3g}, largest of B {np.abs(b).max():.3g}: too small beside A's largest "
+            f"{np.abs(a).max():.3g}; scale the command or the output"
+        )
     return a / a[0], b / a[0]
 
 
@@ -73,7 +80,7 @@ def auxiliary_polynomial(auxiliary: ArrayLike, h: float | None = None) -> Array:
 
     Raises BadSpecification where one is on or outside the unit circle, or lacks its conjugate.
     """
-    z = np.atleast_1d(np.asarray(auxiliary, dtype=np.complex128)).ravel()
+    z = root_values(auxiliary, "auxiliary poles")
     P = from_roots(z, "auxiliary poles")
     for value in z[np.abs(z) >= 1]:
         raise BadSpecification(

@@ -58,10 +58,11 @@ def as_runs(logs: Runs) -> list[Run]:
         logs = [(np.asarray(logs[0]), np.asarray(logs[1]))]
     if len(logs) == 0:
         raise BadLog("no run to fit (0 found, at least 1 needed)")
-    for number, run in enumerate(logs, start=1):
+    runs = [tuple(np.asarray(signal) for signal in run) for run in logs]
+    for number, run in enumerate(runs, start=1):
         if len(run) != 2:
             raise BadLog(f"run {number}: {len(run)} signals; a run is the pair (u, y)")
-    return [(np.asarray(run[0]), np.asarray(run[1])) for run in logs]
+    return [(run[0], run[1]) for run in runs]
 
 
 def fit_arx(logs: Runs, na: int, nb: int, nk: int, h: float, *, offset: bool = False) -> ArxModel:
@@ -80,7 +81,7 @@ def fit_arx(logs: Runs, na: int, nb: int, nk: int, h: float, *, offset: bool = F
             if exact:
                 raise
             continue
-        if factor.trusted(model.condition):
+        if factor.trusted(model.condition, model.residual_rms):
             break
     return model
 
@@ -113,17 +114,18 @@ def model_of(factor: Factor, order: Order, h: float, *, offset: bool = False) ->
         )
     norms = np.sqrt(np.sum(R[:, :-1] ** 2, axis=0))
     _refuse_zero(norms, order, offset)
-    scale = np.append(norms, 1.0)
-    T = np.linalg.qr(R / scale, mode="r")
+    scaled: Array = R / np.append(norms, 1.0)
+    T = np.asarray(np.linalg.qr(scaled, mode="r"), dtype=np.float64)
     angles = np.abs(np.diagonal(T)[:size])
     _refuse_dependent(angles, order, offset)
-    solved = _back_substituted(T[:size, :size], np.column_stack([T[:size, size], np.eye(size)]))
+    triangle: Array = T[:size, :size]
+    solved = _back_substituted(triangle, np.column_stack([T[:size, size], np.eye(size)]))
     theta, inverse = solved[:, 0] / norms, solved[:, 1:] / norms[:, None]
     rss = float(T[size, size] ** 2) if T.shape[0] > size else 0.0
     variance = rss / (factor.rows - size)
     covariance = variance * (inverse @ inverse.T)
     sd = np.sqrt(np.diagonal(covariance))
-    sizes = np.linalg.svd(T[:size, :size], compute_uv=False)
+    sizes = np.linalg.svd(triangle, compute_uv=False)
     moving = float(np.sum(factor.R[1:, -1] ** 2))
     c = int(offset)
     return ArxModel(

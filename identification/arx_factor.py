@@ -4,12 +4,12 @@ The factor R is that of QR of `[1, y(t-1).., u(t-nk).., y(t)]`, made from the Gr
 
 - exact: lagged products as pairs of doubles (relative rounding about 2^-90), edges and Cholesky in
   40 digits. The rounding of R is then 2^-90 cond^2, below that of Householder QR, 2^-53 cond, for
-  any cond under 2^37; beyond 1e14 a column counts as a combination of the ones before it.
+  any cond under 2^37; beyond 1e13 a column counts as a combination of the ones before it.
 - plain: products in double, three times as fast; harmless where `Factor.trusted` says so, that is
-  where its rounding (at most 1e-14 of the columns' lengths) times cond^2 stays under 1e-8.
+  where its rounding (1e-14 of the columns' lengths) times cond^2 stays under 1e-8, and is small
+  against the part of y that is left over.
 """
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -18,18 +18,19 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.arx_kernels import add_lagged_products, add_to_pair
+from identification.arx_kernels import ONES, U, Y, add_lagged_products, add_to_pair
 from identification.errors import BadLog, BadModel
 
 DIGITS = 40
 PIECE = 1 << 18
 CONVERTED = 1 << 19
-WORKERS = min(os.cpu_count() or 1, 4)
+WORKERS = 4
 # Sine of the angle to the columns before it under which a column says nothing of its own.
-SMALLEST_ANGLE = 1e-14
-# Rounding of a plain product sum, times cond^2, allowed in the estimate (relative).
+SMALLEST_ANGLE = 1e-13
+# Rounding of a plain sum of products; what it may do to an estimate and to its noise variance.
 PLAIN_ROUNDING = 1e-14
 PLAIN_ERROR = 1e-8
+PLAIN_VARIANCE = 1e-4
 
 
 @dataclass(frozen=True)
@@ -70,9 +71,11 @@ class Factor:
     rows: int
     rounding: float
 
-    def trusted(self, condition: float) -> bool:
-        """Whether an estimate from columns of this condition has no rounding that matters."""
-        return self.rounding * condition**2 <= PLAIN_ERROR
+    def trusted(self, condition: float, residual_rms: float) -> bool:
+        """Whether rounding does not matter to an estimate of this condition and residual."""
+        target = float(np.sum(self.R[:, -1] ** 2))
+        estimate = self.rounding * condition**2 <= PLAIN_ERROR
+        return estimate and self.rounding * target <= PLAIN_VARIANCE * residual_rms**2 * self.rows
 
     def columns(self, order: Order, offset: bool) -> IntArray:
         """Places of the columns of a smaller model, the target last."""
@@ -95,17 +98,16 @@ class _Run:
     def __init__(self, order: Order, exact: bool, number: int) -> None:
         na, nb, nk = order.na, order.nb, order.nk
         self.lag, self.exact, self.number = order.lag, exact, number
-        lowest = max(nk - na, 0)
-        self.lags = np.array(
-            [
-                [0, na + 1],
-                [0, nb],
-                [lowest, nk + nb - lowest if nb else 0],
-                [1, max(na - nk, 0) if nb else 0],
-            ],
-            dtype=np.int64,
-        )
-        self.high = np.zeros(int(self.lags[:, 1].sum()) + 2)
+        apart = range(max(nk - na, 0), nk + nb) if nb else range(0)
+        lags_u = sorted({*range(1, nb), *apart} - {0})
+        factors = [(Y, 0), (U, 0), (ONES, 0), *((Y, k) for k in range(1, na + 1))]
+        factors += [(U, k) for k in lags_u]
+        self.factors = np.array(factors, dtype=np.int64)
+        back = range(1, na - nk + 1) if nb else range(0)
+        own = {ONES: range(1), U: range(nb), Y: back}
+        wanted = [[b != U or k in apart for b, k in factors], [k in own[b] for b, k in factors]]
+        self.wanted = np.array(wanted, dtype=np.int64)
+        self.high = np.zeros(self.wanted.shape)
         self.low = np.zeros_like(self.high)
         self.head = np.zeros((2, 0))
         self.tail = np.zeros((2, 0))
@@ -130,59 +132,53 @@ class _Run:
         self.samples += len(y)
 
     def _add_products(self, y: Array, u: Array, high: Array, low: Array) -> None:
-        """Add to `high + low` what the samples after the first `lag` give, on all cores."""
+        """Add to `high + low` what the samples after the first `lag` give, in threads."""
 
         def part(start: int) -> tuple[Array, Array]:
             own = slice(start - self.lag, start + PIECE)
             sums = np.zeros_like(high), np.zeros_like(low)
             views = _read_only(y[own]), _read_only(u[own])
-            add_lagged_products(*views, self.lag, self.lags, self.exact, *sums)
+            add_lagged_products(*views, self.lag, self.factors, self.wanted, self.exact, *sums)
             return sums
 
         starts = range(self.lag, len(y), PIECE)
         with ThreadPoolExecutor(max(min(len(starts), WORKERS), 1)) as pool:
-            for pair in (pool.map if len(starts) > 1 else map)(part, starts):
-                for k, (value, rest) in enumerate(zip(*pair, strict=True)):
-                    add_to_pair(high, low, k, value, rest)
+            for more in (pool.map if len(starts) > 1 else map)(part, starts):
+                for row, k in np.ndindex(high.shape):
+                    value, rest = float(more[0][row, k]), float(more[1][row, k])
+                    add_to_pair(high[row], low[row], k, value, rest)
+
+    def _product(self, a: int, b: int, k: int) -> Decimal:
+        """sum a(s) b(s-k), s from `lag` on; 0 for one that is not wanted."""
+        at = np.flatnonzero((self.factors == (b, k)).all(axis=1) & (self.wanted[a] != 0))
+        return sum((Decimal(self.high[a, i]) + Decimal(self.low[a, i]) for i in at), Decimal(0))
 
     def energy(self) -> Array:
         """Sums of y^2 and u^2 that no column of this run exceeds, shape (2,)."""
-        first_u = int(self.lags[0, 1] + self.lags[2, 1]) + 1
-        squares = np.array([self.high[0], self.high[first_u] if self.lags[1, 1] else 0.0])
+        squares = np.array([self._product(Y, Y, 0), self._product(U, U, 0)], dtype=np.float64)
         return np.asarray(squares + np.sum(self.head**2, axis=1), dtype=np.float64)
 
     def gram(self, order: Order) -> list[list[Decimal]]:
         """Gram matrix of the columns of Factor, in the current decimal context."""
-        products = [Decimal(a) + Decimal(b) for a, b in zip(self.high, self.low, strict=True)]
-        after_y = int(self.lags[0, 1] + self.lags[2, 1])
-        sums = {"y": products.pop(after_y), "u": products.pop()}
-        ends = {
-            name: ([*map(Decimal, self.head[row])], [*map(Decimal, self.tail[row])])
-            for row, name in enumerate("yu")
-        }
-        table: dict[tuple[str, int, str, int], Decimal] = {}
-        at = 0
-        for a, b, row in (("y", "y", 0), ("y", "u", 2), ("u", "u", 1), ("u", "y", 3)):
-            start, count = self.lags[row].tolist()
-            for k in range(start, start + count):
-                total = products[at]
-                at += 1
-                for i in range(self.lag - k + 1):
-                    table[a, i, b, i + k] = table[b, i + k, a, i] = total
-                    if i + k < self.lag:
-                        total += ends[a][0][-1 - i] * ends[b][0][-1 - i - k]
-                        total -= ends[a][1][-1 - i] * ends[b][1][-1 - i - k]
-        means: dict[tuple[str, int], Decimal] = {}
-        for a in "yu":
-            total = sums[a]
-            for i in range(self.lag + 1):
-                means[a, i] = total
-                if i < self.lag:
-                    total += ends[a][0][-1 - i] - ends[a][1][-1 - i]
-        own = [("y", i) for i in range(1, order.na + 1)]
-        own += [("u", order.nk + j) for j in range(order.nb)] + [("y", 0)]
-        one = [Decimal(self.samples - self.lag), *(means[c] for c in own)]
-        return [one, *([means[c], *(table[c + d] for d in own)] for c in own)]
+        ends = [([*map(Decimal, self.head[a])], [*map(Decimal, self.tail[a])]) for a in (Y, U)]
+        table: dict[tuple[int, int, int, int], Decimal] = {}
+        sums: dict[tuple[int, int], Decimal] = {}
+        for a, at in zip(*np.nonzero(self.wanted), strict=True):
+            b, k = self.factors[at].tolist()
+            total = self._product(int(a), b, k)
+            (head, tail), other = ends[a], ends[b] if b != ONES else None
+            for i in range(self.lag - k + 1):
+                if other is None:
+                    sums[int(a), i] = total
+                else:
+                    table[int(a), i, b, i + k] = table[b, i + k, int(a), i] = total
+                if i + k < self.lag:
+                    total += head[-1 - i] * (other[0][-1 - i - k] if other else 1)
+                    total -= tail[-1 - i] * (other[1][-1 - i - k] if other else 1)
+        own = [(Y, i) for i in range(1, order.na + 1)]
+        own += [(U, order.nk + j) for j in range(order.nb)] + [(Y, 0)]
+        one = [Decimal(self.samples - self.lag), *(sums[c] for c in own)]
+        return [one, *([sums[c], *(table[c + d] for d in own)] for c in own)]
 
 
 def _read_only(values: Array) -> Array:

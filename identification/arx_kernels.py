@@ -4,7 +4,8 @@ With `y(t-i)` and `u(t-j)` as regressors nearly all entries of their Gram matrix
 product seen from another lag, so one pass over `na + nb + ...` products replaces the matrix.
 """
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, cast
 
 import numpy as np
 from numba import types
@@ -15,17 +16,20 @@ from identification.compiled import compiled, compiled_fast, compiled_inline
 
 BLOCK = 8192
 LANES = 512
+Y, U, ONES = 0, 1, 2
 
 
-@intrinsic  # type: ignore[untyped-decorator]
-def fused(_context: Any, a: Any, b: Any, c: Any) -> Any:
-    """a b + c with one rounding, whatever the optimiser thinks of it."""
+def _fused(_context: Any, a: Any, b: Any, c: Any) -> Any:
     double = types.float64
 
     def generate(_target: Any, builder: Any, _signature: Any, values: Any) -> Any:
         return builder.fma(*values)
 
     return double(double, double, double), generate
+
+
+# a b + c with one rounding, whatever the optimiser thinks of it; within compiled functions only.
+fused = cast(Callable[[float, float, float], float], intrinsic(_fused))
 
 
 @compiled_fast
@@ -40,22 +44,44 @@ def plain_dot(x: Array, z: Array) -> float:
 @compiled_fast
 def plain_dots(
     x: Array,
+    v: Array,
     z: tuple[Array, Array, Array, Array, Array, Array, Array, Array],
-) -> tuple[float, float, float, float, float, float, float, float]:
-    """Eight sums of x z at the price of three: x is read once and the sums overlap."""
+    out: Array,
+) -> None:
+    """Set `out`, shape (2, 11), to the sums of x b and v b, b = x, v, 1 and the eight of z.
+
+    One loop over ten arrays: it is the loads that cost, nearly each across two cache lines, so
+    no array is loaded twice.
+    """
     z0, z1, z2, z3, z4, z5, z6, z7 = z
-    a = b = c = d = e = f = g = h = 0.0
+    xx = xv = vv = x1 = v1 = 0.0
+    a0 = a1 = a2 = a3 = a4 = a5 = a6 = a7 = 0.0
+    b0 = b1 = b2 = b3 = b4 = b5 = b6 = b7 = 0.0
     for i in range(x.shape[0]):
-        v = x[i]
-        a += v * z0[i]
-        b += v * z1[i]
-        c += v * z2[i]
-        d += v * z3[i]
-        e += v * z4[i]
-        f += v * z5[i]
-        g += v * z6[i]
-        h += v * z7[i]
-    return a, b, c, d, e, f, g, h
+        p, q = x[i], v[i]
+        xx += p * p
+        xv += p * q
+        vv += q * q
+        x1 += p
+        v1 += q
+        a0 += p * z0[i]
+        b0 += q * z0[i]
+        a1 += p * z1[i]
+        b1 += q * z1[i]
+        a2 += p * z2[i]
+        b2 += q * z2[i]
+        a3 += p * z3[i]
+        b3 += q * z3[i]
+        a4 += p * z4[i]
+        b4 += q * z4[i]
+        a5 += p * z5[i]
+        b5 += q * z5[i]
+        a6 += p * z6[i]
+        b6 += q * z6[i]
+        a7 += p * z7[i]
+        b7 += q * z7[i]
+    out[0] = (xx, xv, x1, a0, a1, a2, a3, a4, a5, a6, a7)
+    out[1] = (xv, vv, v1, b0, b1, b2, b3, b4, b5, b6, b7)
 
 
 @compiled_fast
@@ -101,80 +127,72 @@ def add_to_pair(high: Array, low: Array, k: int, value: float, rest: float) -> N
 
 
 @compiled
-def _lagged(y: Array, u: Array, s: int, e: int, lags: IntArray, row: int, target: int) -> Array:
-    """The `target`-th factor of y (row 0) or u (row 1): lags of the same signal, then the other."""
-    own = lags[row, 1]
-    k = lags[row, 0] + target if target < own else lags[row + 2, 0] + target - own
-    if (row == 0) == (target < own):
-        return y[s - k : e - k]
-    return u[s - k : e - k]
+def _factor(y: Array, u: Array, s: int, e: int, factors: IntArray, i: int) -> Array:
+    """The i-th factor over the block; past the last one, the first."""
+    i = i if i < factors.shape[0] else 0
+    k = factors[i, 1]
+    return y[s - k : e - k] if factors[i, 0] == Y else u[s - k : e - k]
 
 
 @compiled
 def _add_plain(
-    y: Array, u: Array, s: int, e: int, lags: IntArray, row: int, high: Array, low: Array
+    y: Array, u: Array, s: int, e: int, factors: IntArray, high: Array, low: Array
 ) -> None:
-    x = y[s:e] if row == 0 else u[s:e]
-    count = lags[row, 1] + lags[row + 2, 1]
-    i = 0
-    while i < count:
-        if count - i < 4:
-            add_to_pair(high, low, i, plain_dot(x, _lagged(y, u, s, e, lags, row, i)), 0.0)
-            i += 1
-            continue
-        last = count - 1
+    out = np.empty((2, 11))
+    m = factors.shape[0]
+    for i in range(3, max(m, 4), 8):
         eight = (
-            _lagged(y, u, s, e, lags, row, i),
-            _lagged(y, u, s, e, lags, row, i + 1),
-            _lagged(y, u, s, e, lags, row, i + 2),
-            _lagged(y, u, s, e, lags, row, i + 3),
-            _lagged(y, u, s, e, lags, row, min(i + 4, last)),
-            _lagged(y, u, s, e, lags, row, min(i + 5, last)),
-            _lagged(y, u, s, e, lags, row, min(i + 6, last)),
-            _lagged(y, u, s, e, lags, row, min(i + 7, last)),
+            _factor(y, u, s, e, factors, i),
+            _factor(y, u, s, e, factors, i + 1),
+            _factor(y, u, s, e, factors, i + 2),
+            _factor(y, u, s, e, factors, i + 3),
+            _factor(y, u, s, e, factors, i + 4),
+            _factor(y, u, s, e, factors, i + 5),
+            _factor(y, u, s, e, factors, i + 6),
+            _factor(y, u, s, e, factors, i + 7),
         )
-        sums = plain_dots(x, eight)
-        for j in range(min(8, count - i)):
-            add_to_pair(high, low, i + j, sums[j], 0.0)
-        i += 8
-    add_to_pair(high, low, count, plain_sum(x), 0.0)
+        plain_dots(y[s:e], u[s:e], eight, out)
+        for row in range(2):
+            for j in range(0 if i == 3 else 3, min(11, m - i + 3)):
+                add_to_pair(high[row], low[row], i - 3 + j, out[row, j], 0.0)
 
 
 @compiled
 def add_lagged_products(
-    y: Array, u: Array, first: int, lags: IntArray, exact: bool, high: Array, low: Array
+    y: Array,
+    u: Array,
+    first: int,
+    factors: IntArray,
+    wanted: IntArray,
+    exact: bool,
+    high: Array,
+    low: Array,
 ) -> None:
     """Add sum_s a(s) b(s-k), s from `first` to the end, to the pairs `high + low`.
 
-    y, u: shape (n,). lags: shape (4, 2), the first lag and the number of lags of y y, u u, y u and
-    u y in turn; no lag above `first`. high, low: shape (sum of the numbers + 2,): y y, y u, the
-    sum of y, then u u, u y, the sum of u. exact: products by `exact_dot`, else by `plain_dot`;
-    the sum over blocks is compensated in both.
+    y, u: shape (n,). a is y in the first row of `high` and `low`, u in the second; shape (2, m).
+    factors: shape (m, 2), what b is and its lag k, at most `first`: (Y, 0), (U, 0), (ONES, 0),
+    then any of Y and U. exact: products by `exact_dot`, and only those where `wanted`, shape
+    (2, m), is not 0; else by `plain_dots`, all of them. The sum over blocks is compensated in both.
     """
     ones = np.ones(BLOCK)
     work_high = np.zeros(LANES)
     work_low = np.zeros(LANES)
-    norms = np.ones(2)
+    norms = np.ones(3)
     n = y.shape[0]
     for s in range(first, n, BLOCK):
         e = min(s + BLOCK, n)
-        if exact:
-            norms[0] = np.sqrt(plain_dot(y[s - first : e], y[s - first : e]))
-            norms[1] = np.sqrt(plain_dot(u[s - first : e], u[s - first : e]))
-        at = 0
+        if not exact:
+            _add_plain(y, u, s, e, factors, high, low)
+            continue
+        norms[Y] = np.sqrt(plain_dot(y[s - first : e], y[s - first : e]))
+        norms[U] = np.sqrt(plain_dot(u[s - first : e], u[s - first : e]))
+        norms[ONES] = np.sqrt(float(e - s))
         for row in range(2):
-            x = y[s:e] if row == 0 else u[s:e]
-            own = lags[row, 1]
-            count = own + lags[row + 2, 1]
-            if exact:
-                for i in range(count):
-                    z = _lagged(y, u, s, e, lags, row, i)
-                    sigma = 2.0 * norms[row] * norms[row if i < own else 1 - row]
+            x = y[s:e] if row == Y else u[s:e]
+            for i in range(factors.shape[0]):
+                if wanted[row, i] != 0:
+                    z = ones[: e - s] if i == 2 else _factor(y, u, s, e, factors, i)
+                    sigma = 2.0 * norms[row] * norms[factors[i, 0]]
                     value, rest = exact_dot(x, z, sigma, work_high, work_low)
-                    add_to_pair(high, low, at + i, value, rest)
-                sigma = 2.0 * norms[row] * np.sqrt(float(e - s))
-                value, rest = exact_dot(x, ones[: e - s], sigma, work_high, work_low)
-                add_to_pair(high, low, at + count, value, rest)
-            else:
-                _add_plain(y, u, s, e, lags, row, high[at:], low[at:])
-            at += count + 1
+                    add_to_pair(high[row], low[row], i, value, rest)

@@ -88,7 +88,7 @@ def _check_work(log: Log) -> None:
     work = work_share(log["y"], log["F"])
     if work is None or work > _SWAPPED:
         return
-    found = f"{log.name}: over closed paths the applied force takes out {-work:.0%} of the work"
+    found = f"{log.name}: the applied force takes out {-work:.0%} of the work it exchanges"
     roughness = _path(log["F"]) / max(_path(log["y"]), 1e-12)
     if roughness < (1.0 if work < _WRONG_SIGN else _MUCH_SMOOTHER):
         raise BadLog(
@@ -103,12 +103,12 @@ def _check_work(log: Log) -> None:
 
 
 def work_share(y: Array, F: Array) -> float | None:
-    """Work of `F` over the closed part of the path, as a share of the work exchanged there.
+    """Work of `F` as a share of the work exchanged: +1 for friction alone, 0 without any.
 
-    Between the first and the last passage of mid-stroke every force of position alone (spring,
-    weight) does no work, and friction makes the rest positive: +1 for friction alone, about 0
-    where inertia or springs rule. `None` where the motion does not come back. White noise of the
-    sensors does not bias it, since it is uncorrelated between y and F.
+    The larger of two shares: over the whole log, where kinetic energy drops out if it begins and
+    ends at rest, and between the first and the last passage of mid-stroke, where every force of
+    position alone (spring, weight) does. `None` where the motion does not come back. White noise
+    of the sensors does not bias it, since it is uncorrelated between y and F.
     """
     y, F = _blocks(y), _blocks(F)
     above = y > 0.5 * (y.min() + y.max())
@@ -116,12 +116,16 @@ def work_share(y: Array, F: Array) -> float | None:
     if passages.size < 2:
         return None
     last = passages[0::2][-1] if passages.size > 2 else passages[1]
-    path = slice(int(passages[0]), int(last) + 2)
-    step = np.diff(y[path])
-    force = 0.5 * (F[path][1:] + F[path][:-1])
+    closed = slice(int(passages[0]), int(last) + 2)
+    return max(_share(y, F), _share(y[closed], F[closed]))
+
+
+def _share(y: Array, F: Array) -> float:
+    step = np.diff(y)
+    force = 0.5 * (F[1:] + F[:-1])
     force = force - force.mean()
     exchanged = float(np.sum(np.abs(force * step)))
-    return float(np.sum(force * step)) / exchanged if exchanged > 0 else None
+    return float(np.sum(force * step)) / exchanged if exchanged > 0 else 0.0
 
 
 def _path(values: Array) -> float:

@@ -173,9 +173,7 @@ def velocity(y: Array, h: float, N_d: int = 5) -> Array:
     taken to rest at y[0]. Causal: it lags by (N_d - 1)/2 samples. Source: paper, eq. (5).
     """
     if N_d < 2 or h <= 0:
-        raise BadSpecification(
-            f"velocity: N_d = {N_d}, h = {h:g} s; need N_d >= 2, h > 0"
-        )
+        raise BadSpecification(f"velocity: N_d = {N_d}, h = {h:g} s; need N_d >= 2, h > 0")
     j = np.arange(N_d) - 0.5 * (N_d - 1)
     slope = Filter(tuple(float(w) for w in j[::-1] / (h * np.sum(j**2))))
     return apply_filter(slope, y)

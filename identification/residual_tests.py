@@ -85,14 +85,15 @@ def residual_tests(
     """Both tests on one run `(u, y)` or several.
 
     max_lag: number M of lags. lag_step: samples between tested lags of e; None takes a tenth of
-    the time in which y decorrelates. fitted: the model was fitted on these runs, so part of the
-    correlations was fitted away. Raises BadLog where the runs are too short.
+    the time in which y decorrelates, or what the runs allow. fitted: the model was fitted on these
+    runs, so part of the correlations was fitted away. Raises BadLog where the runs are too short.
     """
     runs = as_runs(logs)
     errors = [one_step_errors(model, u, y) for u, y in runs]
     inputs = [np.asarray(u, dtype=np.float64)[model.lag :] for u, _ in runs]
     if lag_step is None:
-        lag_step = plant_step([y for _, y in runs])
+        longest = min(map(len, errors)) // (4 * max_lag)
+        lag_step = max(1, min(plant_step([y for _, y in runs]), longest))
     return error_tests(
         errors,
         inputs,
@@ -121,6 +122,8 @@ def error_tests(
             f"max_lag = {max_lag}, lag_step = {lag_step}, level = {level}; "
             "lags from 1, and a level between 0 and 1 needed"
         )
+    if not errors:
+        raise BadLog("no errors to test (0 runs found, at least 1 needed)")
     shortest = min(map(len, errors))
     needed = 4 * max_lag * lag_step
     if shortest < needed:

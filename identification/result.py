@@ -6,7 +6,7 @@ from typing import Literal
 
 from identification.arrays import Array
 from identification.karnopp import Karnopp
-from identification.plant import Actuator
+from identification.plant import Actuator, Motor
 
 Drive = Literal["command", "force"]
 
@@ -48,18 +48,19 @@ class KarnoppFit:
     """The nine parameters and the actuator, identified from one or more logs.
 
     friction: all nine, those that the logs do not tell at the value assumed for simulation;
-    estimates: the nine (and "k1", "k2" where the command is logged) by name; covariance: of the
-    names in `free`, in that order; noise_y [m], noise_F [N]: standard deviations found in the
+    estimates: the nine (and "k1", "k2" where the command is logged) by name; samples: (k, free)
+    equally likely sets of the names in `free`; covariance: of the same, in that order; noise_y [m], noise_F [N]: standard deviations found in the
     residual; `chi_square` near 1 says that the model leaves nothing but noise, `adequate` that
     the search found such a fit; `stiffness` [N/m] couples a force-driven run to the measured
     position (0: none); `remarks`: one line each on what was noticed.
     """
 
     friction: Karnopp
-    actuator: Actuator | None
+    actuator: Actuator | Motor | None
     estimates: Mapping[str, Estimate]
     free: tuple[str, ...]
     covariance: Array
+    samples: Array
     drive: Drive
     stiffness: float
     noise_y: float

@@ -92,7 +92,7 @@ def _download(entry: FileEntry, card: Card) -> Path:
         raise BadLog(f"{entry.name}: what {entry.url} sends is not the card's ({text})") from error
     except OSError as error:  # requests' errors are OSErrors too
         raise BadLog(
-            f"{entry.name}: cannot be fetched from {entry.url} ({type(error).__name__}); go online, "
-            f"or put it into <folder>/{card.name}/ and set {VARIABLE}=<folder>"
+            f"{entry.name}: cannot be fetched from {entry.url} ({type(error).__name__}); go "
+            f"online, or put it into <folder>/{card.name}/ and set {VARIABLE}=<folder>"
         ) from error
     return Path(str(found))

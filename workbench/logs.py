@@ -17,6 +17,9 @@ from workbench.card import Card, SignalSpec
 from workbench.tables import damaged, read_table
 from workbench.units import scale
 
+_CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
+_ABSURD = 1e30  # in SI; products of such values overflow
+
 
 @dataclass(frozen=True)
 class Fingerprint:
@@ -85,7 +88,9 @@ def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
         except Exception as error:  # columns are read late, so damage may show only here
             raise damaged(path, card.file.format or "data", error) from error
         numbers = _numbers(raw, f"{path}: column {spec.column!r}", table.first_row)
-        signals[name] = _to_si(numbers, name, spec, card, path)
+        with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
+            signals[name] = _to_si(numbers, name, spec, card, path)
+        _refuse_absurd(signals[name], name, path, table.first_row)
     return Log(path.name, _same_length(signals, path)), table.first_row
 
 
@@ -132,6 +137,15 @@ def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -
     if factor != 1.0:
         values = values * factor
     return values + shift if shift != 0.0 else values
+
+
+def _refuse_absurd(values: Array, name: str, path: Path, first_row: int) -> None:
+    absurd = np.flatnonzero(np.isfinite(values) & (np.abs(values) > _ABSURD))
+    if name in _CANONICAL and absurd.size:
+        raise BadLog(
+            f"{path}: signal {name!r} is {values[absurd[0]]:g} in row {first_row + absurd[0]}, "
+            "which no machine reaches; check the file and the column's unit"
+        )
 
 
 def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from identification.errors import BadLog
 from workbench.card import FileSpec, Format, nearest
+from workbench.mat import tags_are_sound
 from workbench.text import read_text_table
 
 RawColumn = NDArray[Any]
@@ -56,6 +57,11 @@ def read_table(path: Path, spec: FileSpec) -> Table:
     """The table in the file; raises BadLog where it is missing, empty, damaged or of no format."""
     head = _head(path)
     form = spec.format or find_format(path, head)
+    if form in ("parquet", "mat", "hdf5") and spec.format is None and path.suffix == ".csv":
+        raise BadLog(
+            f"{path}: is a binary {form} file named .csv; rename it, or give its format in the "
+            "card's [file]"
+        )
     _check_magic(path, form, head)
     readers: Mapping[str, Callable[[Path, FileSpec], Table]] = {
         "csv": _read_csv,
@@ -147,8 +153,11 @@ def _read_parquet(path: Path, spec: FileSpec) -> Table:
 def _read_mat(path: Path, spec: FileSpec) -> Table:
     import scipy.io
 
-    if path.read_bytes()[:1024].find(b"\x89HDF") >= 0:
+    bytes_read = path.read_bytes()
+    if b"\x89HDF" in bytes_read[:1024]:
         return _read_hdf5(path, spec)
+    if bytes_read.startswith(b"MATLAB 5") and not tags_are_sound(bytes_read):
+        raise damaged(path, "mat", ValueError("a tag does not fit"))
     content: Any = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     found = {name: value for name, value in content.items() if not name.startswith("__")}
     for key in spec.rows.split(".") if spec.rows else ():

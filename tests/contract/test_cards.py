@@ -1,6 +1,5 @@
 """Every shipped card is sound, and every file of its set reads to plausible values."""
 
-import os
 from pathlib import Path
 
 import numpy as np
@@ -53,10 +52,12 @@ def test_recipe_card_reads_its_own_log(name: str) -> None:
 
 
 @pytest.mark.parametrize(("name", "file"), FILES)
-def test_file_reads_to_plausible_values(name: str, file: str) -> None:
-    folder = os.environ.get(VARIABLE)
-    if not folder or not (Path(folder) / name / file).exists():
-        pytest.skip(f"{VARIABLE} has no {name}/{file}")
+def test_file_reads_to_plausible_values(
+    name: str, file: str, workbench_data: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if not (workbench_data / name / file).exists():
+        pytest.skip(f"{workbench_data} has no {name}/{file}")
+    monkeypatch.setenv(VARIABLE, str(workbench_data))
     card: Card = CARDS[name]
     prepared = read_runs(find_data(file, card), card)
     y_max, F_max = PLAUSIBLE[name]

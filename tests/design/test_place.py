@@ -19,6 +19,14 @@ def residual(A: Array, B: Array, P: Array, R: Array, S: Array) -> float:
     return float(np.abs(add(left, -P)).max() / np.abs(P).max())
 
 
+def sylvester_condition(a: Array, b: Array) -> float:
+    """Condition number of the equation's matrix, made by shifting columns."""
+    n_s, n_r = b.size - 1, a.size - 1
+    columns = [np.pad(a, (k, n_s - 1 - k)) for k in range(n_s)]
+    columns += [np.pad(b, (k, n_r - 1 - k)) for k in range(n_r)]
+    return float(np.linalg.cond(np.array(columns)))
+
+
 @given(plant(), stable_polynomial(1, 14), st.booleans(), st.booleans())
 def test_closed_loop_is_as_asked(
     AB: tuple[Array, Array], P: Array, integrator: bool, notch: bool
@@ -29,8 +37,14 @@ def test_closed_loop_is_as_asked(
     a, b = multiply(A, H_S), multiply(B, H_R)
     assume(common_roots(a, b, 1e-2, 0.05).size == 0)
     before = [x.copy() for x in (A, B, P, H_R, H_S)]
-    R, S = solve_diophantine(A, B, P, H_R=H_R, H_S=H_S)
-    assert residual(A, B, P, R, S) < 1e-8
+    try:
+        R, S = solve_diophantine(A, B, P, H_R=H_R, H_S=H_S)
+    except BadSpecification as error:
+        assert "ill-conditioned" in str(error)
+        assert sylvester_condition(a, b / np.abs(b).max()) > 1e8
+        return
+    size = np.abs(A).sum() * np.abs(S).max() + np.abs(B).sum() * np.abs(R).max()
+    assert residual(A, B, P, R, S) < 1e-12 + 8 * 2.3e-16 * size / np.abs(P).max()
     assert R.size <= max(a.size - 1, 1) + H_R.size - 1
     assert S.size == max(b.size - 1, P.size - (a.size - 1)) + H_S.size - 1
     assert root_error(S, 1.0) < 1e-9 or not integrator

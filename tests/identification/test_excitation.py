@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.excitation import (
     Multisine,
@@ -16,10 +17,10 @@ from identification.excitation import (
     reference_signal,
 )
 
-T = 0.01 * np.arange(2001)
+T = 0.01 * np.arange(2001, dtype=np.float64)
 
 
-def signal(spec: ReferenceSpec, seed: int = 0) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+def signal(spec: ReferenceSpec, seed: int = 0) -> Array:
     return reference_signal(spec, T, np.random.default_rng(seed))
 
 

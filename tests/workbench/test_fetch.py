@@ -61,7 +61,7 @@ def test_the_folder_of_the_variable_comes_before_the_card_s(
 
 def test_changed_bytes_are_refused(card: Card) -> None:
     (card.path.parent / "run1.csv").write_bytes(BYTES + b"!")
-    with pytest.raises(BadLog, match="sha256 .* is not the card's"):
+    with pytest.raises(BadLog, match=r"sha256 .* is not the card's"):
         find_data("run1.csv", card)
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
 from identification.errors import BadCard
+from identification.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
 from identification.plant import Actuator, Motor
 from workbench.card import load_card
 from workbench.recipe import PD, PID, RST, ForcePI, Recipe

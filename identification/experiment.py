@@ -1,0 +1,141 @@
+"""Logs prepared for the fit: measured arrays, restart windows, and cost over all of them."""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.block import WIDTH
+from identification.differentiate import spectrum
+from identification.log import Log
+from identification.objective import (
+    COMMAND,
+    HELD_FORCE,
+    START_G,
+    START_V,
+    START_Y,
+    Measured,
+    Windows,
+    evaluate_block,
+)
+from identification.result import Drive
+from identification.simulate import force_slope
+from identification.three_step import FirstEstimate
+
+SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
+
+
+@dataclass(frozen=True)
+class Run:
+    """One log ready for the kernels, with its restart windows and its own start (3,).
+
+    `open` lists the entries of `start` that are unknown: a body that begins at rest has v = 0,
+    and a run driven by the measured force has no constant.
+    """
+
+    name: str
+    measured: Measured
+    windows: Windows
+    start: Array
+    open: tuple[int, ...]
+
+    def whole(self) -> "Run":
+        """The same log as one free run."""
+        first = Windows(self.windows.at[:1], self.windows.y[:1], self.windows.v[:1])
+        return replace(self, windows=first)
+
+
+def noise_of(x: Array, h: float) -> float:
+    """White noise of a signal (one sigma), never below what its range could resolve."""
+    spread = float(np.ptp(x))
+    return max(spectrum(x, h).noise, SMALLEST * spread, 1e-300)
+
+
+def impulse_of(log: Log) -> Array:
+    """h * (sum of the commands before each sample) [V s]."""
+    return log.h * np.concatenate([[0.0], np.cumsum(log["u"])[:-1]])
+
+
+def prepare_run(
+    log: Log,
+    first: FirstEstimate,
+    drive: Drive,
+    *,
+    constant: float,
+    window: float,
+    hold: bool,
+    noise: tuple[float, float] | None = None,
+) -> Run:
+    """A log for the kernels.
+
+    constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; hold:
+    a held force has no slope between samples; noise: sigma of y [m] and F [N], else estimated.
+    """
+    h, y, force = log.h, log["y"], log["F"]
+    sigma_y, sigma_f = noise or (noise_of(y, h), noise_of(force, h))
+    by_command = drive == "command"
+    measured = Measured(
+        h=h,
+        drive=COMMAND if by_command else HELD_FORCE,
+        y=y,
+        force=force,
+        u=log["u"] if by_command else np.zeros(len(y)),
+        impulse=impulse_of(log) if by_command else np.zeros(len(y)),
+        slope_y=np.append(np.diff(y) / h, 0.0),
+        slope_force=force_slope(log, hold),
+        weight_y=1.0 / sigma_y,
+        weight_force=1.0 / sigma_f if by_command else 0.0,
+    )
+    windows = restart_windows(first, h, window)
+    start = np.array([windows.y[0], windows.v[0], constant])
+    unknown = [START_Y]
+    if not first.rest[0]:
+        unknown.append(START_V)
+    if by_command:
+        unknown.append(START_G)
+    return Run(log.name, measured, windows, start, tuple(unknown))
+
+
+def restart_windows(first: FirstEstimate, h: float, seconds: float) -> Windows:
+    """Restarts about every `seconds`, at rest where the body rests nearby."""
+    n = len(first.rest)
+    step = max(20, round(seconds / h))
+    at = [0]
+    for low in range(step, n - step // 2, step):
+        resting = np.flatnonzero(first.rest[low : low + step // 2])
+        at.append(low + int(resting[len(resting) // 2]) if len(resting) else low)
+    index: IntArray = np.array(at, dtype=np.int64)
+    v = np.where(first.rest[index], 0.0, first.motion.v[index])
+    return Windows(index, first.motion.y[index], v)
+
+
+def total_cost(runs: Sequence[Run], p: Array, cap: float, starts: Array | None = None) -> Array:
+    """Cost of parameter sets `p` (k, 11) over all runs, (k,); starts (runs, k, 3) where they vary.
+
+    cap: bound of one sample's squared residual, 0 for none. Works on all cores.
+    """
+    k = len(p)
+    short = -k % WIDTH
+    padded = np.concatenate([p, np.repeat(p[:1], short, axis=0)])
+
+    def block(task: tuple[int, int]) -> tuple[int, Array]:
+        index, low = task
+        run = runs[index]
+        if starts is None:
+            start = np.tile(run.start, (WIDTH, 1))
+        else:
+            own = starts[index, low : low + WIDTH]
+            start = np.concatenate([own, np.repeat(own[:1], WIDTH - len(own), axis=0)])
+        rows = np.ascontiguousarray(padded[low : low + WIDTH])
+        return low, evaluate_block(rows, start, run.measured, run.windows, cap, False)[0]
+
+    costs = np.zeros(len(padded))
+    tasks = [(index, low) for low in range(0, len(padded), WIDTH) for index in range(len(runs))]
+    if len(tasks) == 1:
+        return block(tasks[0])[1][:k]
+    with ThreadPoolExecutor() as pool:
+        for low, part in pool.map(block, tasks):
+            costs[low : low + WIDTH] += part
+    return costs[:k]

@@ -1,0 +1,134 @@
+"""What a log can tell of each parameter: events and speeds before, interval widths after.
+
+A number that the log does not support is not given: a parameter without the events that carry it,
+or with an interval as wide as itself, is reported as None with the reason.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.karnopp import NAMES, ROTARY_UNITS, UNITS
+from identification.result import Estimate
+from identification.stepping import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
+
+NEEDED = 3  # events of a kind that make a parameter identifiable
+SLIDING = 50  # samples of sliding a direction needs
+WIDEST = 0.3  # sd relative to the value beyond which the value says nothing
+ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m"}
+ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad"}
+
+
+@dataclass(frozen=True)
+class Events:
+    """What happened in the fitted run, (positive, negative): rests that ended, crossings of the
+    band's limit, samples of sliding, and the fastest sliding speed [m/s]."""
+
+    breakaways: tuple[int, int]
+    crossings: tuple[int, int]
+    sliding: tuple[int, int]
+    fastest: tuple[float, float]
+
+
+def events_of(modes: Sequence[IntArray], speeds: Sequence[Array]) -> Events:
+    """Events counted over the modes (n,) and velocities (n,) of simulated runs."""
+    both = []
+    for side, (slip, band) in enumerate(((SLIP_P, BAND_P), (SLIP_N, BAND_N))):
+        sign = 1.0 if side == 0 else -1.0
+        starts = crossings = sliding = 0
+        fastest = 0.0
+        for mode, v in zip(modes, speeds, strict=True):
+            rest, moving = mode == STUCK, sign * v > 0
+            starts += int(np.count_nonzero(rest[:-1] & moving[1:]))
+            starts += int(np.count_nonzero(rest[:-1] & (mode[1:] == band) & ~moving[1:]))
+            slides = mode == slip
+            crossings += int(np.count_nonzero(slides[1:] != slides[:-1]))
+            sliding += int(np.count_nonzero(slides))
+            if slides.any():
+                fastest = max(fastest, float(np.max(sign * v[slides])))
+        both.append((starts, crossings, sliding, fastest))
+    (s0, c0, n0, v0), (s1, c1, n1, v1) = both
+    return Events((s0, s1), (c0, c1), (n0, n1), (v0, v1))
+
+
+def estimates(
+    names: Sequence[str],
+    center: Array,
+    samples: Array,
+    events: Events,
+    rotary: bool,
+    log: str,
+) -> Mapping[str, Estimate]:
+    """Estimate of each of `names` from its value (d,) and equally likely samples (k, d)."""
+    units = {**(ROTARY_UNITS if rotary else UNITS)}
+    units |= ROTARY_ACTUATOR_UNITS if rotary else ACTUATOR_UNITS
+    value_of = dict(zip(names, center, strict=True))
+    found = {}
+    for column, name in enumerate(names):
+        drawn = samples[:, column]
+        value = float(center[column])
+        sd = float(np.std(drawn))
+        # The spread of finite samples is itself uncertain: never narrower than 1.96 sd.
+        low = min(float(np.quantile(drawn, 0.025)), value - 1.96 * sd)
+        high = max(float(np.quantile(drawn, 0.975)), value + 1.96 * sd)
+        reason = _missing(name, events, log) or _too_wide(name, value, sd, value_of, events)
+        if reason:
+            found[name] = Estimate(None, units[name], reason=reason, assumed=value)
+        else:
+            low, high = _signed(name, low, high)
+            found[name] = Estimate(value, units[name], sd, low, high)
+    return found
+
+
+def _signed(name: str, low: float, high: float) -> tuple[float, float]:
+    """An interval cut where the model's sign ends."""
+    if name in ("dv_n", "F_sn"):
+        return low, min(high, 0.0)
+    return max(low, 0.0), high
+
+
+def _missing(name: str, events: Events, log: str) -> str | None:
+    """Reason why the events of the log cannot carry a parameter, if so."""
+    if name not in NAMES or name == "m":
+        return None
+    side = 1 if name.endswith("n") else 0
+    way = ("positive", "negative")[side]
+    if name.startswith("F_s") and events.breakaways[side] < NEEDED:
+        return (
+            f"{log}: {events.breakaways[side]} breakaways in the {way} direction, at least"
+            f" {NEEDED} needed; add slow reversals or longer rests"
+        )
+    if name.startswith("dv") and events.crossings[side] < NEEDED:
+        return (
+            f"{log}: {events.crossings[side]} crossings of the band's limit in the {way}"
+            f" direction, at least {NEEDED} needed; add starts and stops"
+        )
+    if events.sliding[side] < SLIDING:
+        return (
+            f"{log}: {events.sliding[side]} samples of sliding in the {way} direction, at least"
+            f" {SLIDING} needed; add motion that way"
+        )
+    return None
+
+
+def _too_wide(
+    name: str, value: float, sd: float, value_of: Mapping[str, float], events: Events
+) -> str | None:
+    """Reason where the spread is as large as what the parameter could mean."""
+    scale = abs(value)
+    side = 1 if name.endswith("n") else 0
+    coulomb = abs(value_of.get(("F_cp", "F_cn")[side], 0.0))
+    if name.startswith("F_v") and events.fastest[side] > 0:
+        # A viscous term near zero is known when it is small beside the Coulomb force.
+        scale = max(scale, coulomb / events.fastest[side])
+    if name in ("F_cp", "F_cn"):
+        other = abs(value_of.get(("F_vp", "F_vn")[side], 0.0)) * events.fastest[side]
+        scale = max(scale, other)
+    if sd <= WIDEST * scale:
+        return None
+    return (
+        f"found {value:.3g} with a standard deviation of {sd:.2g}: the log does not tell it;"
+        " excite it more (speeds, reversals, rests) or log for longer"
+    )

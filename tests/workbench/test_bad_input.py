@@ -1,0 +1,254 @@
+"""Each way in which a log can be bad has its own error, in one line, never a traceback."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+
+from identification.errors import UserError
+from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv
+from workbench.card import load_card
+from workbench.logs import read_log, read_runs
+
+
+def refusal(path: Path, text: str = CARD) -> str:
+    """The one line with which both readers refuse the file."""
+    spec = card(path.parent, text)
+    messages = []
+    for read in (read_log, read_runs):
+        assert callable(read)
+        with pytest.raises(UserError) as caught:
+            read(path, spec)
+        messages.append(str(caught.value))
+    assert messages[0] == messages[1]
+    assert "\n" not in messages[0]
+    assert len(messages[0]) < 400
+    return messages[0]
+
+
+def edited(folder: Path, row: int, change: Callable[[list[str]], list[str]]) -> Path:
+    """A sound CSV with the fields of one line (counted from 1 as in the file) changed."""
+    path = folder / "a.csv"
+    write_csv(path, signals())
+    lines = path.read_text("utf-8").splitlines()
+    lines[row - 1] = ",".join(change(lines[row - 1].split(",")))
+    path.write_text("\n".join(lines), "utf-8")
+    return path
+
+
+def with_columns(folder: Path, **changed: object) -> Path:
+    path = folder / "a.csv"
+    write_csv(path, {**signals(), **{k: np.asarray(v, dtype=float) for k, v in changed.items()}})
+    return path
+
+
+def test_missing_file_names_the_nearest(tmp_path: Path) -> None:
+    write_csv(tmp_path / "run1.csv", signals())
+    message = refusal(tmp_path / "run11.csv")
+    assert "no such file" in message
+    assert "did you mean 'run1.csv'?" in message
+
+
+def test_missing_column_names_the_nearest(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path, {("pos_m" if k == "y" else k): v for k, v in signals().items()})
+    message = refusal(path, CARD.replace('column = "y"', 'column = "posm"'))
+    assert "signals.y: no column 'posm'; did you mean 'pos_m'? (there is: t, pos_m, F)" in message
+
+
+@pytest.mark.parametrize("column", ["3", "-1", "99"])
+def test_column_number_out_of_range(tmp_path: Path, column: str) -> None:
+    path = with_columns(tmp_path)
+    message = refusal(path, CARD.replace('column = "y"', f"column = {column}"))
+    assert f"no column {column}, there are 3 (0 to 2" in message
+
+
+def test_name_in_a_file_without_header(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    path.write_text(path.read_text("utf-8").split("\n", 1)[1], "utf-8")
+    assert "the file has no header" in refusal(path)
+
+
+def test_wrong_unit(tmp_path: Path) -> None:
+    message = refusal(with_columns(tmp_path), CARD.replace('unit = "m"', 'unit = "bar"'))
+    assert "signals.y: unit 'bar' is not a length" in message
+
+
+@pytest.mark.parametrize("text", ["n/e", "1.2.3", "0x10", "12:30", "OFF"])
+def test_text_in_a_number_names_row_and_column(tmp_path: Path, text: str) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [f[0], text, f[2]]))
+    assert f"column 'y', row 57: '{text}' is not a number" in message
+
+
+def test_a_column_of_text(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path, signals())
+    lines = path.read_text("utf-8").splitlines()
+    rows = [lines[0]] + [",".join([x.split(",")[0], "high", "0"]) for x in lines[1:]]
+    path.write_text("\n".join(rows), "utf-8")
+    assert "column 'y', row 2: 'high' is not a number" in refusal(path)
+
+
+@pytest.mark.parametrize("fields", [1, 2, 4])
+def test_row_of_another_length(tmp_path: Path, fields: int) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [*f, "9"][:fields]))
+    assert f"row 57 has {fields} fields, 3 needed" in message
+
+
+@pytest.mark.parametrize("value", ["nan", "inf", "-inf", ""])
+def test_runs_of_nan_or_infinite(tmp_path: Path, value: str) -> None:
+    path = with_columns(tmp_path)
+    lines = path.read_text("utf-8").splitlines()
+    for row in range(99, 120):
+        lines[row] = f"{0.01 * (row - 1)},{value},1.0"
+    path.write_text("\n".join(lines), "utf-8")
+    assert "signal 'y' is NaN or infinite for 21 rows from row 100" in refusal(path)
+
+
+def test_absurd_values(tmp_path: Path) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [f[0], f[1], "1e300"]))
+    assert "signal 'F' is 1e+300 in row 57" in message
+
+
+def test_time_going_back_or_repeated(tmp_path: Path) -> None:
+    t = signals()["t"]
+    t[50] = t[49]
+    assert "time repeats in row 52 " in refusal(with_columns(tmp_path, t=t))
+    t[50] = t[30]
+    assert "time goes back in row 52 " in refusal(with_columns(tmp_path, t=t))
+
+
+def test_constant_position(tmp_path: Path) -> None:
+    assert "position is constant (0.3 m" in refusal(with_columns(tmp_path, y=np.full(400, 0.3)))
+
+
+def test_force_of_the_wrong_sign(tmp_path: Path) -> None:
+    assert "wrong sign" in refusal(with_columns(tmp_path, F=-signals()["F"]))
+
+
+def test_force_and_position_swapped(tmp_path: Path) -> None:
+    s = signals()
+    assert "look swapped" in refusal(with_columns(tmp_path, y=s["F"], F=s["y"]))
+    stroke = CARD.replace('"force"', '"force"\nstroke_m = [-0.12, 0.12]')
+    assert "the card's stroke" in refusal(with_columns(tmp_path, y=s["F"], F=s["y"]), stroke)
+
+
+def test_far_too_short(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    write_csv(path, signals(20))
+    assert "20 samples, at least 100 needed" in refusal(path)
+
+
+def test_header_alone(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,y,F\n", "utf-8")
+    assert "no rows" in refusal(path)
+    path.write_text("# nothing\n\n", "utf-8")
+    assert "no rows" in refusal(path)
+
+
+def test_signals_of_different_lengths(tmp_path: Path) -> None:
+    s = signals()
+    WRITERS["a.h5"](tmp_path / "a.h5", {**s, "y": s["y"][:200]})
+    assert "'y' has 200 values and t 400" in refusal(tmp_path / "a.h5")
+
+
+def test_unknown_key_in_the_card(tmp_path: Path) -> None:
+    (tmp_path / "card.toml").write_text(CARD + '[file]\ndelimeter = ";"\n', "utf-8")
+    with pytest.raises(UserError, match=r"\[file\] unknown key 'delimeter'; .* 'delimiter'\?"):
+        load_card(tmp_path / "card.toml")
+
+
+@pytest.mark.parametrize("name", sorted(WRITERS))
+def test_zero_bytes(tmp_path: Path, name: str) -> None:
+    (tmp_path / name).touch()
+    assert "is empty (0 bytes)" in refusal(tmp_path / name)
+
+
+def test_directory(tmp_path: Path) -> None:
+    (tmp_path / "logs").mkdir()
+    assert "is a directory" in refusal(tmp_path / "logs")
+
+
+@pytest.mark.parametrize("name", ["a.parquet", "a.mat", "a73.mat", "a.h5", "a.json"])
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.5, 0.8, 0.99])
+def test_truncated_files(tmp_path: Path, name: str, share: float) -> None:
+    path = tmp_path / name
+    WRITERS[name](path, signals())
+    whole = path.read_bytes()
+    path.write_bytes(whole[: int(share * len(whole))])
+    message = refusal(path)
+    assert "copy it again" in message or "no column" in message
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    content=st.one_of(
+        st.binary(min_size=1, max_size=300),
+        st.text(max_size=300).map(lambda text: text.encode("utf-8", "replace")),
+        st.text(alphabet="0123456789.,;-e\n\t\"' #", max_size=300).map(str.encode),
+    ),
+    name=st.sampled_from(["a.csv", "a.parquet", "a.mat", "a.h5", "a.json", "a.dat"]),
+)
+def test_no_bytes_make_a_traceback(tmp_path: Path, content: bytes, name: str) -> None:
+    (tmp_path / name).write_bytes(content)
+    refusal(tmp_path / name)
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@example("a.mat", 1161, 0x08)  # the complex flag: scipy's reader died of it
+@given(
+    name=st.sampled_from(["a.parquet", "a.mat", "a73.mat", "a.h5"]),
+    at=st.integers(0, 3000),
+    value=st.integers(0, 255),
+)
+def test_a_flipped_byte_makes_no_traceback(tmp_path: Path, name: str, at: int, value: int) -> None:
+    path = tmp_path / name
+    WRITERS[name](path, signals(120))
+    content = bytearray(path.read_bytes())
+    content[at % len(content)] = value
+    path.write_bytes(bytes(content))
+    try:
+        read_log(path, card(tmp_path))
+    except UserError as error:
+        assert "\n" not in str(error)
+
+
+@pytest.mark.parametrize("name", ["a.parquet", "a.mat", "a.h5"])
+def test_binary_format_named_csv(tmp_path: Path, name: str) -> None:
+    WRITERS[name](tmp_path / name, signals())
+    (tmp_path / name).rename(tmp_path / "b.csv")
+    assert "file named .csv; rename it" in refusal(tmp_path / "b.csv")
+    form = {"a.parquet": "parquet", "a.mat": "mat", "a.h5": "hdf5"}[name]
+    named = card(tmp_path, CARD + f'[file]\nformat = "{form}"\n')
+    assert len(read_log(tmp_path / "b.csv", named)) == 400
+
+
+def test_unknown_binary_file_named_csv(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_bytes(bytes(range(256)) * 20)
+    assert "is not text" in refusal(path)
+    path.write_bytes(b"ab\0cd" * 100)
+    assert "is a binary file, not text" in refusal(path)
+
+
+def test_a_text_file_named_parquet_or_mat(tmp_path: Path) -> None:
+    for name in ("a.parquet", "a.h5", "a.mat"):
+        write_csv(tmp_path / name, signals())
+        assert "copy it again" in refusal(tmp_path / name)
+
+
+def test_header_that_is_not_utf8(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    path.write_bytes(path.read_bytes().replace(b"y", b"\xf6l", 1))
+    message = refusal(path)
+    assert "byte 0xf6 in line 1" in message
+    assert 'encoding = "latin-1"' in message
+    assert "unknown" in refusal(path, CARD + '[file]\nencoding = "latin-99"\n')
