@@ -22,6 +22,7 @@ from identification.objective import (
 )
 from identification.result import Drive
 from identification.simulate import force_slope
+from identification.start import measured_start
 from identification.three_step import FirstEstimate
 
 SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
@@ -31,8 +32,9 @@ SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
 class Run:
     """One log ready for the kernels, with its restart windows and its own start (3,).
 
-    `open` lists the entries of `start` that are unknown: a body that begins at rest has v = 0,
-    and a run driven by the measured force has no constant.
+    `open` lists the entries of `start` that are fitted: a body that begins at rest has v = 0, a run
+    driven by a force has no constant, and a motor's run begins in its measured state, since a
+    fitted one would take up what the model lacks.
     """
 
     name: str
@@ -84,14 +86,15 @@ def prepare_run(
         u=log["u"] if by_command else np.zeros(len(y)),
         impulse=impulse_of(log) if by_command else np.zeros(len(y)),
         slope_y=np.append(np.diff(y) / h, 0.0),
-        slope_force=force_slope(log, hold),
+        slope_force=force_slope(force, h, hold),
         weight_y=1.0 / sigma_y,
         weight_force=1.0 / sigma_f if by_command else 0.0,
     )
     windows = restart_windows(first, h, window)
-    start = np.array([windows.y[0], windows.v[0], constant])
-    unknown = [START_Y]
-    if not first.rest[0]:
+    y_0, v_0, _ = measured_start(log)
+    start = np.array([y_0, v_0, constant])
+    unknown = [] if hold else [START_Y]
+    if v_0 != 0.0 and not hold:
         unknown.append(START_V)
     if by_command:
         unknown.append(START_G)
@@ -129,7 +132,7 @@ def total_cost(runs: Sequence[Run], p: Array, cap: float, starts: Array | None =
             own = starts[index, low : low + WIDTH]
             start = np.concatenate([own, np.repeat(own[:1], WIDTH - len(own), axis=0)])
         rows = np.ascontiguousarray(padded[low : low + WIDTH])
-        return low, evaluate_block(rows, start, run.measured, run.windows, cap, False)[0]
+        return low, evaluate_block(rows, start, run.measured, run.windows, cap, 0)[0]
 
     costs = np.zeros(len(padded))
     tasks = [(index, low) for low in range(0, len(padded), WIDTH) for index in range(len(runs))]

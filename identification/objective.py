@@ -112,20 +112,22 @@ def evaluate(
     cap: float,
     cost: Array,
     gram: Array,
+    stretch: int,
 ) -> None:
-    """Cost of WIDTH parameter sets and, where `gram` is (WIDTH, WIDTH), its local quadratic form.
+    """Cost of WIDTH parameter sets and, where `gram` is not empty, its local quadratic form.
 
     p: (WIDTH, 11) rows of kernel parameters; start: (WIDTH, 3) first position, first velocity and
     the constant F + k2 y - k1 * impulse; at, at_y, at_v: the windows, the first of which starts
-    from `start`. cost: (WIDTH,); gram[0, 0] is r'r of lane 0, gram[0, i] is d_i' r, gram[i, j]
-    d_i' d_j with d_i the change of the residual from lane 0 to lane i.
+    from `start`. cost: (WIDTH,). gram (stretches, WIDTH, WIDTH), one a stretch of `stretch`
+    samples: [0, 0] is r'r of lane 0, [0, i] is d_i' r, [i, j] d_i' d_j with
+    d_i the change of the residual from lane 0 to lane i.
     """
     s, modes, flags, tables, c = work_space()
     out = np.zeros((CHUNK, 2, WIDTH))
     rows = np.zeros((2 * CHUNK, WIDTH))
     prepare(p, h, tables, s, c)
     cost[:] = 0.0
-    gram[:, :] = 0.0
+    gram[:, :, :] = 0.0
     n = len(y)
     for window in range(len(at)):
         first = at[window]
@@ -160,17 +162,27 @@ def evaluate(
             if len(gram) > 0:
                 _chunk_rows(out, y[low:high], force[low:high], w_y, w_f, cap, rows)
                 used = rows[: 2 * (high - low)]
-                gram += np.dot(used.T, used)
+                part = min(low // stretch, len(gram) - 1)
+                gram[part] += np.dot(used.T, used)
             else:
                 _chunk_cost(out, y[low:high], force[low:high], w_y, w_f, cap, cost)
 
 
 def evaluate_block(
-    p: Array, start: Array, log: Measured, windows: Windows, cap: float, with_gram: bool
+    p: Array,
+    start: Array,
+    log: Measured,
+    windows: Windows,
+    cap: float,
+    stretches: int,
 ) -> tuple[Array, Array]:
-    """`evaluate` over a log: costs (WIDTH,) and the Gram matrix, empty unless asked for."""
+    """`evaluate` over a log: costs (WIDTH,), and Gram matrices (stretches, WIDTH, WIDTH).
+
+    stretches: parts of the log, each with its own matrix; 0 for costs alone.
+    """
     cost = np.zeros(WIDTH)
-    gram = np.zeros((WIDTH, WIDTH) if with_gram else (0, 0))
+    gram = np.zeros((stretches, WIDTH, WIDTH))
+    stretch = len(log.y) // max(stretches, 1) + 1
     evaluate(
         p,
         start,
@@ -190,7 +202,6 @@ def evaluate_block(
         cap,
         cost,
         gram,
+        stretch,
     )
     return cost, gram
-
-

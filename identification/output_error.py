@@ -23,12 +23,22 @@ from identification.karnopp import NAMES, Karnopp
 from identification.log import Log, Rig
 from identification.objective import START_G, START_V, START_Y
 from identification.plant import Actuator, Motor, Plant
-from identification.refine import Cloud, Optimum, moved, pack, refine, sample, unpack
+from identification.refine import (
+    Cloud,
+    Optimum,
+    keep_signs,
+    moved,
+    pack,
+    refine,
+    robust_covariance,
+    sample,
+    unpack,
+)
 from identification.residual_tests import effective_samples
 from identification.result import Drive, KarnoppFit, LogFit
 from identification.search import Population, evolve
 from identification.simulate import FreeRun, free_run
-from identification.stepping import K1, K2
+from identification.stepping import DV_N, DV_P, K1, K2
 from identification.three_step import FirstEstimate, first_estimate
 
 Progress = Callable[[str, float], None]
@@ -36,11 +46,16 @@ ADEQUATE = 1.5  # normalised chi-square up to which a fit counts as found
 POPULATION = 64
 GENERATIONS = 150
 ATTEMPTS = 3
+FOLLOWS = 1e4  # chi-square over windows up to which a fit is worth a closer search
 SAME = 0.02  # relative gain of a new search below which the misfit is the model's
 LONGEST = 40.0  # s; a run without a stiffness that holds it is compared at most this long
 FEWEST, MOST = 12.0, 400.0  # independent samples granted to a residual that is not noise
+OUTLIER = 25.0  # bound of a squared residual where stops may be missed
+BETWEEN = 5e-4  # relative sd that the force between samples adds where it drives the run
+STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated residuals
 WALKERS = 64
 STEPS = 200
+LONG_WALK = 600
 
 
 @dataclass(frozen=True)
@@ -58,6 +73,11 @@ class Problem:
     actuator: ActuatorFit | None
 
     @property
+    def adequate(self) -> float:
+        """Chi-square up to which a fit counts as found; a measured force brings its own noise."""
+        return ADEQUATE if self.drive == "command" else 2.0 * ADEQUATE
+
+    @property
     def count(self) -> int:
         """Number of compared values."""
         return sum(run.measured.count for run in self.runs)
@@ -65,8 +85,10 @@ class Problem:
     @property
     def long_runs(self) -> tuple[Run, ...]:
         """Runs as long as the model may be asked to follow without a restart."""
-        if self.drive == "command" or not self.hold:
+        if self.drive == "command":
             return tuple(run.whole() for run in self.runs)
+        if not self.hold:
+            return self.runs
         out = []
         for run in self.runs:
             at = run.windows.at * run.measured.h
@@ -144,7 +166,7 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     by_command = chosen == "command" and actuator is not None
     k1 = actuator.k1 if actuator and by_command else 0.0
     k2 = actuator.k2 if actuator and by_command else 0.0
-    window = 1.0 if by_command else (5.0 if hold else 2.0)
+    window = 5.0 if hold else (1.0 if by_command else 2.0)
     runs = tuple(
         prepare_run(
             log,
@@ -167,17 +189,17 @@ def _stiffness_bounds(
 ) -> tuple[float, float]:
     """Range of the coupling [N/m] that holds a force-driven run near the measured position.
 
-    From the stiffness that brings the whole force range to a tenth of the stroke, up to what a
-    sample can resolve (half a radian of oscillation) or the position's noise allows.
+    From the stiffness at which a tenth of the stroke outweighs the friction, up to where the
+    position's noise would shake the force by a fiftieth of the friction, or the coupled body
+    would turn half a radian of its oscillation within a sample.
     """
-    high = np.inf
-    low = 0.0
+    low, high = 0.0, np.inf
     for log, first in zip(logs, firsts, strict=True):
-        force = float(np.std(log["F"]))
-        stroke = float(np.ptp(log["y"]))
-        low = max(low, 0.1 * force / stroke)
-        high = min(high, first.nine[0] * (0.5 / log.h) ** 2, 0.2 * force / first.motion.noise)
-    return low, max(high, 10.0 * low)
+        friction = float(np.mean(first.nine[1:3]))
+        low = max(low, friction / (0.1 * float(np.ptp(log["y"]))))
+        noise = max(first.motion.noise, 1e-7 * float(np.ptp(log["y"])))
+        high = min(high, 0.02 * friction / noise, first.nine[0] * (0.5 / log.h) ** 2)
+    return low, max(high, 3.0 * low)
 
 
 def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solution:
@@ -194,14 +216,16 @@ def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solut
             best = found
         elif found.cost > best.cost * (1 - SAME):
             best = found if found.cost < best.cost else best
-            if best.cost > ADEQUATE * problem.count and attempt > 0:
+            if best.cost > problem.adequate * problem.count and attempt > 0:
                 break
-        if best.cost <= ADEQUATE * problem.count:
+        if best.cost <= problem.adequate * problem.count:
             break
     assert best is not None and population is not None
     chi_square = best.cost / problem.count
     if chi_square <= ADEQUATE and problem.drive == "command":
         return _weigh_noise(problem, best, rng, spent, report)
+    if not problem.hold:
+        return _weigh_correlated(problem, best, rng, spent)
     return _weigh_misfit(problem, best, population, rng, spent, report)
 
 
@@ -227,7 +251,37 @@ def _search(
         whole = optimum.runs(whole)
         optimum = refine(whole, optimum.p, problem.free, cap=bound)
     spent = population.evaluations + near.evaluations + optimum.evaluations
+    if optimum.cost > problem.adequate * problem.count and near.cost < FOLLOWS * problem.count:
+        report("searching near", 0.0)
+        rescued = _search_near(problem, near, cap, rng)
+        spent += rescued.evaluations
+        optimum = rescued if rescued.cost < optimum.cost else optimum
     return replace(optimum, evaluations=spent), population
+
+
+def _search_near(
+    problem: Problem, near: Optimum, cap: float, rng: np.random.Generator
+) -> Optimum:
+    """Search over whole runs around a fit that follows the windows but lost the whole.
+
+    Windows begin with a measured velocity, whose noise shifts their optimum a little: enough to
+    make the whole run stop elsewhere, which no gradient mends.
+    """
+    row = near.p
+    values = np.abs(row[problem.box.free])
+    close = np.where(np.isin(problem.box.free, (DV_P, DV_N, K2)), 0.1, 0.01)
+    low, high = values * (1 - close), values * (1 + close)
+    box = replace(problem.box, low=low, high=high, row=row)
+    whole = list(near.runs(problem.long_runs))
+    found = evolve(
+        lambda z: total_cost(whole, box.rows(z), cap),
+        box.around(row, POPULATION, 0.2, rng),
+        GENERATIONS // 2,
+        rng,
+    )
+    optimum = refine(whole, box.rows(found.members[:1])[0], problem.free, cap=cap)
+    optimum = refine(optimum.runs(whole), optimum.p, problem.free)
+    return replace(optimum, evaluations=optimum.evaluations + found.evaluations)
 
 
 def _cap(problem: Problem, attempt: int) -> float:
@@ -266,6 +320,32 @@ def _weigh_noise(
     return Solution(optimum, members, chi_square, True, spent)
 
 
+def _weigh_correlated(
+    problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int
+) -> Solution:
+    """A fit whose residual is not white: outliers bounded, spread from stretches of the logs."""
+    chi_square = optimum.cost / problem.count
+    runs = list(optimum.runs(problem.long_runs))
+    for _ in range(3):
+        bodies = [_bodies(problem, optimum, index) for index in range(len(runs))]
+        runs = [
+            replace(run, measured=replace(run.measured, weight_y=1 / y, weight_force=w))
+            for run, (y, w) in zip(optimum.runs(runs), bodies, strict=True)
+        ]
+        optimum = refine(runs, optimum.p, problem.free, cap=OUTLIER)
+        spent += optimum.evaluations
+    covariance = robust_covariance(runs, optimum, OUTLIER, STRETCHES)
+    if problem.drive == "force":
+        # What the force does between samples is not known: it is taken as linear.
+        floor = BETWEEN * np.abs(pack(runs, optimum.p, optimum.starts, optimum.free))
+        covariance = 2.0 * covariance + np.diag(floor**2)
+    center = pack(runs, optimum.p, optimum.starts, optimum.free)
+    members = rng.multivariate_normal(center, covariance, 1024, check_valid="ignore")
+    keep_signs(members, optimum.free)
+    optimum = replace(optimum, covariance=covariance)
+    return Solution(optimum, members, chi_square, chi_square <= problem.adequate, spent)
+
+
 def _weigh_misfit(
     problem: Problem,
     optimum: Optimum,
@@ -290,11 +370,11 @@ def _weigh_misfit(
     seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
     around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
     seeds = np.concatenate([around, _jittered_starts(seeds, problem, runs, rng)])
-    members = _walk(problem, runs, optimum, seeds, 2 * STEPS, granted, rng, report)
-    spent += 2 * WALKERS * STEPS
+    members = _walk(problem, runs, optimum, seeds, LONG_WALK, granted, rng, report)
+    spent += WALKERS * LONG_WALK
     covariance = np.cov(members.T)
     optimum = moved(runs, optimum, np.mean(members, axis=0), covariance)
-    adequate = chi_square <= ADEQUATE
+    adequate = chi_square <= problem.adequate
     return Solution(optimum, members, chi_square, adequate, spent)
 
 
@@ -368,6 +448,16 @@ def _reweighed(run: Run, p: Array) -> Run:
         weight_force=1.0 / force if force > 0 else 0.0,
     )
     return replace(run, measured=measured)
+
+
+def _bodies(problem: Problem, optimum: Optimum, index: int) -> tuple[float, float]:
+    """Robust spread of the position's residual [m] and weight of the force's (0: not compared)."""
+    run, log = simulated(problem, optimum, index), problem.logs[index]
+    floor = 1.0 / problem.runs[index].measured.weight_y
+    y = max(1.4826 * float(np.median(np.abs(run.y - log["y"]))), 0.5 * floor)
+    if problem.drive != "command":
+        return y, 0.0
+    return y, 1.0 / max(1.4826 * float(np.median(np.abs(run.F - log["F"]))), 1e-300)
 
 
 def _channel(run: Run, p: Array, position: bool) -> float:

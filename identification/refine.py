@@ -146,6 +146,40 @@ def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> C
     return Cloud(cloud, weight, costs, effective, settled, (turn + 1) * CLOUD)
 
 
+def robust_covariance(
+    runs: Sequence[Run], optimum: Optimum, cap: float, stretches: int
+) -> Array:
+    """Covariance (d, d) of the unknowns where the residual is not white noise.
+
+    H^-1 (sum of g g') H^-1 with the gradient g of each stretch of the logs: what correlated
+    residuals and a wrong model add shows in the scatter of the stretches (Huber 1967, White 1982).
+    """
+    theta = pack(runs, optimum.p, optimum.starts, optimum.free)
+    k, d = len(optimum.free), len(theta)
+    delta = 0.3 / np.sqrt(np.maximum(np.diag(optimum.hessian), 1e-30))
+    delta = np.clip(delta, 1e-9, 1e-3) * optimum.scale
+    each = max(4, stretches // len(runs))
+    scatter = np.zeros((d, d))
+    low = k
+    for index, run in enumerate(runs):
+        used = np.concatenate([np.arange(k), np.arange(low, low + len(run.open))])
+        low += len(run.open)
+        lanes = np.tile(theta, (WIDTH, 1))
+        lanes[np.arange(1, len(used) + 1), used] += delta[used]
+        sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, lanes)
+        begin = np.ascontiguousarray(begun[index])
+        gram = evaluate_block(sets, begin, run.measured, run.windows, cap, each)[1]
+        slopes = np.zeros((each, d))
+        slopes[:, used] = gram[:, 0, 1 : len(used) + 1] / delta[used] * optimum.scale[used]
+        slopes -= slopes.mean(axis=0)
+        scatter += slopes.T @ slopes * each / (each - 1)
+    inverse = np.linalg.pinv(
+        optimum.hessian + 1e-6 * np.eye(d), rcond=1e-14, hermitian=True
+    )
+    total = inverse @ scatter @ inverse
+    return np.asarray(total * np.outer(optimum.scale, optimum.scale))
+
+
 def moved(runs: Sequence[Run], optimum: Optimum, theta: Array, covariance: Array) -> Optimum:
     """The optimum with its unknowns at `theta` (d,) and this covariance (d, d)."""
     sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, theta[None])
@@ -253,7 +287,7 @@ def _quadratic(
             lanes[lane + 1, column] += delta[column] * scale[column]
         sets, begun = unpack(runs, p, starts, free, lanes)
         begin = np.ascontiguousarray(begun[index])
-        gram = evaluate_block(sets, begin, run.measured, run.windows, cap, True)[1]
+        gram = evaluate_block(sets, begin, run.measured, run.windows, cap, 1)[1][0]
         inner = slice(1, len(used) + 1)
         cost += float(gram[0, 0])
         gradient[used] += gram[inner, 0] / delta[used]

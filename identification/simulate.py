@@ -104,11 +104,11 @@ def run_kernel(
             y, v, f, mode = resolve(p, y, v, f, mode, g, h, c)
 
 
-def force_slope(log: Log, hold: bool) -> Array:
+def force_slope(force: Array, h: float, hold: bool) -> Array:
     """Slope of the force between samples [N/s]: 0 where it is held (a motor), else linear."""
     if hold:
-        return np.zeros(len(log))
-    return np.append(np.diff(log["F"]) / log.h, 0.0)
+        return np.zeros(len(force))
+    return np.append(np.diff(force) / h, 0.0)
 
 
 def free_run(
@@ -150,7 +150,7 @@ def free_run(
         held,
         log["u"] if "u" in log else np.zeros(len(log)),
         force,
-        np.zeros(len(log)) if motor or not held else force_slope(log, hold=False),
+        np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False),
         log["y"],
         at,
         np.concatenate([[start[0]], at_y[keep]]),
