@@ -4,11 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.arrays import Array
-from identification.stepping import DV_N, DV_P, F_SN, K2, PARAMETERS, K1, M
+from identification.arrays import Array, IntArray
+from identification.stepping import DV_N, DV_P, F_SN, K1, K2, PARAMETERS, M
 from identification.three_step import FirstEstimate
 
+BoolArray = NDArray[np.bool_]
 SIGN = np.ones(PARAMETERS)
 SIGN[[DV_N, F_SN]] = -1.0
 LOGARITHMIC = (M, DV_P, DV_N, K2)
@@ -18,7 +20,7 @@ LOGARITHMIC = (M, DV_P, DV_N, K2)
 class Box:
     """Free parameters (d,), their magnitudes' bounds, and the fixed row (11,) around them."""
 
-    free: Array
+    free: IntArray
     low: Array
     high: Array
     row: Array
@@ -28,7 +30,7 @@ class Box:
         low, high, logs = self._scaled()
         values = low + (high - low) * z
         values[:, logs] = np.exp(values[:, logs])
-        rows = np.tile(self.row, (len(z), 1))
+        rows: Array = np.tile(self.row, (len(z), 1))
         rows[:, self.free] = values * SIGN[self.free]
         return rows
 
@@ -37,7 +39,8 @@ class Box:
         low, high, logs = self._scaled()
         values = np.abs(row[self.free])
         values[logs] = np.log(np.maximum(values[logs], 1e-300))
-        return np.clip((values - low) / (high - low), 0.001, 0.999)
+        z: Array = np.clip((values - low) / np.maximum(high - low, 1e-300), 0.001, 0.999)
+        return z
 
     def around(self, row: Array, count: int, spread: float, rng: np.random.Generator) -> Array:
         """First members (count, d): half near `row`, half anywhere in the box."""
@@ -48,15 +51,18 @@ class Box:
         z[0] = center
         return z
 
-    def holds(self, rows: Array) -> Array:
-        """Which rows (k, 11) lie in a box twice as wide, (k,) of 0 or 1."""
+    def holds(self, rows: Array) -> BoolArray:
+        """Which rows (k, 11) lie in a box twice as wide, (k,)."""
         values = rows[:, self.free] * SIGN[self.free]
-        return np.all((values >= 0.5 * self.low) & (values <= 2.0 * self.high), axis=1) * 1.0
+        inside: BoolArray = (values >= 0.5 * self.low) & (values <= 2.0 * self.high)
+        every: BoolArray = np.all(inside, axis=1)
+        return every
 
-    def _scaled(self) -> tuple[Array, Array, Array]:
+    def _scaled(self) -> tuple[Array, Array, BoolArray]:
         logs = np.isin(self.free, LOGARITHMIC)
         low, high = self.low.copy(), self.high.copy()
-        low[logs], high[logs] = np.log(low[logs]), np.log(high[logs])
+        low[logs] = np.log(np.maximum(low[logs], 1e-300))
+        high[logs] = np.log(np.maximum(high[logs], 1e-300))
         return low, high, logs
 
 
@@ -70,7 +76,7 @@ def search_box(
     low = np.min([first.low for first in firsts], axis=0)
     high = np.max([first.high for first in firsts], axis=0)
     nine = np.median([first.nine for first in firsts], axis=0)
-    free = np.arange(9)
+    free: IntArray = np.arange(9, dtype=np.int64)
     row = np.concatenate([nine, [k1, k2]])
     if stiffness:
         free = np.append(free, K2)

@@ -58,9 +58,9 @@ def ensemble(
         moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)],
     )
     state = np.random.RandomState(int(rng.integers(2**32))).get_state()
-    done = 0
-    for _ in sampler.sample(first, iterations=steps, rstate0=state, skip_initial_state_check=True):
-        done += 1
+    begin = emcee.State(first, random_state=state)
+    chain = sampler.sample(begin, iterations=steps, skip_initial_state_check=True)
+    for done, _ in enumerate(chain, start=1):
         if on_progress and done % 20 == 0:
             on_progress(done / steps)
     longest = float(np.max(sampler.get_autocorr_time(tol=0, discard=steps // 2)))

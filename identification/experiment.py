@@ -68,15 +68,15 @@ def prepare_run(
     constant: float,
     window: float,
     hold: bool,
-    noise: tuple[float, float] | None = None,
+    noise: tuple[float, float],
 ) -> Run:
     """A log for the kernels.
 
     constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; hold:
-    a held force has no slope between samples; noise: sigma of y [m] and F [N], else estimated.
+    a held force has no slope between samples; noise: sigma of y [m] and F [N].
     """
     h, y, force = log.h, log["y"], log["F"]
-    sigma_y, sigma_f = noise or (noise_of(y, h), noise_of(force, h))
+    sigma_y, sigma_f = noise
     by_command = drive == "command"
     measured = Measured(
         h=h,

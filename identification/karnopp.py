@@ -57,7 +57,9 @@ class Karnopp:
             value = getattr(self, field.name)
             sign = -1.0 if field.name in NEGATIVE else 1.0
             if not np.isfinite(value) or sign * value < 0 or (field.name == "m" and value <= 0):
-                need = "negative or 0" if sign < 0 else ("> 0" if field.name == "m" else "0 or more")
+                need = (
+                    "negative or 0" if sign < 0 else ("> 0" if field.name == "m" else "0 or more")
+                )
                 raise BadModel(f"{field.name} = {value:g} {UNITS[field.name]}, must be {need}")
 
     @property

@@ -54,7 +54,9 @@ class Log:
     def __getitem__(self, key: str) -> Array:
         if key not in self.signals:
             have = ", ".join(self.signals)
-            raise BadLog(f"{self.name}: no signal {key!r} (has {have}); name its column in the card")
+            raise BadLog(
+                f"{self.name}: no signal {key!r} (has {have}); name its column in the card"
+            )
         return self.signals[key]
 
     def __contains__(self, key: object) -> bool:

@@ -63,7 +63,8 @@ class Measured:
 
 
 @compiled_fast
-def _chunk_cost(out: Array, y: Array, force: Array, w_y: float, w_f: float, cap: float, cost: Array
+def _chunk_cost(
+    out: Array, y: Array, force: Array, w_y: float, w_f: float, cap: float, cost: Array
 ) -> None:
     """Add the squared residuals, bent to stay below `cap` where that is positive, to `cost`."""
     for k in range(len(y)):

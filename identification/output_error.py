@@ -17,7 +17,7 @@ from identification.arrays import Array, IntArray
 from identification.box import Box, search_box
 from identification.ensemble import ensemble
 from identification.errors import BadLog
-from identification.experiment import Run, prepare_run, total_cost
+from identification.experiment import Run, impulse_of, noise_of, prepare_run, total_cost
 from identification.identifiability import Events, estimates, events_of
 from identification.karnopp import NAMES, Karnopp
 from identification.log import Log, Rig
@@ -26,7 +26,7 @@ from identification.plant import Actuator, Motor, Plant
 from identification.refine import (
     Cloud,
     Optimum,
-    keep_signs,
+    keep_near,
     moved,
     pack,
     refine,
@@ -53,6 +53,7 @@ FEWEST, MOST = 12.0, 400.0  # independent samples granted to a residual that is 
 OUTLIER = 25.0  # bound of a squared residual where stops may be missed
 BETWEEN = 5e-4  # relative sd that the force between samples adds where it drives the run
 STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated residuals
+ROUGH = 1.15  # what the walls of the likelihood add to its spread: coverage of 40 seeds chose it
 WALKERS = 64
 STEPS = 200
 LONG_WALK = 600
@@ -175,18 +176,27 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
             constant=float(actuator.constants[i]) if actuator and by_command else 0.0,
             window=window,
             hold=hold,
+            noise=_noise(log, first, actuator if by_command else None),
         )
         for i, (log, first) in enumerate(zip(logs, firsts, strict=True))
     )
     stiffness = None if by_command or hold else _stiffness_bounds(logs, firsts)
     box, row = search_box(firsts, k1, k2, stiffness)
-    free = np.append(box.free, [K1, K2]) if by_command else box.free
+    free = box.free
+    if by_command:
+        free = np.concatenate([box.free, np.array([K1, K2], dtype=np.int64)])
     return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator)
 
 
-def _stiffness_bounds(
-    logs: Sequence[Log], firsts: Sequence[FirstEstimate]
-) -> tuple[float, float]:
+def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tuple[float, float]:
+    """Noise of position [m] and force [N]; what the actuator explains of the force is no noise."""
+    force = log["F"]
+    if actuator is not None:
+        force = force - actuator.k1 * impulse_of(log) + actuator.k2 * first.motion.y
+    return noise_of(log["y"], log.h), noise_of(force, log.h)
+
+
+def _stiffness_bounds(logs: Sequence[Log], firsts: Sequence[FirstEstimate]) -> tuple[float, float]:
     """Range of the coupling [N/m] that holds a force-driven run near the measured position.
 
     From the stiffness at which a tenth of the stroke outweighs the friction, up to where the
@@ -259,9 +269,7 @@ def _search(
     return replace(optimum, evaluations=spent), population
 
 
-def _search_near(
-    problem: Problem, near: Optimum, cap: float, rng: np.random.Generator
-) -> Optimum:
+def _search_near(problem: Problem, near: Optimum, cap: float, rng: np.random.Generator) -> Optimum:
     """Search over whole runs around a fit that follows the windows but lost the whole.
 
     Windows begin with a measured velocity, whose noise shifts their optimum a little: enough to
@@ -287,8 +295,7 @@ def _search_near(
 def _cap(problem: Problem, attempt: int) -> float:
     """Bound of a squared residual: wide of the noise, and of a fiftieth of the motion."""
     noise = max(
-        (0.02 * float(np.std(run.measured.y)) * run.measured.weight_y) ** 2
-        for run in problem.runs
+        (0.02 * float(np.std(run.measured.y)) * run.measured.weight_y) ** 2 for run in problem.runs
     )
     return float(max(1e4, noise) * 25.0**attempt)
 
@@ -298,14 +305,12 @@ def _weigh_noise(
 ) -> Solution:
     """A fit that leaves noise: its level taken from the residual, then the likelihood's cloud."""
     runs = list(optimum.runs(problem.long_runs))
-    chi_square = optimum.cost / problem.count
     for _ in range(4):
         runs = [_reweighed(run, optimum.p) for run in optimum.runs(runs)]
         before = optimum
         optimum = refine(runs, optimum.p, problem.free)
         spent += optimum.evaluations
-        chi_square = optimum.cost / problem.count
-        if np.allclose(optimum.p, before.p, rtol=1e-6) and chi_square > 0.99:
+        if np.allclose(optimum.p, before.p, rtol=1e-6):
             break
     report("weighing", 0.0)
     cloud = sample(runs, optimum, rng)
@@ -315,8 +320,13 @@ def _weigh_noise(
         members = cloud.members[index]
     else:
         members = _walk(problem, runs, optimum, _seeds(cloud, rng), STEPS, None, rng, report)
+        members = _widened(members, optimum.covariance)
         spent += WALKERS * STEPS
+    members = np.mean(members, axis=0) + ROUGH * (members - np.mean(members, axis=0))
     optimum = _centred(runs, optimum, members)
+    # Against the noise seen in the signals themselves, not against that of the residual.
+    as_logged = optimum.runs(problem.long_runs)
+    chi_square = float(total_cost(as_logged, optimum.p[None], 0.0)[0]) / problem.count
     return Solution(optimum, members, chi_square, True, spent)
 
 
@@ -341,7 +351,7 @@ def _weigh_correlated(
         covariance = 2.0 * covariance + np.diag(floor**2)
     center = pack(runs, optimum.p, optimum.starts, optimum.free)
     members = rng.multivariate_normal(center, covariance, 1024, check_valid="ignore")
-    keep_signs(members, optimum.free)
+    keep_near(members, optimum.free, optimum.p)
     optimum = replace(optimum, covariance=covariance)
     return Solution(optimum, members, chi_square, chi_square <= problem.adequate, spent)
 
@@ -361,9 +371,7 @@ def _weigh_misfit(
     """
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
-    residuals = [
-        simulated(problem, optimum, i).y - log["y"] for i, log in enumerate(problem.logs)
-    ]
+    residuals = [simulated(problem, optimum, i).y - log["y"] for i, log in enumerate(problem.logs)]
     granted = float(np.clip(effective_samples(residuals), FEWEST, MOST))
     rows = problem.box.rows(population.members[: WALKERS // 2])
     rows[:, [K1, K2]] = np.where(problem.free[-1] == K2, rows[:, [K1, K2]], optimum.p[[K1, K2]])
@@ -392,7 +400,7 @@ def _walk(
 
     def cost(members: Array) -> Array:
         sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
-        inside = problem.box.holds(sets) > 0
+        inside = problem.box.holds(sets)
         values = np.full(len(members), np.inf)
         if inside.any():
             begun = np.ascontiguousarray(begun[:, inside])
@@ -415,9 +423,18 @@ def _seeds(cloud: Cloud, rng: np.random.Generator) -> Array:
     return np.concatenate([members, between])
 
 
-def _jitter(
-    runs: Sequence[Run], optimum: Optimum, count: int, rng: np.random.Generator
-) -> Array:
+def _widened(members: Array, covariance: Array) -> Array:
+    """Samples (k, d) spread, about their mean, at least as widely as `covariance` (d, d).
+
+    Walls in the likelihood can hold walkers in one of its chambers, narrower than the whole.
+    """
+    mean = np.mean(members, axis=0)
+    spread = np.maximum(np.std(members, axis=0), 1e-300)
+    factor = np.maximum(1.0, np.sqrt(np.diag(covariance)) / spread)
+    return np.asarray(mean + factor * (members - mean))
+
+
+def _jitter(runs: Sequence[Run], optimum: Optimum, count: int, rng: np.random.Generator) -> Array:
     """Walkers (count, d) a percent around the optimum."""
     theta = pack(runs, optimum.p, optimum.starts, optimum.free)
     return theta + 0.01 * optimum.scale * rng.standard_normal((count, len(theta)))

@@ -10,11 +10,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.block import WIDTH
 from identification.experiment import Run, total_cost
 from identification.objective import evaluate_block
-from identification.stepping import DV_N, DV_P, F_SN, M
+from identification.stepping import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, K1, K2, M
 
 TRIALS = WIDTH - 1
 FREEDOM = 8.0  # degrees of freedom of the sampling t-distribution
@@ -37,7 +37,7 @@ class Optimum:
     cost: float
     hessian: Array
     scale: Array
-    free: Array
+    free: IntArray
     evaluations: int
     covariance: Array
 
@@ -56,7 +56,7 @@ class _Form:
 def refine(
     runs: Sequence[Run],
     p: Array,
-    free: Array,
+    free: IntArray,
     *,
     cap: float = 0.0,
     iterations: int = 30,
@@ -75,7 +75,7 @@ def refine(
     delta = np.full(len(scale), 1e-5)
     form = _quadratic(runs, p, starts, theta, free, scale, delta, cap)
     for _ in range(iterations):
-        trials = _steps(form, theta, center, scale, prior, damping, free)
+        trials = _steps(form, theta, center, scale, prior, damping, free, p)
         sets, begun = unpack(runs, p, starts, free, trials)
         costs = total_cost(runs, sets, cap, begun)
         spent += len(trials) + WIDTH
@@ -128,9 +128,11 @@ def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> C
     """
     theta = pack(runs, optimum.p, optimum.starts, optimum.free)
     covariance = optimum.covariance
-    for turn in range(ROUNDS):
+    spent = 0
+    for _ in range(ROUNDS):
+        spent += CLOUD
         cloud, density = _draw(theta, covariance, rng)
-        keep_signs(cloud, optimum.free)
+        keep_near(cloud, optimum.free, optimum.p)
         sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, cloud)
         costs = total_cost(runs, sets, 0.0, begun)
         costs = np.where(np.isfinite(costs), costs, np.inf)
@@ -143,12 +145,10 @@ def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> C
         off = cloud - theta
         covariance = 0.8 * (softened[:, None] * off).T @ off + 0.2 * covariance
     settled = effective > ENOUGH * CLOUD
-    return Cloud(cloud, weight, costs, effective, settled, (turn + 1) * CLOUD)
+    return Cloud(cloud, weight, costs, effective, settled, spent)
 
 
-def robust_covariance(
-    runs: Sequence[Run], optimum: Optimum, cap: float, stretches: int
-) -> Array:
+def robust_covariance(runs: Sequence[Run], optimum: Optimum, cap: float, stretches: int) -> Array:
     """Covariance (d, d) of the unknowns where the residual is not white noise.
 
     H^-1 (sum of g g') H^-1 with the gradient g of each stretch of the logs: what correlated
@@ -173,9 +173,7 @@ def robust_covariance(
         slopes[:, used] = gram[:, 0, 1 : len(used) + 1] / delta[used] * optimum.scale[used]
         slopes -= slopes.mean(axis=0)
         scatter += slopes.T @ slopes * each / (each - 1)
-    inverse = np.linalg.pinv(
-        optimum.hessian + 1e-6 * np.eye(d), rcond=1e-14, hermitian=True
-    )
+    inverse = np.linalg.pinv(optimum.hessian + 1e-6 * np.eye(d), rcond=1e-14, hermitian=True)
     total = inverse @ scatter @ inverse
     return np.asarray(total * np.outer(optimum.scale, optimum.scale))
 
@@ -187,9 +185,7 @@ def moved(runs: Sequence[Run], optimum: Optimum, theta: Array, covariance: Array
     return replace(optimum, p=sets[0], starts=begun[:, 0], cost=cost, covariance=covariance)
 
 
-def _draw(
-    center: Array, covariance: Array, rng: np.random.Generator
-) -> tuple[Array, Array]:
+def _draw(center: Array, covariance: Array, rng: np.random.Generator) -> tuple[Array, Array]:
     """A cloud (CLOUD, d) of a t-distribution and its log density up to a constant, (CLOUD,)."""
     d = len(center)
     values, vectors = np.linalg.eigh(0.5 * (covariance + covariance.T))
@@ -220,7 +216,7 @@ def _tempered(costs: Array, density: Array, wanted: float) -> Array:
     return _weights(costs, density, low)
 
 
-def _scales(runs: Sequence[Run], p: Array, free: Array) -> Array:
+def _scales(runs: Sequence[Run], p: Array, free: IntArray) -> Array:
     """Units in which the unknowns are of order one."""
     shared = np.maximum(np.abs(p[free]), 1e-9)
     forces = np.isin(free, [1, 2, 7, 8])
@@ -233,14 +229,14 @@ def _scales(runs: Sequence[Run], p: Array, free: Array) -> Array:
     return np.concatenate([shared, *own])
 
 
-def pack(runs: Sequence[Run], p: Array, starts: Array, free: Array) -> Array:
+def pack(runs: Sequence[Run], p: Array, starts: Array, free: IntArray) -> Array:
     """Unknowns (d,): the free shared parameters, then each run's open start entries."""
     own = [starts[index, list(run.open)] for index, run in enumerate(runs)]
     return np.concatenate([p[free], *own])
 
 
 def unpack(
-    runs: Sequence[Run], p: Array, starts: Array, free: Array, theta: Array
+    runs: Sequence[Run], p: Array, starts: Array, free: IntArray, theta: Array
 ) -> tuple[Array, Array]:
     """Parameter sets (k, 11) and starts (runs, k, 3) of unknowns (k, d)."""
     sets = np.tile(p, (len(theta), 1))
@@ -253,15 +249,18 @@ def unpack(
     return sets, begun
 
 
-def keep_signs(theta: Array, free: Array) -> None:
-    """Move unknowns (k, d) back to the signs that the model allows, in place."""
+def keep_near(theta: Array, free: IntArray, row: Array) -> None:
+    """Move unknowns (k, d) to the model's signs and within reach of `row` (11,), in place.
+
+    A step to a vanishing mass or band would be as costly to simulate as it is beside the point.
+    """
+    reach = 5.0 * np.abs(row[free]) + 5.0 * np.max(np.abs(row[[F_CP, F_CN, F_SP, F_SN]]))
     for column, index in enumerate(free):
-        if index in (DV_N, F_SN):
-            np.minimum(theta[:, column], -1e-7, out=theta[:, column])
-        elif index in (M, DV_P):
-            np.maximum(theta[:, column], 1e-7, out=theta[:, column])
-        else:
-            np.maximum(theta[:, column], 0.0, out=theta[:, column])
+        sign = -1.0 if index in (DV_N, F_SN) else 1.0
+        size = abs(row[index])
+        low = 0.2 * size if index in (M, DV_P, DV_N) else 0.0
+        high = 5.0 * size if index in (M, DV_P, DV_N, K1, K2) else reach[column]
+        theta[:, column] = sign * np.clip(sign * theta[:, column], low, high)
 
 
 def _quadratic(
@@ -269,7 +268,7 @@ def _quadratic(
     p: Array,
     starts: Array,
     theta: Array,
-    free: Array,
+    free: IntArray,
     scale: Array,
     delta: Array,
     cap: float,
@@ -300,7 +299,7 @@ def _gentlest(
     p: Array,
     starts: Array,
     theta: Array,
-    free: Array,
+    free: IntArray,
     scale: Array,
     delta: Array,
     cap: float,
@@ -333,7 +332,8 @@ def _steps(
     scale: Array,
     prior: Array,
     damping: float,
-    free: Array,
+    free: IntArray,
+    row: Array,
 ) -> Array:
     """Trial points (TRIALS, d) for dampings around the last that served."""
     pull = form.gradient + prior * (theta - center) / scale
@@ -347,6 +347,5 @@ def _steps(
         except np.linalg.LinAlgError:
             step = np.linalg.pinv(matrix) @ pull
         trials[i] = theta - step * scale
-    keep_signs(trials, free)
+    keep_near(trials, free, row)
     return trials
-

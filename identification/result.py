@@ -47,12 +47,13 @@ class LogFit:
 class KarnoppFit:
     """The nine parameters and the actuator, identified from one or more logs.
 
-    friction: all nine, those that the logs do not tell at the value assumed for simulation;
-    estimates: the nine (and "k1", "k2" where the command is logged) by name; samples: (k, free)
-    equally likely sets of the names in `free`; covariance: of the same, in that order; noise_y [m], noise_F [N]: standard deviations found in the
-    residual; `chi_square` near 1 says that the model leaves nothing but noise, `adequate` that
-    the search found such a fit; `stiffness` [N/m] couples a force-driven run to the measured
-    position (0: none); `remarks`: one line each on what was noticed.
+    friction: all nine, those that the logs do not tell at the value assumed for simulation.
+    estimates: the nine (and "k1", "k2" where the command is logged) by name.
+    free: names in the order of `covariance` (d, d) and of `samples` (k, d), equally likely sets.
+    stiffness [N/m]: couples a force-driven run to the measured position, 0 for none.
+    noise_y [m], noise_F [N]: standard deviations found in the residual.
+    chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
+    adequate: whether the search found such a fit. remarks: one line each on what was noticed.
     """
 
     friction: Karnopp

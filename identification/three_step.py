@@ -120,9 +120,7 @@ def _breakaways(
     return max(stick_p, 0.1 * otherwise[0]), max(stick_n, 0.1 * otherwise[1])
 
 
-def _stops(
-    h: float, rest: NDArray[np.bool_], v: Array, otherwise: float
-) -> tuple[float, float]:
+def _stops(h: float, rest: NDArray[np.bool_], v: Array, otherwise: float) -> tuple[float, float]:
     """Step 3: median speed shortly before the body comes to rest, by direction."""
     back = max(2, round(BEFORE_STOP / h))
     begins = np.flatnonzero(~rest[:-1] & rest[1:])

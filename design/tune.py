@@ -1,0 +1,197 @@
+"""Poles chosen for a robust loop: a small search over dominant and auxiliary poles.
+
+Ours. Stable, well damped plant poles are kept as closed-loop poles (moving them costs robustness
+and buys nothing; Landau & Zito, section 3.6), the other poles lie on the real axis, faster than
+the dominant ones. Of the loops that keep the margins, the fastest is taken.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from design.margins import Margins, margins
+from design.pid import PID, design_pid
+from design.polynomial import ComplexArray, frequency_and_damping, roots
+from design.rst import RST, design_rst
+from design.specification import normalised_plant
+from identification.arrays import Array
+from identification.errors import BadSpecification
+
+FREQUENCIES = 20  # dominant w_n tried, evenly spaced in log
+SLOWEST, FASTEST = 0.005, 0.6  # w_n h [rad]
+DAMPINGS = (1.0, 0.8)
+RATIOS = (3.0, 6.0, 1.5)  # auxiliary poles, in units of w_n
+KEPT = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
+
+
+@dataclass(frozen=True)
+class Goals:
+    """What a loop must keep: modulus margin [-], delay margin in samples, largest |S_up| [dB].
+
+    effort bounds the force that measurement noise may ask for; None for no bound.
+    """
+
+    modulus: float = 0.5
+    delay: float = 2.0
+    effort: float | None = None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """A specification by hand: dominant (w_n [rad/s], zeta), auxiliary poles z; None: searched."""
+
+    dominant: tuple[float, float] | None = None
+    auxiliary: tuple[complex, ...] | None = None
+    integrator: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Tuned:
+    """A controller with its margins, the poles it was asked for, and what it misses, if so.
+
+    gains: of a PID that has them. missed: goals not kept, in words; () where all are.
+    """
+
+    rst: RST
+    margins: Margins
+    dominant: tuple[float, float]
+    auxiliary: tuple[complex, ...]
+    missed: tuple[str, ...]
+    pid: PID | None = None
+
+
+Design = Callable[[tuple[float, float], tuple[complex, ...]], tuple[RST, PID | None]]
+
+
+def tune_rst(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
+    """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
+
+    R holds 1 + z^-1, so that noise at half the sampling rate does not reach the force.
+    Raises BadSpecification with the first reason where no poles of the search give a stable loop.
+    """
+    A, B = normalised_plant(A, B)
+    H_S = [1.0, -1.0] if asked.integrator else [1.0]
+
+    def design(
+        dominant: tuple[float, float], auxiliary: tuple[complex, ...]
+    ) -> tuple[RST, PID | None]:
+        controller = design_rst(
+            A, B, h, dominant=dominant, auxiliary=auxiliary, H_R=[1.0, 1.0], H_S=H_S,
+            T="keep-dominant",
+        )  # fmt: skip
+        return controller, None
+
+    free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
+    return _best(A, B, h, asked, goals, design, _auxiliary(A, h, max(free, 0)))
+
+
+def tune_pid(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
+    """The fastest digital PID within the goals, or the one asked for; A, B in z^-1, h [s].
+
+    Raises BadSpecification with the first reason where none gives a stable loop.
+    """
+    A, B = normalised_plant(A, B)
+
+    def design(
+        dominant: tuple[float, float], auxiliary: tuple[complex, ...]
+    ) -> tuple[RST, PID | None]:
+        found = design_pid(A, B, h, dominant=dominant, auxiliary=auxiliary)
+        return found.rst, found
+
+    return _best(A, B, h, asked, goals, design, _auxiliary(A, h, min(A.size - 1, 2)))
+
+
+def _auxiliary(A: Array, h: float, count: int) -> Callable[[float], tuple[complex, ...]]:
+    """Auxiliary poles for a given speed [rad/s]: kept plant poles, then equal real ones."""
+    kept = _kept(roots(A), h)[:count]
+    kept = kept[:-1] if len(kept) and kept[-1].imag > 0 else kept
+
+    def poles(speed: float) -> tuple[complex, ...]:
+        real = complex(math.exp(-speed * h))
+        return (*(complex(z) for z in kept), *[real] * (count - len(kept)))
+
+    return poles
+
+
+def _kept(poles: ComplexArray, h: float) -> ComplexArray:
+    """Plant poles that may stay: fast and damped; conjugates side by side, positive one first."""
+    fit = [
+        complex(z)
+        for z in poles
+        if 1e-6 < abs(z) <= KEPT and (z.real > 0 and frequency_and_damping(complex(z), h)[1] > 0.5)
+    ]
+    return np.array(sorted(fit, key=lambda z: (abs(z), z.real, -z.imag)), dtype=np.complex128)
+
+
+def _best(
+    A: Array,
+    B: Array,
+    h: float,
+    asked: Asked,
+    goals: Goals,
+    design: Design,
+    auxiliary: Callable[[float], tuple[complex, ...]],
+) -> Tuned:
+    refusal: BadSpecification | None = None
+    found: list[Tuned] = []
+    for dominant, candidates in _grid(h, asked, auxiliary):
+        for others in candidates:
+            try:
+                controller, pid = design(dominant, others)
+                margin = margins(A, B, controller)
+            except BadSpecification as error:
+                refusal = refusal or error
+                continue
+            missed = goals_missed(margin, goals, _integrates(A, controller))
+            found.append(Tuned(controller, margin, dominant, others, missed, pid))
+        kept = [one for one in found if not one.missed and one.rst.stable]
+        if kept:
+            return max(kept, key=lambda one: one.margins.modulus)
+    if not found:
+        raise refusal or BadSpecification("no poles to try; give --poles w_n,zeta")
+    return max(found, key=lambda one: (one.rst.stable, one.margins.modulus))
+
+
+def _grid(
+    h: float, asked: Asked, auxiliary: Callable[[float], tuple[complex, ...]]
+) -> Iterator[tuple[tuple[float, float], list[tuple[complex, ...]]]]:
+    """Dominant poles, the fastest first, each with the auxiliary poles to try."""
+    frequencies: list[float] = np.geomspace(FASTEST / h, SLOWEST / h, FREQUENCIES).tolist()
+    pairs = [(w, zeta) for w in frequencies for zeta in DAMPINGS]
+    for dominant in [asked.dominant] if asked.dominant else pairs:
+        if asked.auxiliary is not None:
+            yield dominant, [asked.auxiliary]
+        else:
+            yield dominant, [auxiliary(ratio * dominant[0]) for ratio in RATIOS]
+
+
+def _integrates(A: Array, controller: RST) -> bool:
+    """Whether the loop gain is infinite at frequency 0."""
+    size = float(np.abs(A).sum() * np.abs(controller.S).sum())
+    return abs(float(A.sum() * controller.S.sum())) < 1e-9 * size
+
+
+def goals_missed(found: Margins, goals: Goals, integrates: bool) -> tuple[str, ...]:
+    """The goals that a loop does not keep, in words; integrates: its gain is infinite at 0."""
+    missed = []
+    if integrates and found.delay_s is None:
+        missed.append("the crossover is lost in rounding; sample more slowly")
+    if found.modulus < goals.modulus:
+        missed.append(f"modulus margin {found.modulus:.3f}, at least {goals.modulus:g} asked")
+    if found.delay_s is not None and found.delay_s < goals.delay * found.h:
+        samples = found.delay_s / found.h
+        missed.append(f"delay margin {samples:.2f} samples, at least {goals.delay:g} asked")
+    effort = found.S_up_max_db
+    if goals.effort is not None and effort is not None and effort > goals.effort:
+        missed.append(
+            f"noise asks for {effort:.1f} dB of force, at most {goals.effort:.1f} allowed"
+        )
+    return tuple(missed)
+
+
+def as_pairs(poles: Sequence[complex]) -> list[Any]:
+    """Poles as plain numbers: a real one as itself, a complex one as [re, im]."""
+    return [z.real if z.imag == 0 else [z.real, z.imag] for z in poles]

@@ -1,0 +1,82 @@
+"""Reasons instead of numbers where the events or the spread do not carry a parameter."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import IntArray
+from identification.identifiability import Events, estimates, events_of
+from identification.karnopp import NAMES
+from identification.stepping import BAND_P, SLIP_N, SLIP_P, STUCK
+from tests.identification.plants import table
+
+PLENTY = Events((10, 10), (10, 10), (1000, 1000), (0.5, 0.5))
+
+
+def spread(relative: float) -> np.ndarray:
+    rng = np.random.default_rng(1)
+    return table(1).array * (1 + relative * rng.standard_normal((2000, 9)))
+
+
+def test_events_are_counted_by_direction() -> None:
+    modes: IntArray = np.array(
+        [STUCK, BAND_P, SLIP_P, SLIP_P, STUCK, STUCK, SLIP_N, SLIP_N, STUCK], dtype=np.int64
+    )
+    v = np.array([0, 0.01, 0.1, 0.2, 0, 0, -0.3, -0.1, 0])
+    events = events_of([modes], [v])
+    assert events.breakaways == (1, 1)
+    assert events.crossings == (2, 2)
+    assert events.sliding == (2, 2)
+    assert events.fastest == (0.2, 0.3)
+
+
+def test_an_interval_holds_its_value_and_the_sign() -> None:
+    found = estimates(NAMES, table(1).array, spread(0.01), PLENTY, False, "log")
+    for name, value in zip(NAMES, table(1).array, strict=True):
+        one = found[name]
+        assert one.value == value
+        assert one.low is not None
+        assert one.high is not None
+        assert one.low < value < one.high
+        assert one.high - one.low == pytest.approx(2 * 1.96 * 0.01 * abs(value), rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("events", "silent"),
+    [
+        (Events((0, 9), (9, 9), (999, 999), (1, 1)), {"F_sp"}),
+        (Events((9, 2), (9, 9), (999, 999), (1, 1)), {"F_sn"}),
+        (Events((9, 9), (0, 9), (999, 999), (1, 1)), {"dv_p"}),
+        (Events((9, 9), (9, 9), (0, 999), (0, 1)), {"F_cp", "F_vp", "dv_p", "F_sp"}),
+    ],
+)
+def test_missing_events_silence_their_parameters(events: Events, silent: set[str]) -> None:
+    found = estimates(NAMES, table(1).array, spread(0.01), events, False, "run3.csv")
+    assert {name for name in NAMES if found[name].value is None} == silent
+    for name in silent:
+        reason = found[name].reason
+        assert reason is not None
+        assert "run3.csv" in reason
+        assert "needed" in reason
+
+
+def test_a_wide_interval_silences_a_parameter() -> None:
+    samples = spread(0.01)
+    samples[:, 5] *= np.random.default_rng(2).uniform(0, 2, len(samples))
+    found = estimates(NAMES, table(1).array, samples, PLENTY, False, "log")
+    assert {name for name in NAMES if found[name].value is None} == {"dv_p"}
+    assert found["dv_p"].assumed == table(1).dv_p
+
+
+def test_a_viscous_term_that_is_surely_small_is_an_answer() -> None:
+    center, samples = table(1).array.copy(), spread(0.001)
+    center[3] = 0.1
+    samples[:, 3] = np.abs(0.1 + 0.1 * np.random.default_rng(3).standard_normal(len(samples)))
+    found = estimates(NAMES, center, samples, PLENTY, False, "log")
+    assert found["F_vp"].value == 0.1
+    assert found["F_vp"].low == 0.0
+
+
+def test_rotary_units() -> None:
+    found = estimates(NAMES, table(1).array, spread(0.01), PLENTY, True, "log")
+    assert found["m"].unit == "kg m^2"
+    assert found["dv_p"].unit == "rad/s"

@@ -1,0 +1,101 @@
+"""The vectorised distance: the same numbers as a scalar run, lane for lane."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.block import WIDTH
+from identification.experiment import Run, prepare_run, restart_windows, total_cost
+from identification.log import Log
+from identification.objective import evaluate_block
+from identification.plant import Actuator, Plant
+from identification.simulate import free_run
+from identification.stepping import kernel_parameters
+from identification.three_step import first_estimate
+from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
+
+
+def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> Run:
+    run = prepare_run(
+        log,
+        first_estimate(log),
+        "command" if by_command else "force",
+        constant=0.0,
+        window=window,
+        hold=False,
+        noise=(NOISE_Y, NOISE_F),
+    )
+    return Run(run.name, run.measured, run.windows, np.zeros(3), run.open)
+
+
+def sets(number: int) -> np.ndarray:
+    """WIDTH parameter sets around a table's plant."""
+    truth = kernel_parameters(table(number).array, ACTUATOR.k1, ACTUATOR.k2)
+    rng = np.random.default_rng(number)
+    return truth * (1 + 0.02 * rng.standard_normal((WIDTH, len(truth))))
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_cost_is_that_of_scalar_runs(number: int) -> None:
+    log = made_log(table(number), seconds=3.0)
+    run, rows = run_of(log), sets(number)
+    costs = total_cost([run], rows, 0.0)
+    for lane in (0, 3, WIDTH - 1):
+        plant = Plant(
+            type(table(number)).from_array(rows[lane, :9]), Actuator(rows[lane, 9], rows[lane, 10])
+        )
+        alone = free_run(plant, log, (0.0, 0.0, 0.0), "command")
+        expected = np.sum(((alone.y - log["y"]) / NOISE_Y) ** 2)
+        expected += np.sum(((alone.F - log["F"]) / NOISE_F) ** 2)
+        assert costs[lane] == pytest.approx(expected, rel=1e-6)
+
+
+def test_cost_driven_by_force_is_that_of_a_scalar_run() -> None:
+    log = made_log(table(2), seconds=3.0)
+    run, rows = run_of(log, by_command=False), sets(2)
+    rows[:, 9] = 0.0
+    costs = total_cost([run], rows, 0.0)
+    plant = Plant(type(table(2)).from_array(rows[0, :9]))
+    alone = free_run(
+        plant, log, (0.0, 0.0, float(log["F"][0])), "force", stiffness=float(rows[0, 10])
+    )
+    expected = np.sum(((alone.y - log["y"]) / NOISE_Y) ** 2)
+    assert costs[0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_cost_of_the_truth_is_the_noise() -> None:
+    run = run_of(made_log(table(1), seed=2))
+    truth = kernel_parameters(table(1).array, ACTUATOR.k1, ACTUATOR.k2)
+    assert total_cost([run], truth[None], 0.0)[0] / run.measured.count == pytest.approx(1, abs=0.03)
+
+
+def test_a_bound_keeps_outliers_from_ruling() -> None:
+    log = made_log(table(1), seconds=3.0)
+    y = log["y"].copy()
+    y[1000:1010] += 1.0
+    run = run_of(log)
+    run = replace(run, measured=replace(run.measured, y=y))
+    truth = kernel_parameters(table(1).array, ACTUATOR.k1, ACTUATOR.k2)[None]
+    assert total_cost([run], truth, 0.0)[0] > 1e9
+    assert total_cost([run], truth, 25.0)[0] < 2 * run.measured.count + 10 * 25.0
+
+
+def test_gram_matrices_add_up_over_stretches() -> None:
+    run, rows = run_of(made_log(table(2), seconds=3.0)), sets(2)
+    start = np.zeros((WIDTH, 3))
+    _, one = evaluate_block(rows, start, run.measured, run.windows, 0.0, 1)
+    _, ten = evaluate_block(rows, start, run.measured, run.windows, 0.0, 10)
+    assert np.allclose(one[0], ten.sum(axis=0), rtol=1e-9)
+    assert np.allclose(one[0][1:, 1:], one[0][1:, 1:].T)
+    costs = total_cost([run], rows, 0.0)
+    assert one[0, 0, 0] == pytest.approx(costs[0], rel=1e-9)
+
+
+def test_windows_restart_at_rest_where_there_is_rest() -> None:
+    log = made_log(table(2), seconds=6.0)
+    first = first_estimate(log)
+    windows = restart_windows(first, log.h, 1.0)
+    assert windows.at[0] == 0
+    assert np.all(np.diff(windows.at) > 0)
+    assert np.all(windows.v[first.rest[windows.at]] == 0.0)

@@ -1,0 +1,136 @@
+"""The nine-parameter fit on logs of known plants, and its honesty where a log is silent."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+
+from identification.errors import BadLog, NotIdentifiable
+from identification.karnopp import NAMES, Karnopp
+from identification.log import Log, Rig
+from identification.output_error import fit_karnopp
+from identification.plant import Actuator, Motor
+from identification.result import KarnoppFit
+from tests.identification.plants import ACTUATOR, made_log, table
+
+FORCE = Rig("force")
+
+
+def fitted(log: Log, seed: int = 7) -> KarnoppFit:
+    return fit_karnopp([log], np.random.default_rng(seed), rig=FORCE)
+
+
+def errors(fit: KarnoppFit, truth: Karnopp) -> np.ndarray:
+    return np.abs(fit.friction.array / truth.array - 1.0)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_recovers_the_papers_plants(number: int) -> None:
+    truth = table(number)
+    fit = fitted(made_log(truth, seed=number))
+    assert fit.adequate
+    assert fit.drive == "command"
+    assert fit.chi_square == pytest.approx(1.0, abs=0.15)
+    assert np.max(errors(fit, truth)) < 0.01
+    assert isinstance(fit.actuator, Actuator)
+    assert fit.actuator.k1 == pytest.approx(ACTUATOR.k1, rel=1e-3)
+    assert fit.actuator.k2 == pytest.approx(ACTUATOR.k2, rel=1e-3)
+    for name, value in zip(NAMES, truth.array, strict=True):
+        found = fit.estimates[name]
+        assert found.value is not None, found.reason
+        assert found.sd is not None
+        assert abs(found.value - value) < 5 * found.sd + 1e-4 * abs(value)
+
+
+def test_recovers_a_plant_from_the_force_alone() -> None:
+    truth = table(2)
+    log = made_log(truth, seed=3)
+    alone = Log(log.name, {key: log[key] for key in ("t", "y", "F")})
+    fit = fitted(alone)
+    assert fit.drive == "force"
+    assert fit.actuator is None
+    assert fit.stiffness > 0
+    assert np.max(errors(fit, truth)[:5]) < 0.02
+    assert np.max(errors(fit, truth)) < 0.10
+
+
+def test_motor_is_driven_by_its_command() -> None:
+    log = made_log(table(2), seed=4)
+    motor = Log(log.name, {"t": log["t"], "y": log["y"], "F": 2.0 * log["u"], "u": log["u"]})
+    fit = fit_karnopp([motor], np.random.default_rng(1), rig=Rig("motor", force_per_command=2.0))
+    assert fit.actuator == Motor(2.0)
+    assert fit.stiffness == 0.0
+
+
+def test_two_logs_make_one_fit_with_smaller_spread() -> None:
+    truth = table(3)
+    logs = [made_log(truth, seed=seed, seconds=6.0) for seed in (1, 2)]
+    one = fit_karnopp(logs[:1], np.random.default_rng(2), rig=FORCE)
+    both = fit_karnopp(logs, np.random.default_rng(2), rig=FORCE)
+    assert both.adequate
+    assert len(both.logs) == 2
+    assert np.max(errors(both, truth)) < 0.01
+    assert np.trace(both.covariance[:1, :1]) < np.trace(one.covariance[:1, :1])
+
+
+def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
+    t = np.arange(8000) * 1e-3
+    pushes = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0) * (np.sin(2 * np.pi * 2.0 * t) > -0.2)
+    log = made_log(table(2), u=pushes, seconds=8.0)
+    assert np.min(np.diff(log["y"][::100])) > -1e-4
+    fit = fitted(log)
+    for name in ("F_cn", "F_vn", "dv_n", "F_sn"):
+        found = fit.estimates[name]
+        assert found.value is None
+        assert found.assumed is not None
+        assert found.reason is not None
+        assert "negative direction" in found.reason or "does not tell" in found.reason
+    assert fit.estimates["F_cp"].value == pytest.approx(table(2).F_cp, rel=0.02)
+
+
+def test_same_seed_gives_the_same_fit() -> None:
+    log = made_log(table(1), seed=5, seconds=5.0)
+    one, two = fitted(log), fitted(log)
+    for field in fields(Karnopp):
+        assert getattr(one.friction, field.name) == getattr(two.friction, field.name)
+
+
+def test_arrays_of_the_caller_are_not_changed() -> None:
+    log = made_log(table(1), seed=6, seconds=4.0)
+    before = {key: values.copy() for key, values in log.signals.items()}
+    fitted(log)
+    for key, values in before.items():
+        assert np.array_equal(log[key], values)
+
+
+def test_progress_is_reported_by_stage() -> None:
+    seen: list[tuple[str, float]] = []
+    fit_karnopp(
+        [made_log(table(2), seconds=4.0)],
+        np.random.default_rng(0),
+        rig=FORCE,
+        on_progress=lambda stage, share: seen.append((stage, share)),
+    )
+    assert {"searching", "refining"} <= {stage for stage, _ in seen}
+    assert all(0.0 <= share <= 1.0 for _, share in seen)
+
+
+def test_a_wrong_structure_is_not_called_adequate() -> None:
+    log = made_log(table(2), seed=8, seconds=6.0)
+    spring = log.with_signals(F=log["F"] + 300.0 * log["y"] ** 2 / np.max(log["y"]))
+    fit = fit_karnopp([spring], np.random.default_rng(3), rig=FORCE)
+    assert not fit.adequate
+    assert any("effect is missing" in remark for remark in fit.remarks)
+
+
+def test_refusals() -> None:
+    log = made_log(table(2), seconds=2.0)
+    with pytest.raises(BadLog, match="no applied force"):
+        fitted(Log("bare", {"t": log["t"], "y": log["y"]}))
+    rng = np.random.default_rng(0)
+    still = log.with_signals(y=1e-5 * rng.standard_normal(len(log)))
+    with pytest.raises(NotIdentifiable, match="no motion"):
+        fitted(still)
+    alone = Log("alone", {key: log[key] for key in ("t", "y", "F")})
+    with pytest.raises(BadLog, match="no command u"):
+        fit_karnopp([alone], rng, rig=FORCE, drive="command")

@@ -1,0 +1,46 @@
+"""The global search on functions with known minima."""
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from identification.arrays import Array
+from identification.search import evolve
+
+
+def rugged(z: Array) -> Array:
+    """Rastrigin's function in the unit cube: many local minima, the global one at 0.3."""
+    x = 10.0 * (z - 0.3)
+    return np.asarray(10.0 * z.shape[1] + np.sum(x**2 - 10.0 * np.cos(2 * np.pi * x), axis=1))
+
+
+def test_leaves_local_minima() -> None:
+    rng = np.random.default_rng(1)
+    found = evolve(rugged, rng.random((64, 4)), 200, rng)
+    assert np.allclose(found.members[0], 0.3, atol=0.01)
+    assert np.all(np.diff(found.costs) >= 0)
+
+
+@given(st.integers(0, 2**31))
+def test_members_stay_in_the_cube_and_never_get_worse(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    first = rng.random((16, 3))
+    before = rugged(first).min()
+    found = evolve(rugged, first, 10, rng)
+    assert np.all((found.members >= 0) & (found.members <= 1))
+    assert found.costs[0] <= before
+
+
+def test_members_that_cannot_be_are_left() -> None:
+    def half(z: Array) -> Array:
+        return np.where(z[:, 0] < 0.5, np.nan, (z[:, 0] - 0.6) ** 2)
+
+    rng = np.random.default_rng(2)
+    found = evolve(half, rng.random((32, 1)), 60, rng)
+    assert abs(found.members[0, 0] - 0.6) < 1e-3
+
+
+def test_stops_when_the_population_has_met() -> None:
+    rng = np.random.default_rng(3)
+    found = evolve(lambda z: 1.0 + np.sum((z - 0.5) ** 2, axis=1), rng.random((32, 2)), 1000, rng)
+    assert found.evaluations < 32 * 200

@@ -1,0 +1,86 @@
+"""`workbench identify`: logs -> model.json and report.html."""
+
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options, progress
+
+STAGES = {"searching": (0.0, 0.5), "searching near": (0.5, 0.6), "refining": (0.6, 0.65)}
+REST = (0.65, 1.0)
+
+
+@click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@click.option("--card", required=True, help="Path of the card, or the name of a shipped one.")
+@click.option(
+    "--drive",
+    type=click.Choice(["force", "command"]),
+    help="What drives the fitted run.  [default: the command where it explains the force]",
+)
+@click.option("--orders", metavar="NA,NB,NK", help="Orders of the ARX plant.  [default: chosen]")
+@click.option(
+    "--design-period",
+    type=float,
+    metavar="S",
+    help="Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
+)
+@click.option("--posterior", is_flag=True, help="Sample the posterior of the parameters too.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@output_options
+def command(
+    logs: tuple[str, ...],
+    card: str,
+    drive: Literal["force", "command"] | None,
+    orders: str | None,
+    design_period: float | None,
+    posterior: bool,
+    seed: int,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Find friction, plant and actuator of a machine from its logs.
+
+    Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
+    report.html. LOG is a path, or a file name of the card's set. Exit status 1: the logs tell
+    nothing.
+    """
+    from workbench.model import model_document
+    from workbench.options import parse_orders
+    from workbench.pipeline import Options, identify_sources
+    from workbench.report.reports import identification_report
+    from workbench.sources import read_sources
+    from workbench.views import model_view
+
+    options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
+    with OutputFolder("identify", out, now=datetime.now()) as folder:
+        with progress("identifying", 1.0, as_json=as_json) as advance:
+            sources = read_sources(logs, card)
+            found = identify_sources(
+                sources, options, seed, posterior=posterior, on_progress=staged(advance)
+            )
+        folder.write_json("model.json", model_document(found.model))
+        folder.write_text("report.html", identification_report(found))
+    emit(
+        {**model_document(found.model), "out": folder.final},
+        as_json,
+        lambda: model_view(found.model, sources.remarks, folder.final),
+    )
+
+
+def staged(advance: Callable[[float], None]) -> Callable[[str, float], None]:
+    """Progress by stages as steps of one bar that only moves forward."""
+    reached = 0.0
+
+    def report(stage: str, share: float) -> None:
+        nonlocal reached
+        low, high = STAGES.get(stage, REST)
+        place = low + (high - low) * min(max(share, 0.0), 1.0)
+        if place > reached:
+            advance(place - reached)
+            reached = place
+
+    return report

@@ -1,0 +1,256 @@
+"""Runs -> Model: the nine parameters, the actuator, and the ARX plant that a design may start from.
+
+ARX: its input is the applied force F, the stand-in for the force loop's reference of the paper's
+plant model, since a force loop has unity gain; where there is no force, the command u. A log at
+1 kHz is taken every 10 ms (`design_period`): the output at the samples, the input as its mean in
+between, since that is what moves the body. A log from a closed loop is fitted directly.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.arx import ArxModel, fit_arx, one_step_errors, simulation_errors
+from identification.arx_select import select_arx
+from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.inverse_model import ForceError, Smoothing, force_error
+from identification.karnopp import NAMES, ROTARY_UNITS, UNITS
+from identification.log import Log, Rig
+from identification.output_error import fit_karnopp
+from identification.plant import Actuator, Motor
+from identification.residual_tests import residual_tests
+from identification.result import Drive, Estimate, KarnoppFit
+from workbench.model import ArxPlant, ArxTests, FitSummary, LogEntry, Model, versions
+
+Progress = Callable[[str, float], None]
+Orders = tuple[int, int, int]
+DESIGN_PERIOD = 10e-3  # s
+SPLIT = 0.6
+LARGEST = 4  # na, nb and nk tried where no orders are given
+TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
+
+
+@dataclass(frozen=True)
+class Source:
+    """One run of a file: its log on an even clock, the file's name, hash and rows."""
+
+    log: Log
+    file: str
+    sha256: str
+    rows: int
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to identify; orders (na, nb, nk) and period [s] of the ARX plant, None: chosen."""
+
+    drive: Drive | None = None
+    orders: Orders | None = None
+    design_period: float | None = None
+
+
+def identify(
+    sources: Sequence[Source],
+    rng: np.random.Generator,
+    *,
+    card: str,
+    rig: Rig,
+    options: Options | None = None,
+    on_progress: Progress | None = None,
+) -> tuple[Model, KarnoppFit]:
+    """The model of one machine from its runs, and the fit it comes from.
+
+    Raises NotIdentifiable where nothing can be told, BadLog where a signal is missing.
+    """
+    options = options or Options()
+    logs = [source.log for source in sources]
+    fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
+    if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
+        first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
+        raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
+    plant, reason = _arx_or_reason(logs, options)
+    errors = _force_error(logs[0], fit, rig)
+    return (
+        Model(
+            card=card,
+            rig=rig,
+            friction=_nine(fit, rig),
+            actuator=_actuator(fit, rig),
+            plant=plant,
+            plant_reason=reason,
+            fit=FitSummary(
+                drive=fit.drive,
+                stiffness=fit.stiffness,
+                noise_y=fit.noise_y,
+                noise_F=fit.noise_F,
+                chi_square=fit.chi_square,
+                adequate=fit.adequate,
+                evaluations=fit.evaluations,
+                force_relative=errors.relative if errors else None,
+                force_rms=errors.rms if errors else None,
+                remarks=(*fit.remarks, *closed_loop_remarks(logs)),
+            ),
+            log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
+            versions=versions(),
+        ),
+        fit,
+    )
+
+
+def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
+    """All nine; those that the fit held have their assumed value."""
+    units = ROTARY_UNITS if rig.motion == "rotary" else UNITS
+    held = "held at a value that does not matter for these logs"
+    return {
+        name: fit.estimates.get(name)
+        or Estimate(None, units[name], reason=held, assumed=getattr(fit.friction, name))
+        for name in NAMES
+    }
+
+
+def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
+    """k1 and k2, or k_a; None where no command is logged."""
+    rotary = rig.motion == "rotary"
+    match fit.actuator:
+        case Motor(k_a):
+            return {"k_a": Estimate(k_a, "N m/V" if rotary else "N/V", reason="given by the card")}
+        case Actuator(k1, k2):
+            if "k1" in fit.estimates:
+                return {name: fit.estimates[name] for name in ("k1", "k2")}
+            why = "a linear actuator explains only a part of the force; the value is a regression's"
+            first, second = ("N m/(V s)", "N m/rad") if rotary else ("N/(V s)", "N/m")
+            return {
+                "k1": Estimate(None, first, reason=why, assumed=k1),
+                "k2": Estimate(None, second, reason=why, assumed=k2),
+            }
+        case _:
+            return None
+
+
+def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
+    found, log = fit.logs[index], source.log
+    return LogEntry(
+        file=source.file,
+        sha256=source.sha256,
+        rows=source.rows,
+        start=found.start,
+        travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
+        duration=log.duration,
+        h=log.h,
+        position_rms=found.position_rms,
+        force_rms=found.force_rms,
+        chi_square=found.chi_square,
+    )
+
+
+def _force_error(log: Log, fit: KarnoppFit, rig: Rig) -> ForceError | None:
+    """What the mechanical equation leaves of the force on sliding samples; None without any."""
+    try:
+        return force_error(log, fit.friction, Smoothing(held=rig.kind == "motor"))
+    except (NotIdentifiable, BadLog):
+        return None
+
+
+def closed_loop_remarks(logs: Sequence[Log]) -> list[str]:
+    """A line for each log that was taken in a position loop."""
+    out = []
+    for log in logs:
+        if "r" in log and np.ptp(log["r"]) > 0:
+            together = float(np.corrcoef(log["r"], log["y"])[0, 1])
+            if together > TRACKS:
+                out.append(
+                    f"{log.name}: logged in a closed loop (r and y correlate by {together:.2f});"
+                    " the ARX plant is fitted directly, so noise fed back may bias it"
+                )
+    return out
+
+
+def _arx_or_reason(logs: Sequence[Log], options: Options) -> tuple[ArxPlant | None, str | None]:
+    """The ARX plant; or None and why not, where it was not asked for by orders."""
+    try:
+        return arx_plant(logs, options.orders, options.design_period), None
+    except (NotIdentifiable, BadLog, BadModel) as error:
+        if options.orders is not None:
+            raise
+        return None, str(error)
+
+
+def arx_plant(
+    logs: Sequence[Log], orders: Orders | None = None, period: float | None = None
+) -> ArxPlant:
+    """The ARX model from applied force (or else command) to position at the design period [s].
+
+    orders: (na, nb, nk), by default chosen on the last 40 % of every log. Raises NotIdentifiable,
+    BadLog, BadModel.
+    """
+    key: Literal["F", "u"] = "F" if all("F" in log for log in logs) else "u"
+    step = decimation(logs[0].h, period)
+    h = step * logs[0].h
+    runs = [decimated(log[key], log["y"], step) for log in logs]
+    ends = [round(SPLIT * len(y)) for _, y in runs]
+    held = [(u[n:], y[n:]) for (u, y), n in zip(runs, ends, strict=True)]
+    if orders is None:
+        choice = select_arx(
+            runs, None, h, max_na=LARGEST, max_nb=LARGEST, max_nk=LARGEST, min_nk=1,
+            split=SPLIT, offset=True,
+        )  # fmt: skip
+        orders = (choice.model.na, choice.model.nb, choice.model.nk)
+    fitted = [(u[:n], y[:n]) for (u, y), n in zip(runs, ends, strict=True)]
+    trial = fit_arx(fitted, *orders, h, offset=True)
+    one_step, simulated = _held_out(trial, held)
+    spread = float(np.std(np.concatenate([y for _, y in held])))
+    model = fit_arx(runs, *orders, h, offset=True)
+    return ArxPlant(
+        na=model.na,
+        nb=model.nb,
+        nk=model.nk,
+        A=tuple(model.A.tolist()),
+        B=tuple(model.B.tolist()),
+        h=h,
+        input=key,
+        offset=float(model.offset or 0.0),
+        sd_a=tuple(model.sd_a.tolist()),
+        sd_b=tuple(model.sd_b.tolist()),
+        one_step_rms=one_step,
+        simulation_rms=simulated,
+        simulation_relative=None if simulated is None or spread == 0 else simulated / spread,
+        tests=_tests(model, runs),
+    )
+
+
+def _held_out(model: ArxModel, held: Sequence[tuple[Array, Array]]) -> tuple[float, float | None]:
+    """One-step and free-run errors on runs that the fit has not seen; None: the run diverges."""
+    steps = np.concatenate([one_step_errors(model, u, y) for u, y in held])
+    with np.errstate(over="ignore", invalid="ignore"):
+        runs = np.concatenate([simulation_errors(model, u, y) for u, y in held])
+        free = float(np.sqrt(np.mean(runs**2)))
+    return float(np.sqrt(np.mean(steps**2))), free if np.isfinite(free) else None
+
+
+def _tests(model: ArxModel, runs: Sequence[tuple[Array, Array]]) -> ArxTests | None:
+    try:
+        found = residual_tests(model, runs, lag_step=None)
+    except BadLog:
+        return None
+    cross: Any = found.cross
+    return ArxTests(found.whiteness.p_value, cross.p_value if cross else None, found.lag_step)
+
+
+def decimation(h: float, period: float | None) -> int:
+    """Samples of the log in one design period; raises BadModel where the log is slower."""
+    wanted = DESIGN_PERIOD if period is None else period
+    if not wanted > 0:
+        raise BadModel(f"design period {wanted:g} s, must be > 0")
+    if period is not None and period < 0.99 * h:
+        raise BadModel(f"design period {period:g} s, the log is sampled every {h:g} s; ask for it")
+    return max(1, round(wanted / h))
+
+
+def decimated(u: Array, y: Array, step: int) -> tuple[Array, Array]:
+    """Every `step`-th output, and the mean of the input until the next one; shapes (n//step,)."""
+    count = len(y) // step
+    mean = u[: count * step].reshape(count, step).mean(axis=1)
+    return np.ascontiguousarray(mean), np.ascontiguousarray(y[: count * step : step])

@@ -1,0 +1,227 @@
+"""The model of one machine: what identification found, and model.json, which holds all of it."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any, Literal
+
+from identification.errors import BadModel
+from identification.karnopp import NAMES, Karnopp
+from identification.log import Rig
+from identification.plant import Actuator, Motor, Plant
+from identification.result import Drive, Estimate
+from workbench.logs import Fingerprint
+from workbench.reading import read_result
+
+SCHEMA = "model/1"
+PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
+
+
+@dataclass(frozen=True)
+class ArxTests:
+    """P-values of the residual tests at 99 %: white errors, errors free of the input."""
+
+    whiteness_p: float
+    cross_p: float | None
+    lag_step: int
+
+
+@dataclass(frozen=True)
+class ArxPlant:
+    """A(z^-1) y = B(z^-1) input + offset; y in m, `input` "F" [N] or "u" [V], period h [s].
+
+    B ascends in z^-1 with `nk` zeros first; sd_a, sd_b belong to a1.. and b1... The errors are
+    root mean squares on held-out samples [m]: one step ahead, and simulated freely (None: it runs away), also relative
+    to the deviation of y.
+    """
+
+    na: int
+    nb: int
+    nk: int
+    A: tuple[float, ...]
+    B: tuple[float, ...]
+    h: float
+    input: Literal["F", "u"]
+    offset: float
+    sd_a: tuple[float, ...]
+    sd_b: tuple[float, ...]
+    one_step_rms: float
+    simulation_rms: float | None
+    simulation_relative: float | None
+    tests: ArxTests | None
+
+    def __post_init__(self) -> None:
+        if len(self.A) != self.na + 1 or self.A[0] != 1.0:
+            raise BadModel(f"[plant] A has {len(self.A)} values from {self.A[:1]}; 1 and na needed")
+        if not self.h > 0:
+            raise BadModel(f"[plant] h = {self.h:g} s, must be > 0")
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One fitted run: its file, the state in which it starts (m, m/s, N) and what the fit leaves.
+
+    travel: lowest and highest measured position [m]; duration, h [s].
+    """
+
+    file: str
+    sha256: str
+    rows: int
+    start: tuple[float, float, float]
+    travel: tuple[float, float]
+    duration: float
+    h: float
+    position_rms: float
+    force_rms: float | None
+    chi_square: float
+
+
+@dataclass(frozen=True)
+class FitSummary:
+    """Noise found (m, N), chi-square per value, and whether only noise is left.
+
+    drive: what the fitted run was driven by; stiffness [N/m] couples a force-driven one to the
+    measured position. force_relative, force_rms [N]: the mechanical equation on sliding samples.
+    """
+
+    drive: Drive
+    stiffness: float
+    noise_y: float
+    noise_F: float
+    chi_square: float
+    adequate: bool
+    evaluations: int
+    force_relative: float | None
+    force_rms: float | None
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """Everything that is needed to simulate a machine and to say how well it is known.
+
+    friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command.
+    plant is None with the reason in `plant_reason`. posterior: what `--posterior` found.
+    """
+
+    card: str
+    rig: Rig
+    friction: Mapping[str, Estimate]
+    actuator: Mapping[str, Estimate] | None
+    plant: ArxPlant | None
+    plant_reason: str | None
+    fit: FitSummary
+    log: tuple[LogEntry, ...]
+    versions: Mapping[str, str]
+    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    posterior: Mapping[str, Any] | None = None
+    schema: Literal["model/1"] = "model/1"
+
+    def __post_init__(self) -> None:
+        for name in self.friction:
+            if name not in NAMES:
+                from workbench.card import nearest
+
+                raise BadModel(f"[friction] unknown key {name!r}{nearest(name, NAMES)}")
+        for name in NAMES:
+            if name not in self.friction:
+                raise BadModel(f"[friction] has no {name!r}; add it with a value, or null")
+        for table, found in (("friction", self.friction), ("actuator", self.actuator or {})):
+            for name, estimate in found.items():
+                _check_estimate(f"[{table}.{name}]", estimate)
+        _ = self.simulated
+
+    @property
+    def karnopp(self) -> Karnopp:
+        """The nine that simulations use; assumed ones where the log does not tell them."""
+        return Karnopp(**{name: used(self.friction[name]) for name in NAMES})
+
+    @property
+    def simulated(self) -> Plant:
+        """The plant as simulations use it."""
+        return Plant(self.karnopp, _drive_of(self.actuator), self.effects)
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Names of the nine that no log told."""
+        return tuple(name for name in NAMES if self.friction[name].value is None)
+
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Lowest and highest position in the logs [m]."""
+        return (min(e.travel[0] for e in self.log), max(e.travel[1] for e in self.log))
+
+    @property
+    def rotary(self) -> bool:
+        """Whether positions are angles [rad]."""
+        return self.rig.motion == "rotary"
+
+
+def used(estimate: Estimate) -> float:
+    """The value that simulations use of an estimate."""
+    value = estimate.value if estimate.value is not None else estimate.assumed
+    if value is None:
+        raise BadModel("neither a value nor an assumed one; a simulation needs one of them")
+    return value
+
+
+def _check_estimate(where: str, found: Estimate) -> None:
+    if found.value is None and (not found.reason or found.assumed is None):
+        raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
+    if found.sd is not None and found.sd < 0:
+        raise BadModel(f"{where} sd = {found.sd:g}, must be 0 or more")
+    if found.low is not None and found.high is not None and found.low > found.high:
+        raise BadModel(f"{where} low = {found.low:g} lies above high = {found.high:g}")
+
+
+def _drive_of(actuator: Mapping[str, Estimate] | None) -> Actuator | Motor | None:
+    if actuator is None:
+        return None
+    if set(actuator) == {"k_a"}:
+        return Motor(used(actuator["k_a"]))
+    if set(actuator) == {"k1", "k2"}:
+        return Actuator(used(actuator["k1"]), used(actuator["k2"]))
+    raise BadModel(f"[actuator] holds {sorted(actuator)}; 'k1' and 'k2', or 'k_a' needed")
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """The model as model.json writes it: the schema first, one entry an estimate."""
+    document = asdict(model)
+    document["friction"] = {name: as_number(model.friction[name]) for name in NAMES}
+    if model.actuator is not None:
+        document["actuator"] = {key: as_number(value) for key, value in model.actuator.items()}
+    return {"schema": document.pop("schema"), **document}
+
+
+def as_number(estimate: Estimate) -> dict[str, Any]:
+    """One parameter as results carry it; `reason` and `assumed` only where they say something."""
+    number = asdict(estimate)
+    return {
+        key: value
+        for key, value in number.items()
+        if value is not None or key not in ("reason", "assumed")
+    }
+
+
+def read_model(path: Path) -> Model:
+    """The model in the file `path`; raises BadModel in one line where it is none."""
+    return read_result(path, Model, SCHEMA)
+
+
+def log_entries(prints: Sequence[Fingerprint], entries: Sequence[LogEntry]) -> tuple[LogEntry, ...]:
+    """The entries with the file, hash and rows of their files."""
+    pairs = zip(prints, entries, strict=True)
+    return tuple(replace(e, file=p.file, sha256=p.sha256, rows=p.rows) for p, e in pairs)
+
+
+def versions() -> dict[str, str]:
+    """Versions of our package and of those that its numbers hang on."""
+    return {name: _version(name) for name in PACKAGES}
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return "unknown"

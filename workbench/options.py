@@ -1,0 +1,45 @@
+"""Option texts into values; each wrong one is a usage error that names what is needed."""
+
+import cmath
+import math
+
+import click
+
+
+def parse_orders(text: str | None) -> tuple[int, int, int] | None:
+    """`na,nb,nk` as three counts; None for None."""
+    if text is None:
+        return None
+    parts = text.split(",")
+    if len(parts) != 3 or not all(part.strip().isdigit() for part in parts):
+        raise click.UsageError(f"--orders {text!r}: three counts na,nb,nk needed, as in 3,2,1.")
+    na, nb, nk = (int(part) for part in parts)
+    return na, nb, nk
+
+
+def parse_poles(text: str | None) -> tuple[float, float] | None:
+    """`w_n,zeta` as numbers; None for None."""
+    if text is None:
+        return None
+    try:
+        w_n, zeta = (float(part) for part in text.split(","))
+    except ValueError:
+        raise click.UsageError(f"--poles {text!r}: w_n,zeta needed, as in 20,0.9.") from None
+    if not (math.isfinite(w_n) and math.isfinite(zeta)):
+        raise click.UsageError(f"--poles {text!r}: finite numbers needed.")
+    return w_n, zeta
+
+
+def parse_auxiliary(text: str | None) -> tuple[complex, ...] | None:
+    """Values of z, `0.5,0.3+0.2j,0.3-0.2j`; None for None, none for an empty text."""
+    if text is None:
+        return None
+    try:
+        poles = tuple(complex(part.replace(" ", "")) for part in text.split(",") if part.strip())
+    except ValueError:
+        raise click.UsageError(
+            f"--auxiliary {text!r}: values of z needed, as in 0.5,0.3+0.2j,0.3-0.2j."
+        ) from None
+    if not all(cmath.isfinite(z) for z in poles):
+        raise click.UsageError(f"--auxiliary {text!r}: finite numbers needed.")
+    return poles

@@ -1,0 +1,150 @@
+"""Model + log -> prediction: force by the inverse model, force and position by simulation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.clean import applied_force
+from identification.differentiate import differentiate
+from identification.errors import BadLog, BadModel
+from identification.inverse_model import SURE, Smoothing, force_predicted
+from identification.log import Log
+from identification.result import Drive
+from identification.simulate import FreeRun, free_run
+from identification.start import measured_start
+from workbench.model import Model
+
+FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
+COLUMNS = (
+    "t",
+    "force_applied",
+    "force_predicted",
+    "force_simulated",
+    "position_measured",
+    "position_simulated",
+)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Columns of prediction.csv, each (n,); force_simulated is NaN without a command.
+
+    drive: what drove the position; the errors are root mean squares [N], [m], None where empty.
+    """
+
+    t: Array
+    force_applied: Array
+    force_predicted: Array
+    force_simulated: Array
+    position_measured: Array
+    position_simulated: Array
+    drive: Drive
+
+    @property
+    def position_rms(self) -> float:
+        """Root mean square of measured less simulated position."""
+        return _rms(self.position_measured - self.position_simulated)
+
+    @property
+    def force_predicted_rms(self) -> float | None:
+        """Root mean square of applied less predicted force, where both are."""
+        return _rms_where(self.force_applied - self.force_predicted)
+
+    @property
+    def force_simulated_rms(self) -> float | None:
+        """Root mean square of applied less simulated force, where both are."""
+        return _rms_where(self.force_applied - self.force_simulated)
+
+
+def predict(
+    model: Model, log: Log, *, drive: Drive | None = None, window: float | None = None
+) -> Prediction:
+    """What the model says of a log on an even clock; nothing is fitted on it.
+
+    drive: by default the command where the model has an identified actuator and the log a command.
+    window [s]: the run starts anew from the measured state after each. Raises BadModel, BadLog.
+    """
+    if window is not None and not window >= 20 * log.h:
+        raise BadModel(f"window {window:g} s, at least 20 samples ({20 * log.h:g} s) needed")
+    chosen = drive or default_drive(model, log)
+    if chosen == "command" and "u" not in log:
+        raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
+    log = _with_force(log, model)
+    restarts = _restarts(log, window) if window else None
+    motor = model.rig.kind == "motor"
+    blank = np.full(len(log), np.nan)
+    applied = log["F"] if "F" in log else blank
+    run = free_run(
+        model.simulated, log, measured_start(log), chosen, restarts=restarts
+    )
+    return Prediction(
+        t=log["t"],
+        force_applied=applied,
+        force_predicted=force_predicted(log, model.karnopp, Smoothing(held=motor)),
+        force_simulated=run.F if chosen == "command" else _commanded(model, log, restarts, blank),
+        position_measured=log["y"],
+        position_simulated=run.y,
+        drive=chosen,
+    )
+
+
+def default_drive(model: Model, log: Log) -> Drive:
+    """The command where the actuator is known and the command logged, else the force."""
+    known = model.actuator is not None and all(
+        e.value is not None for e in model.actuator.values()
+    )
+    return "command" if known and "u" in log else "force"
+
+
+def fitted_run(model: Model, log: Log, index: int) -> FreeRun:
+    """The run that the fit compared with one of its logs: from its start, coupled as it was."""
+    drive = model.fit.drive
+    restarts = _restarts(log, FORCE_WINDOW) if drive == "force" else None
+    return free_run(
+        model.simulated,
+        log,
+        model.log[index].start,
+        drive,
+        stiffness=model.fit.stiffness if drive == "force" else 0.0,
+        restarts=restarts,
+    )
+
+
+def _with_force(log: Log, model: Model) -> Log:
+    """The log with F, from the command where the rig is a motor whose constant the model holds."""
+    if "F" in log:
+        return log
+    force = applied_force(log, model.rig)
+    if force is None:
+        raise BadLog(
+            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
+        )
+    return log.with_signals(F=force)
+
+
+def _commanded(
+    model: Model, log: Log, restarts: tuple[IntArray, Array, Array] | None, blank: Array
+) -> Array:
+    """Force of the actuator driven by the command, where there are both."""
+    if model.actuator is None or "u" not in log:
+        return blank
+    return free_run(model.simulated, log, measured_start(log), "command", restarts=restarts).F
+
+
+def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:
+    """Samples, positions and velocities of the measured state every `window` [s]."""
+    step = max(1, round(window / log.h))
+    at = np.arange(step, len(log), step, dtype=np.int64)
+    motion = differentiate(log["y"], log.h)
+    v = np.where(np.abs(motion.v) > SURE * motion.v_noise, motion.v, 0.0)
+    return at, motion.y[at], v[at]
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def _rms_where(values: Array) -> float | None:
+    found = values[np.isfinite(values)]
+    return _rms(found) if found.size else None

@@ -1,0 +1,1 @@
+"""Reports: one section a module and a template, one self-contained HTML file."""

@@ -1,0 +1,100 @@
+"""Figures of the reports: one look, labelled axes, small inline SVG."""
+
+import io
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.arrays import Array
+from workbench.report.page import safe
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# Okabe and Ito's colours, which colour-blind readers can tell apart.
+MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
+BAND = "#e69f00"
+POINTS = 1200  # of a line; more than a screen shows
+SCATTER = 6000
+STYLE = {
+    "svg.fonttype": "none",
+    "font.size": 9.0,
+    "font.family": "sans-serif",
+    "axes.grid": True,
+    "grid.color": "#dddddd",
+    "grid.linewidth": 0.6,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.axisbelow": True,
+    "lines.linewidth": 1.1,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "figure.constrained_layout.use": True,
+}
+
+
+@contextmanager
+def style() -> Iterator[None]:
+    """Matplotlib in the reports' look, as it was afterwards."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        yield
+
+
+def figure(width: float, height: float) -> "Figure":
+    """An empty figure [inch] without a window."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height))
+
+
+def inline(drawn: "Figure", name: str, description: str) -> Any:
+    """The figure as inline SVG with a description; `name` keeps ids apart on a page."""
+    import matplotlib as mpl
+
+    out = io.StringIO()
+    with mpl.rc_context({"svg.hashsalt": name}):
+        drawn.savefig(out, format="svg", dpi=110, metadata={"Date": None, "Creator": None})
+    text = out.getvalue()
+    # Group ids repeat from figure to figure and nothing refers to them.
+    svg = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
+    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")', r"<svg \1", svg, count=1)
+    return safe(svg.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1))
+
+
+def line(axes: "Axes", x: Array, y: Array, **look: Any) -> None:
+    """A line of at most `POINTS` points that keeps every peak."""
+    axes.plot(*thinned(x, y), **look)
+
+
+def thinned(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
+    """Lowest and highest sample of equal blocks, in the order of time."""
+    n = len(x)
+    if n <= points:
+        return x, y
+    size = int(np.ceil(2 * n / points))
+    count = n // size
+    blocks = y[: count * size].reshape(count, size)
+    first = np.arange(count) * size
+    ends = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)]), axis=0) + first
+    index = np.unique(np.concatenate([[0], ends.T.ravel(), [n - 1]]))
+    return x[index], y[index]
+
+
+def spread(count: int, most: int = SCATTER) -> Array:
+    """Indices of at most `most` of `count` points, evenly spread."""
+    step = max(1, -(-count // most))
+    return np.arange(0, count, step)
+
+
+def label(axes: "Axes", x: str, y: str, title: str = "") -> None:
+    """Axis labels with units and a small title."""
+    axes.set_xlabel(x)
+    axes.set_ylabel(y)
+    if title:
+        axes.set_title(title, loc="left", fontsize=9.5)

@@ -1,0 +1,63 @@
+"""Section: measured and simulated position and force over time."""
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.log import Log
+from identification.simulate import FreeRun
+from workbench.model import Model
+from workbench.report.figures import MEASURED, MODEL, figure, inline, label, line, style
+from workbench.report.page import Section, render
+
+ZOOM = 0.12  # part of the log shown enlarged
+
+
+def fit(model: Model, log: Log, run: FreeRun) -> Section:
+    """Position and force of one log, the whole of it and its liveliest part."""
+    length, force = ("rad", "N m") if model.rotary else ("m", "N")
+    t = log["t"] - log["t"][0]
+    with style():
+        drawn = figure(9.0, 5.0)
+        axes = drawn.subplots(2, 2, width_ratios=[1.5, 1.0])
+        part = liveliest(log["y"])
+        for column, where in enumerate((slice(None), part)):
+            for row, (name, simulated) in enumerate((("y", run.y), ("F", run.F))):
+                at = axes[row][column]
+                line(at, t[where], log[name][where], color=MEASURED, label="measured")
+                line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
+        label(axes[0][0], "", f"position [{length}]", "whole log")
+        label(axes[0][1], "", "", "its liveliest part")
+        label(axes[1][0], "time [s]", f"applied force [{force}]")
+        label(axes[1][1], "time [s]", "")
+        axes[0][0].legend(loc="upper right", ncols=2)
+        svg = inline(drawn, "fit", "measured and simulated position and force over time")
+    return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
+
+
+def _caption(model: Model) -> str:
+    if model.fit.drive == "command":
+        return (
+            "The model is driven by the logged command alone, from the start of the log; it never"
+            " sees the measured position."
+        )
+    return (
+        "The model is driven by the measured force and held near the measured position by"
+        f" {model.fit.stiffness:.3g} N/m, with a fresh start every 2 s: a free run on a measured"
+        " force drifts at every stop."
+    )
+
+
+def liveliest(y: Array) -> slice:
+    """The stretch of the log in which the position moves most."""
+    size = max(50, round(ZOOM * len(y)))
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)))])
+    if len(y) <= size:
+        return slice(0, len(y))
+    # Blocks keep the noise of a fast log from counting as motion.
+    block = max(1, size // 50)
+    coarse = y[::block]
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(coarse)))])
+    wide = max(2, size // block)
+    gain = way[wide:] - way[:-wide]
+    start = int(np.argmax(gain)) * block if gain.size else 0
+    return slice(start, min(start + size, len(y)))

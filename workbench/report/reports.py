@@ -1,0 +1,25 @@
+"""The reports that commands write: which sections, in which order, under which words."""
+
+from workbench.pipeline import Identified
+from workbench.predicting import fitted_run
+from workbench.report.fit import fit
+from workbench.report.friction import friction_curve
+from workbench.report.page import Section, page, render
+from workbench.report.parameters import parameters
+from workbench.report.residual import residual
+from workbench.views import fit_lines, summary
+
+
+def identification_report(found: Identified) -> str:
+    """HTML: what was identified, how well it follows the log, what it leaves."""
+    model, log = found.model, found.sources[0].log
+    run = fitted_run(model, log, 0)
+    notes = [*fit_lines(model), *found.remarks, *model.fit.remarks]
+    sections = (
+        parameters(model),
+        Section("In words", render("lines", lines=notes)),
+        fit(model, log, run),
+        friction_curve(model, found.fit, log),
+        residual(model, log, run),
+    )
+    return page(f"Identification of {model.card}", summary(model), sections)

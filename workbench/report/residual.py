@@ -1,0 +1,57 @@
+"""Section: what the model leaves, beside the sensors' noise."""
+
+import numpy as np
+
+from identification.differentiate import differentiate
+from identification.inverse_model import SURE
+from identification.log import Log
+from identification.simulate import FreeRun
+from workbench.model import Model
+from workbench.report.figures import MODEL, REFERENCE, figure, inline, label, line, style
+from workbench.report.friction import friction_data
+from workbench.report.page import Section, render
+
+
+def residual(model: Model, log: Log, run: FreeRun) -> Section:
+    """Position's and force's residual over time, with the noise that a perfect model leaves."""
+    length, force = ("rad", "N m") if model.rotary else ("m", "N")
+    t = log["t"] - log["t"][0]
+    noise = model.fit.noise_y
+    with style():
+        drawn = figure(9.0, 4.4)
+        top, bottom = drawn.subplots(2, 1, sharex=True)
+        line(top, t, log["y"] - run.y, color=MODEL)
+        top.axhspan(-2 * noise, 2 * noise, color=REFERENCE, alpha=0.25, lw=0, label="±2σ of the sensor")
+        label(top, "", f"position [{length}]", "measured less simulated")
+        top.legend(loc="upper right")
+        times, left = _force_residual(model, log)
+        bottom.plot(times, left, ".", ms=1.5, mew=0, color=MODEL, rasterized=True)
+        if model.fit.noise_F > 0:
+            sigma = 2 * model.fit.noise_F
+            bottom.axhspan(-sigma, sigma, color=REFERENCE, alpha=0.25, lw=0)
+        label(bottom, "time [s]", f"force [{force}]", "equation of motion, while sliding")
+        svg = inline(drawn, "residual", "residual of position and force over time")
+    return Section("What the model leaves", render("figure", svg=svg, caption=_caption(model)))
+
+
+def _force_residual(model: Model, log: Log) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+    """Times and friction data less Karnopp curve on sliding samples."""
+    motion = differentiate(log["y"], log.h)
+    data, p = friction_data(model, log), model.karnopp
+    times = (log["t"] - log["t"][0])[motion.edge : len(log) - motion.edge]
+    fast = np.abs(data.v) > SURE * motion.v_noise
+    slides = fast & ((data.v > p.dv_p) | (data.v < p.dv_n))
+    curve = np.where(data.v > 0, p.F_cp + p.F_vp * data.v, -p.F_cn + p.F_vn * data.v)
+    index = np.flatnonzero(slides)
+    index = index[:: max(1, len(index) // 6000)]
+    return times[index], (data.F_f - curve)[index]
+
+
+def _caption(model: Model) -> str:
+    how = np.sqrt(model.fit.chi_square)
+    if model.fit.adequate:
+        return f"What is left is {how:.2f} times the sensors' noise: nothing is missing in the model."
+    return (
+        f"What is left is {how:.3g} times the sensors' noise: the machine has an effect that the"
+        " model has not, or another structure."
+    )

@@ -1,0 +1,53 @@
+"""What a command names on its line: the card, and the runs in its log files."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from identification.errors import BadLog
+from identification.log import Log, Rig
+from workbench.card import Card, load_card
+from workbench.fetch import card_path, find_data
+from workbench.identifying import Source
+from workbench.logs import fingerprint, read_runs
+
+
+@dataclass(frozen=True)
+class Sources:
+    """The card, its rig for these files, their runs, and what had to be repaired in them."""
+
+    card: Card
+    rig: Rig
+    runs: tuple[Source, ...]
+    remarks: tuple[str, ...]
+
+
+def read_sources(names: Sequence[str], card_name: str) -> Sources:
+    """The runs of the log files `names`, each a path or a file of the card's set.
+
+    Raises BadCard, BadLog; also where the files are of different machines or one is named twice.
+    """
+    card = load_card(card_path(card_name))
+    runs: list[Source] = []
+    remarks: list[str] = []
+    rigs: dict[str, Rig] = {}
+    for name in names:
+        path = find_data(name, card)
+        if path.name in rigs:
+            raise BadLog(f"{path.name}: given twice; name every log once")
+        rigs[path.name] = card.rig(path.name)
+        prepared = read_runs(path, card)
+        remarks.extend(prepared.remarks)
+        runs.extend(_source(path, run) for run in prepared.runs)
+    first = next(iter(rigs))
+    for name, rig in rigs.items():
+        if rig != rigs[first]:
+            raise BadLog(
+                f"{name}: the card gives it another rig than {first}; identify machines one by one"
+            )
+    return Sources(card, rigs[first], tuple(runs), tuple(remarks))
+
+
+def _source(path: Path, run: Log) -> Source:
+    found = fingerprint(path, run)
+    return Source(run, found.file, found.sha256, found.rows)
