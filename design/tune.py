@@ -7,8 +7,7 @@ the dominant ones. Of the loops that keep the margins, the fastest is taken.
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -52,24 +51,30 @@ class Asked:
 class Tuned:
     """A controller with its margins, the poles it was asked for, and what it misses, if so.
 
-    gains: of a PID that has them. missed: goals not kept, in words; () where all are.
+    worst: least modulus margin over all plants, None: unstable on one. missed: goals not kept, in
+    words; () where all are. pid: the PID's own form.
     """
 
     rst: RST
     margins: Margins
+    worst: float | None
     dominant: tuple[float, float]
     auxiliary: tuple[complex, ...]
     missed: tuple[str, ...]
     pid: PID | None = None
 
 
+Plants = Sequence[tuple[Array, Array]]
 Design = Callable[[tuple[float, float], tuple[complex, ...]], tuple[RST, PID | None]]
 
 
-def tune_rst(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
+def tune_rst(
+    A: Array, B: Array, h: float, asked: Asked, goals: Goals, corners: Plants = ()
+) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
-    R holds 1 + z^-1, so that noise at half the sampling rate does not reach the force.
+    corners: other plants (A, B) on which the modulus margin must hold too. R holds 1 + z^-1, so
+    that noise at half the sampling rate does not reach the force.
     Raises BadSpecification with the first reason where no poles of the search give a stable loop.
     """
     A, B = normalised_plant(A, B)
@@ -85,11 +90,14 @@ def tune_rst(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
         return controller, None
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
-    return _best(A, B, h, asked, goals, design, _auxiliary(A, h, max(free, 0)))
+    others = _auxiliary(A, h, max(free, 0))
+    return _best(((A, B), *corners), h, asked, goals, design, others)
 
 
-def tune_pid(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
-    """The fastest digital PID within the goals, or the one asked for; A, B in z^-1, h [s].
+def tune_pid(
+    A: Array, B: Array, h: float, asked: Asked, goals: Goals, corners: Plants = ()
+) -> Tuned:
+    """The fastest digital PID within the goals, or the one asked for; see `tune_rst`.
 
     Raises BadSpecification with the first reason where none gives a stable loop.
     """
@@ -101,7 +109,8 @@ def tune_pid(A: Array, B: Array, h: float, asked: Asked, goals: Goals) -> Tuned:
         found = design_pid(A, B, h, dominant=dominant, auxiliary=auxiliary)
         return found.rst, found
 
-    return _best(A, B, h, asked, goals, design, _auxiliary(A, h, min(A.size - 1, 2)))
+    others = _auxiliary(A, h, min(A.size - 1, 2))
+    return _best(((A, B), *corners), h, asked, goals, design, others)
 
 
 def _auxiliary(A: Array, h: float, count: int) -> Callable[[float], tuple[complex, ...]]:
@@ -127,14 +136,14 @@ def _kept(poles: ComplexArray, h: float) -> ComplexArray:
 
 
 def _best(
-    A: Array,
-    B: Array,
+    plants: Plants,
     h: float,
     asked: Asked,
     goals: Goals,
     design: Design,
     auxiliary: Callable[[float], tuple[complex, ...]],
 ) -> Tuned:
+    A, B = plants[0]
     refusal: BadSpecification | None = None
     found: list[Tuned] = []
     for dominant, candidates in _grid(h, asked, auxiliary):
@@ -146,13 +155,32 @@ def _best(
                 refusal = refusal or error
                 continue
             missed = goals_missed(margin, goals, _integrates(A, controller))
-            found.append(Tuned(controller, margin, dominant, others, missed, pid))
+            worst = margin.modulus if missed else worst_modulus(plants, controller)
+            missed = missed or _worst_missed(worst, goals)
+            found.append(Tuned(controller, margin, worst, dominant, others, missed, pid))
         kept = [one for one in found if not one.missed and one.rst.stable]
         if kept:
-            return max(kept, key=lambda one: one.margins.modulus)
+            return max(kept, key=lambda one: one.worst or 0.0)
     if not found:
         raise refusal or BadSpecification("no poles to try; give --poles w_n,zeta")
-    return max(found, key=lambda one: (one.rst.stable, one.margins.modulus))
+    taken = max(found, key=lambda one: (one.rst.stable, one.margins.modulus))
+    return replace(taken, worst=worst_modulus(plants, taken.rst))
+
+
+def worst_modulus(plants: Plants, controller: RST) -> float | None:
+    """Least modulus margin over the plants; None where one of the loops is unstable."""
+    try:
+        return min(margins(A, B, controller).modulus for A, B in plants)
+    except BadSpecification:
+        return None
+
+
+def _worst_missed(worst: float | None, goals: Goals) -> tuple[str, ...]:
+    if worst is None:
+        return ("unstable on a plant inside the parameters' intervals",)
+    if worst < goals.modulus:
+        return (f"modulus margin {worst:.3f} inside the parameters' intervals",)
+    return ()
 
 
 def _grid(
@@ -190,8 +218,3 @@ def goals_missed(found: Margins, goals: Goals, integrates: bool) -> tuple[str, .
             f"noise asks for {effort:.1f} dB of force, at most {goals.effort:.1f} allowed"
         )
     return tuple(missed)
-
-
-def as_pairs(poles: Sequence[complex]) -> list[Any]:
-    """Poles as plain numbers: a real one as itself, a complex one as [re, im]."""
-    return [z.real if z.imag == 0 else [z.real, z.imag] for z in poles]

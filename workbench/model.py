@@ -32,8 +32,8 @@ class ArxPlant:
     """A(z^-1) y = B(z^-1) input + offset; y in m, `input` "F" [N] or "u" [V], period h [s].
 
     B ascends in z^-1 with `nk` zeros first; sd_a, sd_b belong to a1.. and b1... The errors are
-    root mean squares on held-out samples [m]: one step ahead, and simulated freely (None: it runs away), also relative
-    to the deviation of y.
+    root mean squares on held-out samples [m]: one step ahead, and simulated freely
+    (None: it runs away), the latter also relative to the deviation of y.
     """
 
     na: int

@@ -1,5 +1,6 @@
 """Model + log -> prediction: force by the inverse model, force and position by simulation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -74,10 +75,8 @@ def predict(
     restarts = _restarts(log, window) if window else None
     motor = model.rig.kind == "motor"
     blank = np.full(len(log), np.nan)
-    applied = log["F"] if "F" in log else blank
-    run = free_run(
-        model.simulated, log, measured_start(log), chosen, restarts=restarts
-    )
+    applied = log.signals.get("F", blank)
+    run = free_run(model.simulated, log, measured_start(log), chosen, restarts=restarts)
     return Prediction(
         t=log["t"],
         force_applied=applied,
@@ -91,9 +90,7 @@ def predict(
 
 def default_drive(model: Model, log: Log) -> Drive:
     """The command where the actuator is known and the command logged, else the force."""
-    known = model.actuator is not None and all(
-        e.value is not None for e in model.actuator.values()
-    )
+    known = model.actuator is not None and all(e.value is not None for e in model.actuator.values())
     return "command" if known and "u" in log else "force"
 
 
@@ -148,3 +145,12 @@ def _rms(values: Array) -> float:
 def _rms_where(values: Array) -> float | None:
     found = values[np.isfinite(values)]
     return _rms(found) if found.size else None
+
+
+def prediction_csv(found: Sequence[Prediction]) -> str:
+    """prediction.csv of the runs of one log; a cell is empty where there is no value."""
+    import pandas as pd
+
+    frames = [pd.DataFrame({name: getattr(one, name) for name in COLUMNS}) for one in found]
+    text: str = pd.concat(frames).to_csv(index=False, float_format="%.10g")
+    return text

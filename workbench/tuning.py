@@ -9,7 +9,7 @@ import numpy as np
 
 from design.compensator import Compensator
 from design.linear import ForceGains, force_gains, linear_plant
-from design.margins import Margins, margins
+from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
@@ -152,8 +152,8 @@ def design(
     """PID and RST for a model, by pole placement, with margins; poles searched where not asked.
 
     source: the linear plant to design on, by default the sounder. period: of the position
-    controller [s]. Raises BadSpecification where no controller meets what was asked, NotIdentifiable
-    where the model carries no design.
+    controller [s]. Raises BadSpecification where no controller meets what was asked,
+    NotIdentifiable where the model carries no design.
     """
     from workbench.model import versions
 
@@ -163,6 +163,7 @@ def design(
     found: dict[str, Controller] = {}
     refused: dict[str, str] = {}
     a, b = np.array(plant.A), np.array(plant.B)
+    others = corners(model, plant, force)
     for name, tune in (("rst", tune_rst), ("pid", tune_pid)):
         if name == "pid" and not asked.integrator:
             refused[name] = "a PID has an integrator; asked for none"
@@ -171,11 +172,11 @@ def design(
         if name == "pid" and asked.auxiliary is not None:
             wanted = Asked(asked.dominant, None, asked.integrator)
         try:
-            tuned = tune(a, b, plant.h, wanted, goals)
+            tuned = tune(a, b, plant.h, wanted, goals, others)
         except BadSpecification as error:
             refused[name] = str(error)
             continue
-        found[name] = _controller(tuned, model, plant, force)
+        found[name] = _controller(tuned)
     if not found or ("rst" in refused and asked.dominant is not None):
         raise BadSpecification(refused["rst"])
     recommended: Literal["rst", "pid"] = "rst" if "rst" in found else "pid"
@@ -205,22 +206,25 @@ def linear_of(
     """
     known = model.friction["m"].value is not None
     if source == "arx" or (source is None and not known):
-        return _arx(model, period, known), None
+        plant = _arx(model, period, known)
+        return plant, _force_loop(model, plant.h)
     if not known and source is None:
         raise NotIdentifiable(f"no plant to design on: m: {model.friction['m'].reason}")
-    h_log = min(entry.h for entry in model.log)
+    h_log = max(entry.h for entry in model.log)
     h = period or (model.plant.h if model.plant else max(DEFAULT_PERIOD, h_log))
     m, f = _nominal(model)
-    force = None
-    actuator = model.simulated.actuator
-    if isinstance(actuator, Actuator):
-        ratio = max(1, round(h / h_log))
-        gains = force_gains(actuator, h / ratio)
-        force = ForceLoop(gains.k_i, gains.T_i, h / ratio)
+    force = _force_loop(model, h)
     a, b = _physical(m, f, h, model, force)
     inside = "with the actuator and its force loop" if force else "with the force as its input"
     why = f"mass and viscous friction are identified: sliding body, {inside}, sampled exactly"
     return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, f), force
+
+
+def sampled_plant(machine: Model, found: Design) -> Linear:
+    """The linear plant of another machine under a design's force loop and period."""
+    m, f = _nominal(machine)
+    a, b = _physical(m, f, found.plant.h, machine, found.force)
+    return Linear("physical", "", tuple(a.tolist()), tuple(b.tolist()), found.plant.h, m, f)
 
 
 def _physical(
@@ -231,6 +235,16 @@ def _physical(
         return linear_plant(m, f, h)
     gains = ForceGains(force.k_i, force.T_i)
     return linear_plant(m, f, h, actuator, gains, max(1, round(h / force.h)))
+
+
+def _force_loop(model: Model, h: float) -> ForceLoop | None:
+    """The force loop inside a position loop of period h, at the logs' period; None for a motor."""
+    actuator = model.simulated.actuator
+    if not isinstance(actuator, Actuator):
+        return None
+    ratio = max(1, round(h / max(entry.h for entry in model.log)))
+    gains = force_gains(actuator, h / ratio)
+    return ForceLoop(gains.k_i, gains.T_i, h / ratio)
 
 
 def _nominal(model: Model) -> tuple[float, float]:
@@ -272,14 +286,10 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned, model: Model, plant: Linear, force: ForceLoop | None) -> Controller:
+def _controller(tuned: Tuned) -> Controller:
     rst, gains, note = tuned.rst, None, None
     if tuned.pid is not None:
         gains, note = tuned.pid.gains, tuned.pid.note or tuned.pid.reason
-    worst = worst_modulus(rst, model, plant, force)
-    missed = tuned.missed
-    if worst is None:
-        missed = (*missed, "unstable for some mass and friction inside their 95 % intervals")
     return Controller(
         R=tuple(rst.R.tolist()),
         S=tuple(rst.S.tolist()),
@@ -287,8 +297,8 @@ def _controller(tuned: Tuned, model: Model, plant: Linear, force: ForceLoop | No
         h=rst.h,
         dominant=tuned.dominant,
         auxiliary=tuple((z.real, z.imag) for z in tuned.auxiliary),
-        margins=margin_values(tuned.margins, worst),
-        missed=missed,
+        margins=margin_values(tuned.margins, tuned.worst),
+        missed=tuned.missed,
         gains=gains,
         note=note,
     )
@@ -309,28 +319,22 @@ def margin_values(found: Margins, worst: float | None) -> MarginValues:
     )
 
 
-def worst_modulus(
-    controller: RST, model: Model, plant: Linear, force: ForceLoop | None
-) -> float | None:
-    """Least modulus margin over the corners of the intervals of mass and viscous friction.
+def corners(
+    model: Model, plant: Linear, force: ForceLoop | None
+) -> tuple[tuple[Array, Array], ...]:
+    """Linear plants at the corners of the intervals of mass and viscous friction; () for ARX.
 
-    None where a corner is unstable; an ARX plant has one corner, itself.
+    Raises BadSpecification where the force loop is unstable on one.
     """
     if plant.source == "arx":
-        return margins(plant.A, plant.B, controller).modulus
+        return ()
     m, viscous = model.friction["m"], (model.friction["F_vp"], model.friction["F_vn"])
-    masses = {m.low or used(m), m.high or used(m)}
-    lows = [v.low if v.low is not None else used(v) for v in viscous]
-    highs = [v.high if v.high is not None else used(v) for v in viscous]
-    found = []
-    for mass in masses:
-        for f in {max(min(lows), 0.0), max(highs)}:
-            try:
-                a, b = _physical(mass, f, plant.h, model, force)
-                found.append(margins(a, b, controller).modulus)
-            except BadSpecification:
-                return None
-    return min(found)
+    masses = (m.low or used(m), m.high or used(m))
+    least = min(used(v) if v.low is None else v.low for v in viscous)
+    most = max(used(v) if v.high is None else v.high for v in viscous)
+    return tuple(
+        _physical(mass, f, plant.h, model, force) for mass in masses for f in (max(least, 0), most)
+    )
 
 
 def _compensator(model: Model) -> CompensatorValues:

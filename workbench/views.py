@@ -51,7 +51,7 @@ def in_digits(values: Iterable[float], size: float, sd: float | None) -> list[st
     digits = 4
     if sd and size:
         digits = max(2, math.ceil(math.log10(abs(size) / sd)) + 2)
-    return [f"{value:.{min(digits, 8)}g}" for value in values]
+    return [f"{value:#.{min(digits, 8)}g}".rstrip(".") for value in values]
 
 
 def model_view(model: Model, remarks: Sequence[str], folder: Path) -> "Group":

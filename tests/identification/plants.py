@@ -41,7 +41,7 @@ def made_log(
     u: Array | None = None,
 ) -> Log:
     """A log of the plant driven by a command, with the paper's noise times `noise`."""
-    t = np.arange(round(seconds / h)) * h
+    t = np.arange(round(seconds / h), dtype=np.float64) * h
     drive = command(t, seed) if u is None else u
     zero = np.zeros(len(t))
     blank = Log("made", {"t": t, "y": zero, "u": drive})

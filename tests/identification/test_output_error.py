@@ -74,8 +74,8 @@ def test_two_logs_make_one_fit_with_smaller_spread() -> None:
 
 
 def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
-    t = np.arange(8000) * 1e-3
-    pushes = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0) * (np.sin(2 * np.pi * 2.0 * t) > -0.2)
+    t = np.arange(8000, dtype=np.float64) * 1e-3
+    pushes: Array = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0) * (np.sin(2 * np.pi * 2.0 * t) > -0.2)
     log = made_log(table(2), u=pushes, seconds=8.0)
     assert np.min(np.diff(log["y"][::100])) > -1e-4
     fit = fitted(log)

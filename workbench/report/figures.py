@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from workbench.report.page import safe
 
 if TYPE_CHECKING:
@@ -20,7 +20,7 @@ MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
 POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
-STYLE = {
+STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.size": 9.0,
     "font.family": "sans-serif",
@@ -86,10 +86,10 @@ def thinned(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
     return x[index], y[index]
 
 
-def spread(count: int, most: int = SCATTER) -> Array:
+def spread(count: int, most: int = SCATTER) -> IntArray:
     """Indices of at most `most` of `count` points, evenly spread."""
     step = max(1, -(-count // most))
-    return np.arange(0, count, step)
+    return np.arange(0, count, step, dtype=np.int64)
 
 
 def label(axes: "Axes", x: str, y: str, title: str = "") -> None:

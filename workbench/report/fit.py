@@ -3,6 +3,7 @@
 import numpy as np
 
 from identification.arrays import Array
+from identification.inverse_model import Smoothing, force_predicted
 from identification.log import Log
 from identification.simulate import FreeRun
 from workbench.model import Model
@@ -16,12 +17,16 @@ def fit(model: Model, log: Log, run: FreeRun) -> Section:
     """Position and force of one log, the whole of it and its liveliest part."""
     length, force = ("rad", "N m") if model.rotary else ("m", "N")
     t = log["t"] - log["t"][0]
+    predicted = run.F
+    if model.fit.drive == "force" or model.rig.kind == "motor":
+        how = Smoothing(held=model.rig.kind == "motor")
+        predicted = force_predicted(log, model.karnopp, how)
     with style():
         drawn = figure(9.0, 5.0)
         axes = drawn.subplots(2, 2, width_ratios=[1.5, 1.0])
         part = liveliest(log["y"])
         for column, where in enumerate((slice(None), part)):
-            for row, (name, simulated) in enumerate((("y", run.y), ("F", run.F))):
+            for row, (name, simulated) in enumerate((("y", run.y), ("F", predicted))):
                 at = axes[row][column]
                 line(at, t[where], log[name][where], color=MEASURED, label="measured")
                 line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
@@ -29,21 +34,22 @@ def fit(model: Model, log: Log, run: FreeRun) -> Section:
         label(axes[0][1], "", "", "its liveliest part")
         label(axes[1][0], "time [s]", f"applied force [{force}]")
         label(axes[1][1], "time [s]", "")
-        axes[0][0].legend(loc="upper right", ncols=2)
+        drawn.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
         svg = inline(drawn, "fit", "measured and simulated position and force over time")
     return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
 
 
 def _caption(model: Model) -> str:
+    inverse = " The model's force is that of the inverse model: what this motion needs."
     if model.fit.drive == "command":
         return (
             "The model is driven by the logged command alone, from the start of the log; it never"
-            " sees the measured position."
+            f" sees the measured position.{inverse if model.rig.kind == 'motor' else ''}"
         )
     return (
         "The model is driven by the measured force and held near the measured position by"
         f" {model.fit.stiffness:.3g} N/m, with a fresh start every 2 s: a free run on a measured"
-        " force drifts at every stop."
+        f" force drifts at every stop.{inverse}"
     )
 
 

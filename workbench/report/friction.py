@@ -1,6 +1,7 @@
 """Section: friction against velocity, the data under the identified curve."""
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,7 +15,11 @@ from workbench.model import Model
 from workbench.report.figures import BAND, MEASURED, MODEL, figure, inline, label, spread, style
 from workbench.report.page import Section, render
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 CURVES = 200
+SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
 MARGIN = 1.6  # of the curve's range shown; the force of a fast start lies far outside
 
 
@@ -33,9 +38,7 @@ def friction_data(model: Model, log: Log) -> FrictionData:
     F = held_force(log["F"]) if model.rig.kind == "motor" else log["F"]
     F = low_pass(F, log.h, motion.cutoff)
     inner = slice(motion.edge, len(F) - motion.edge)
-    return FrictionData(
-        motion.v[inner], motion.a[inner], (F - model.karnopp.m * motion.a)[inner]
-    )
+    return FrictionData(motion.v[inner], motion.a[inner], (F - model.karnopp.m * motion.a)[inner])
 
 
 def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
@@ -49,7 +52,7 @@ def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
         axes = drawn.subplots()
         keep = spread(len(data.v))
         axes.plot(
-            data.v[keep], data.F_f[keep], ".", ms=2.0, color=MEASURED, alpha=0.25, mew=0,
+            data.v[keep], data.F_f[keep], ".", ms=3.5, color=MEASURED, alpha=0.45, mew=0,
             rasterized=True, label="log: F_e − m a",
         )  # fmt: skip
         for v in (v_n, v_p):
@@ -62,7 +65,7 @@ def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
         axes.plot([0, 0], [p.F_sn, p.F_sp], color=MODEL, lw=1.8, marker="_", ms=10)
         axes.axvspan(p.dv_n, p.dv_p, color="#0072b2", alpha=0.10, lw=0, label="stick band")
         _limits(axes, p, v_n[0], v_p[-1])
-        axes.legend(loc="upper left")
+        axes.legend(loc="upper left", markerscale=2.5)
         label(axes, f"velocity [{speed}]", f"friction force [{force}]")
         svg = inline(drawn, "friction", "friction force against velocity, data and model")
     return Section("Friction", render("figure", svg=svg, caption=_caption(model)))
@@ -79,16 +82,13 @@ def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     for column, name in enumerate(fit.free):
         if name in NAMES:
             nine[: len(drawn), NAMES.index(name)] = drawn[:, column]
-    F_cp, F_cn, F_vp, F_vn = (nine[:, NAMES.index(n), None] for n in ("F_cp", "F_cn", "F_vp", "F_vn"))
+    F_cp, F_cn, F_vp, F_vn = (nine[:, NAMES.index(name), None] for name in SLIDING)
     curves = np.where(v > 0, F_cp + F_vp * v, -F_cn + F_vn * v)
     low, high = np.quantile(curves, [0.025, 0.975], axis=0)
     return low, high
 
 
-def _limits(axes: object, p: Karnopp, v_low: float, v_high: float) -> None:
-    from matplotlib.axes import Axes
-
-    assert isinstance(axes, Axes)
+def _limits(axes: "Axes", p: Karnopp, v_low: float, v_high: float) -> None:
     top = max(p.F_sp, p.F_cp + p.F_vp * v_high)
     bottom = min(p.F_sn, -p.F_cn + p.F_vn * v_low)
     axes.set_ylim(MARGIN * bottom, MARGIN * top)

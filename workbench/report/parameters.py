@@ -11,6 +11,4 @@ def parameters(model: Model) -> Section:
     assumed = ", ".join(
         f"{name} = {used(e):.3g} {e.unit}" for name, e in held.items() if e.value is None
     )
-    return Section(
-        "Parameters", render("parameters", rows=parameter_rows(model), assumed=assumed)
-    )
+    return Section("Parameters", render("parameters", rows=parameter_rows(model), assumed=assumed))

@@ -2,11 +2,18 @@
 
 from workbench.pipeline import Identified
 from workbench.predicting import fitted_run
+from workbench.report.controllers import (
+    coefficients,
+    controllers,
+    sensitivity,
+    step_response,
+)
 from workbench.report.fit import fit
 from workbench.report.friction import friction_curve
 from workbench.report.page import Section, page, render
 from workbench.report.parameters import parameters
 from workbench.report.residual import residual
+from workbench.tuning import Design
 from workbench.views import fit_lines, summary
 
 
@@ -23,3 +30,13 @@ def identification_report(found: Identified) -> str:
         residual(model, log, run),
     )
     return page(f"Identification of {model.card}", summary(model), sections)
+
+
+def design_report(found: Design) -> str:
+    """HTML: the controllers, their margins, what they do to noise, how fast they are."""
+    lead = (
+        f"{found.recommended.upper()} recommended, position loop every"
+        f" {1e3 * found.plant.h:.4g} ms; designed on the {found.plant.source} plant."
+    )
+    sections = (controllers(found), step_response(found), sensitivity(found), coefficients(found))
+    return page(f"Design for {found.card}", lead, sections)

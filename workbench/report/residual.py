@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.differentiate import differentiate
 from identification.inverse_model import SURE
 from identification.log import Log
@@ -10,6 +11,8 @@ from workbench.model import Model
 from workbench.report.figures import MODEL, REFERENCE, figure, inline, label, line, style
 from workbench.report.friction import friction_data
 from workbench.report.page import Section, render
+
+BAND_ALPHA = 0.45
 
 
 def residual(model: Model, log: Log, run: FreeRun) -> Section:
@@ -21,20 +24,27 @@ def residual(model: Model, log: Log, run: FreeRun) -> Section:
         drawn = figure(9.0, 4.4)
         top, bottom = drawn.subplots(2, 1, sharex=True)
         line(top, t, log["y"] - run.y, color=MODEL)
-        top.axhspan(-2 * noise, 2 * noise, color=REFERENCE, alpha=0.25, lw=0, label="±2σ of the sensor")
+        top.axhspan(
+            -2 * noise, 2 * noise, color=REFERENCE, alpha=BAND_ALPHA, lw=0, zorder=3,
+            label="±2σ of the sensor",
+        )  # fmt: skip
         label(top, "", f"position [{length}]", "measured less simulated")
-        top.legend(loc="upper right")
-        times, left = _force_residual(model, log)
-        bottom.plot(times, left, ".", ms=1.5, mew=0, color=MODEL, rasterized=True)
+        drawn.legend(*top.get_legend_handles_labels(), loc="outside upper right")
         if model.fit.noise_F > 0:
             sigma = 2 * model.fit.noise_F
-            bottom.axhspan(-sigma, sigma, color=REFERENCE, alpha=0.25, lw=0)
-        label(bottom, "time [s]", f"force [{force}]", "equation of motion, while sliding")
+            line(bottom, t, log["F"] - run.F, color=MODEL)
+            bottom.axhspan(-sigma, sigma, color=REFERENCE, alpha=BAND_ALPHA, lw=0, zorder=3)
+            title = "measured less simulated"
+        else:
+            times, left = _force_residual(model, log)
+            bottom.plot(times, left, ".", ms=2.5, mew=0, color=MODEL, rasterized=True)
+            title = "applied force less the equation of motion's, while sliding"
+        label(bottom, "time [s]", f"force [{force}]", title)
         svg = inline(drawn, "residual", "residual of position and force over time")
     return Section("What the model leaves", render("figure", svg=svg, caption=_caption(model)))
 
 
-def _force_residual(model: Model, log: Log) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[type-arg]
+def _force_residual(model: Model, log: Log) -> tuple[Array, Array]:
     """Times and friction data less Karnopp curve on sliding samples."""
     motion = differentiate(log["y"], log.h)
     data, p = friction_data(model, log), model.karnopp
@@ -50,7 +60,7 @@ def _force_residual(model: Model, log: Log) -> tuple[np.ndarray, np.ndarray]:  #
 def _caption(model: Model) -> str:
     how = np.sqrt(model.fit.chi_square)
     if model.fit.adequate:
-        return f"What is left is {how:.2f} times the sensors' noise: nothing is missing in the model."
+        return f"What is left is {how:.2f} times the sensors' noise: nothing is missing."
     return (
         f"What is left is {how:.3g} times the sensors' noise: the machine has an effect that the"
         " model has not, or another structure."

@@ -1,0 +1,99 @@
+"""Posterior of the fitted parameters by an ensemble of walkers, started from the global optimum."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.ensemble import ensemble
+from identification.log import Log, Rig
+from identification.problem import pose
+from identification.refine import pack, refine
+from identification.result import KarnoppFit
+from identification.stepping import kernel_parameters
+from identification.weighing import granted_samples, log_cost, reweighed
+
+WALKERS = 64
+STEPS = 1500
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Samples (k, d) of the parameters `names` (d,), and whether the chain can be believed.
+
+    autocorrelation: the longest, in steps; `converged` where the kept half of the chain is at
+    least 50 of them long; `verdict` says so in words.
+    """
+
+    names: tuple[str, ...]
+    samples: Array
+    autocorrelation: float
+    acceptance: float
+    walkers: int
+    steps: int
+    converged: bool
+    verdict: str
+
+    def interval(self, level: float = 0.95) -> Mapping[str, tuple[float, float, float]]:
+        """Median and the bounds of the central `level` interval, by name: (low, median, high)."""
+        tails = np.array([0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level])
+        bounds = np.quantile(self.samples, tails, axis=0)
+        rows = {name: tuple(bounds[:, i].tolist()) for i, name in enumerate(self.names)}
+        return MappingProxyType({name: (a, b, c) for name, (a, b, c) in rows.items()})
+
+
+def sample_posterior(
+    fit: KarnoppFit,
+    logs: Sequence[Log],
+    rng: np.random.Generator,
+    *,
+    rig: Rig,
+    walkers: int = WALKERS,
+    steps: int = STEPS,
+    on_progress: Callable[[float], None] | None = None,
+) -> Posterior:
+    """Posterior of a fit's parameters on the logs it was made from, under flat priors.
+
+    The walkers start around the fit. Where the fit leaves more than noise, a set's likelihood is
+    that of as many independent samples as the residual's correlation leaves.
+    """
+    drive = "force" if fit.stiffness > 0 else fit.drive
+    problem = pose(logs, rig, None if rig.kind == "motor" else drive)
+    k1, k2 = 0.0, fit.stiffness
+    if problem.drive == "command":
+        k1, k2 = (float(fit.estimates[name].value or 0.0) for name in ("k1", "k2"))
+    row = kernel_parameters(fit.friction.array, k1, k2)
+    optimum = refine(problem.long_runs, row, problem.free)
+    runs = optimum.runs(problem.long_runs)
+    granted = None
+    if fit.adequate and problem.drive == "command":
+        runs = [reweighed(run, optimum.p) for run in runs]
+        optimum = refine(runs, optimum.p, problem.free)
+    else:
+        granted = granted_samples(problem, optimum)
+    center = pack(runs, optimum.p, optimum.starts, optimum.free)
+    spread = np.sqrt(np.diag(optimum.covariance)) if granted is None else 0.01 * optimum.scale
+    first = center + spread * rng.standard_normal((walkers, len(center)))
+    cost = log_cost(problem, runs, optimum, granted)
+    walk = ensemble(cost, first, steps, rng, on_progress)
+    names = tuple(fit.free)
+    samples = walk.samples[:, : len(names)]
+    return Posterior(
+        names=names,
+        samples=samples,
+        autocorrelation=walk.autocorrelation,
+        acceptance=walk.acceptance,
+        walkers=walkers,
+        steps=steps,
+        converged=walk.converged,
+        verdict=_verdict(walk.converged, steps, walk.autocorrelation),
+    )
+
+
+def _verdict(converged: bool, steps: int, autocorrelation: float) -> str:
+    length = f"{steps - steps // 2} kept steps are {(steps - steps // 2) / autocorrelation:.0f}"
+    if converged:
+        return f"converged: {length} autocorrelation times long"
+    return f"not converged: {length} autocorrelation times long, 50 needed; take more steps"

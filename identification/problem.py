@@ -1,0 +1,161 @@
+"""Logs posed as a fitting problem: how they are driven, their noise, and where to look."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.actuator import ActuatorFit, fit_actuator
+from identification.arrays import Array, IntArray
+from identification.box import Box, search_box
+from identification.errors import BadLog
+from identification.experiment import Run, impulse_of, noise_of, prepare_run
+from identification.karnopp import Karnopp
+from identification.log import Log, Rig
+from identification.plant import Actuator, Motor, Plant
+from identification.refine import Optimum
+from identification.result import Drive
+from identification.simulate import FreeRun, free_run
+from identification.stepping import K1, K2
+from identification.three_step import FirstEstimate, first_estimate
+
+ADEQUATE = 1.5  # normalised chi-square up to which a fit counts as found
+LONGEST = 40.0  # s; a run without a stiffness that holds it is compared at most this long
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Logs, how they are driven, and where to look."""
+
+    logs: tuple[Log, ...]
+    runs: tuple[Run, ...]
+    firsts: tuple[FirstEstimate, ...]
+    box: Box
+    row: Array
+    free: IntArray
+    drive: Drive
+    hold: bool
+    actuator: ActuatorFit | None
+
+    @property
+    def adequate(self) -> float:
+        """Chi-square up to which a fit counts as found; a measured force brings its own noise."""
+        return ADEQUATE if self.drive == "command" else 2.0 * ADEQUATE
+
+    @property
+    def count(self) -> int:
+        """Number of compared values."""
+        return sum(run.measured.count for run in self.runs)
+
+    @property
+    def long_runs(self) -> tuple[Run, ...]:
+        """Runs as long as the model may be asked to follow without a restart."""
+        if self.drive == "command":
+            return tuple(run.whole() for run in self.runs)
+        if not self.hold:
+            return self.runs
+        out = []
+        for run in self.runs:
+            at = run.windows.at * run.measured.h
+            keep = np.concatenate([[True], np.diff(np.floor(at / LONGEST)) > 0])
+            windows = replace(
+                run.windows, at=run.windows.at[keep], y=run.windows.y[keep], v=run.windows.v[keep]
+            )
+            out.append(replace(run, windows=windows))
+        return tuple(out)
+
+
+def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
+    """The logs as a fitting problem: drive chosen, noise estimated, search box drawn."""
+    for log in logs:
+        if "F" not in log:
+            raise BadLog(
+                f"{log.name}: no applied force; give the card F, both pressures, or"
+                " force_per_command with u"
+            )
+    hold = rig.kind == "motor"
+    firsts = tuple(first_estimate(log, held=hold) for log in logs)
+    with_command = not hold and all("u" in log and np.ptp(log["u"]) > 0 for log in logs)
+    actuator = fit_actuator(logs) if with_command else None
+    if drive == "command" and not hold and actuator is None:
+        raise BadLog(f"{logs[0].name}: drive by command asked for, but no command u is logged")
+    chosen: Drive = "force"
+    if actuator and drive != "force" and (actuator.plausible or drive == "command"):
+        chosen = "command"
+    by_command = chosen == "command" and actuator is not None
+    k1 = actuator.k1 if actuator and by_command else 0.0
+    k2 = actuator.k2 if actuator and by_command else 0.0
+    window = 5.0 if hold else (1.0 if by_command else 2.0)
+    runs = tuple(
+        prepare_run(
+            log,
+            first,
+            chosen,
+            constant=float(actuator.constants[i]) if actuator and by_command else 0.0,
+            window=window,
+            hold=hold,
+            noise=_noise(log, first, actuator if by_command else None),
+        )
+        for i, (log, first) in enumerate(zip(logs, firsts, strict=True))
+    )
+    stiffness = None if by_command or hold else _stiffness_bounds(logs, firsts)
+    box, row = search_box(firsts, k1, k2, stiffness)
+    free = box.free
+    if by_command:
+        free = np.concatenate([box.free, np.array([K1, K2], dtype=np.int64)])
+    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator)
+
+
+def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tuple[float, float]:
+    """Noise of position [m] and force [N]; what the actuator explains of the force is no noise."""
+    force = log["F"]
+    if actuator is not None:
+        force = force - actuator.k1 * impulse_of(log) + actuator.k2 * first.motion.y
+    return noise_of(log["y"], log.h), noise_of(force, log.h)
+
+
+def _stiffness_bounds(logs: Sequence[Log], firsts: Sequence[FirstEstimate]) -> tuple[float, float]:
+    """Range of the coupling [N/m] that holds a force-driven run near the measured position.
+
+    From the stiffness at which a tenth of the stroke outweighs the friction, up to where the
+    position's noise would shake the force by a fiftieth of the friction, or the coupled body
+    would turn half a radian of its oscillation within a sample.
+    """
+    low, high = 0.0, np.inf
+    for log, first in zip(logs, firsts, strict=True):
+        friction = float(np.mean(first.nine[1:3]))
+        low = max(low, friction / (0.1 * float(np.ptp(log["y"]))))
+        noise = max(first.motion.noise, 1e-7 * float(np.ptp(log["y"])))
+        high = min(high, 0.02 * friction / noise, first.nine[0] * (0.5 / log.h) ** 2)
+    return low, max(high, 3.0 * low)
+
+
+def simulated(problem: Problem, optimum: Optimum, index: int) -> FreeRun:
+    """Free run of the fitted model along one log, from its fitted start."""
+    plant = plant_of(problem, optimum)
+    stiffness = 0.0 if problem.drive == "command" or problem.hold else float(optimum.p[K2])
+    drive: Drive = "command" if problem.drive == "command" or problem.hold else "force"
+    run = problem.long_runs[index]
+    restarts = (run.windows.at, run.windows.y, run.windows.v)
+    start = start_of(problem, optimum, index)
+    log = problem.logs[index]
+    return free_run(plant, log, start, drive, stiffness=stiffness, restarts=restarts)
+
+
+def plant_of(problem: Problem, optimum: Optimum) -> Plant:
+    friction = Karnopp.from_array(optimum.p[:9])
+    if problem.drive == "command":
+        return Plant(friction, Actuator(float(optimum.p[K1]), float(optimum.p[K2])))
+    if problem.hold:
+        log = problem.logs[0]
+        moved_most = int(np.argmax(np.abs(log["u"])))
+        return Plant(friction, Motor(float(log["F"][moved_most] / log["u"][moved_most])))
+    return Plant(friction)
+
+
+def start_of(problem: Problem, optimum: Optimum, index: int) -> tuple[float, float, float]:
+    y, v, constant = (float(x) for x in optimum.starts[index])
+    force = float(problem.logs[index]["F"][0])
+    if problem.drive == "command":
+        force = constant - float(optimum.p[K2]) * y
+    return y, v, force

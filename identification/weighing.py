@@ -1,0 +1,270 @@
+"""From an optimum to equally likely parameter sets, by what the residual is made of.
+
+White noise: the likelihood itself. Correlated residuals: the scatter of stretches. A misfit that no
+start resolves: the mean over all sets that explain the log about equally.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.ensemble import ensemble
+from identification.experiment import Run, total_cost
+from identification.objective import START_G, START_V, START_Y
+from identification.problem import Problem, simulated
+from identification.refine import (
+    Cloud,
+    Optimum,
+    keep_near,
+    moved,
+    pack,
+    refine,
+    robust_covariance,
+    sample,
+    unpack,
+)
+from identification.residual_tests import effective_samples
+from identification.search import Population
+from identification.stepping import K1, K2
+
+Progress = Callable[[str, float], None]
+FEWEST, MOST = 12.0, 400.0  # independent samples granted to a residual that is not noise
+OUTLIER = 25.0  # bound of a squared residual where stops may be missed
+BETWEEN = 5e-4  # relative sd that the force between samples adds where it drives the run
+STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated residuals
+ROUGH = 1.15  # what the walls of the likelihood add to its spread: coverage of 40 seeds chose it
+WALKERS = 64
+STEPS = 200
+LONG_WALK = 600
+
+
+@dataclass(frozen=True)
+class Solution:
+    """Optimum, equally likely samples (k, free), and how it was reached."""
+
+    optimum: Optimum
+    samples: Array
+    chi_square: float
+    adequate: bool
+    evaluations: int
+
+
+def weigh_noise(
+    problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int, report: Progress
+) -> Solution:
+    """A fit that leaves noise: its level taken from the residual, then the likelihood's cloud."""
+    runs = list(optimum.runs(problem.long_runs))
+    for _ in range(4):
+        runs = [reweighed(run, optimum.p) for run in optimum.runs(runs)]
+        before = optimum
+        optimum = refine(runs, optimum.p, problem.free)
+        spent += optimum.evaluations
+        if np.allclose(optimum.p, before.p, rtol=1e-6):
+            break
+    report("weighing", 0.0)
+    cloud = sample(runs, optimum, rng)
+    spent += cloud.evaluations
+    if cloud.settled:
+        index = rng.choice(len(cloud.weights), 1024, p=cloud.weights)
+        members = cloud.members[index]
+    else:
+        members = walk(problem, runs, optimum, _seeds(cloud, rng), STEPS, None, rng, report)
+        members = _widened(members, optimum.covariance)
+        spent += WALKERS * STEPS
+    members = np.mean(members, axis=0) + ROUGH * (members - np.mean(members, axis=0))
+    optimum = _centred(runs, optimum, members)
+    # Against the noise seen in the signals themselves, not against that of the residual.
+    as_logged = optimum.runs(problem.long_runs)
+    chi_square = float(total_cost(as_logged, optimum.p[None], 0.0)[0]) / problem.count
+    return Solution(optimum, members, chi_square, True, spent)
+
+
+def weigh_correlated(
+    problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int
+) -> Solution:
+    """A fit whose residual is not white: outliers bounded, spread from stretches of the logs."""
+    chi_square = optimum.cost / problem.count
+    runs = list(optimum.runs(problem.long_runs))
+    for _ in range(3):
+        bodies = [_bodies(problem, optimum, index) for index in range(len(runs))]
+        runs = [
+            replace(run, measured=replace(run.measured, weight_y=1 / y, weight_force=w))
+            for run, (y, w) in zip(optimum.runs(runs), bodies, strict=True)
+        ]
+        optimum = refine(runs, optimum.p, problem.free, cap=OUTLIER)
+        spent += optimum.evaluations
+    covariance = robust_covariance(runs, optimum, OUTLIER, STRETCHES)
+    if problem.drive == "force":
+        # What the force does between samples is not known: it is taken as linear.
+        floor = BETWEEN * np.abs(pack(runs, optimum.p, optimum.starts, optimum.free))
+        covariance = 2.0 * covariance + np.diag(floor**2)
+    center = pack(runs, optimum.p, optimum.starts, optimum.free)
+    members = rng.multivariate_normal(center, covariance, 1024, check_valid="ignore")
+    keep_near(members, optimum.free, optimum.p)
+    optimum = replace(optimum, covariance=covariance)
+    return Solution(optimum, members, chi_square, chi_square <= problem.adequate, spent)
+
+
+def weigh_misfit(
+    problem: Problem,
+    optimum: Optimum,
+    population: Population,
+    rng: np.random.Generator,
+    spent: int,
+    report: Progress,
+) -> Solution:
+    """A fit that leaves more than noise: the mean over all sets that explain the log as well.
+
+    The residual counts for as many independent samples as its correlation leaves of it, at least
+    FEWEST; a set is then as likely as (mean square)^(-n/2).
+    """
+    runs = optimum.runs(problem.long_runs)
+    chi_square = optimum.cost / problem.count
+    granted = granted_samples(problem, optimum)
+    rows = problem.box.rows(population.members[: WALKERS // 2])
+    rows[:, [K1, K2]] = np.where(problem.free[-1] == K2, rows[:, [K1, K2]], optimum.p[[K1, K2]])
+    seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
+    around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
+    seeds = np.concatenate([around, _jittered_starts(seeds, problem, runs, rng)])
+    members = walk(problem, runs, optimum, seeds, LONG_WALK, granted, rng, report)
+    spent += WALKERS * LONG_WALK
+    covariance = np.cov(members.T)
+    optimum = moved(runs, optimum, np.mean(members, axis=0), covariance)
+    adequate = chi_square <= problem.adequate
+    return Solution(optimum, members, chi_square, adequate, spent)
+
+
+def walk(
+    problem: Problem,
+    runs: Sequence[Run],
+    optimum: Optimum,
+    seeds: Array,
+    steps: int,
+    granted: float | None,
+    rng: np.random.Generator,
+    report: Progress,
+) -> Array:
+    """Samples (k, d) of walkers from `seeds`; granted: independent samples of a misfit."""
+    cost = log_cost(problem, runs, optimum, granted)
+    found = ensemble(cost, seeds, steps, rng, lambda share: report("weighing", share))
+    keep = rng.choice(len(found.samples), min(1024, len(found.samples)), replace=False)
+    return found.samples[keep]
+
+
+def log_cost(
+    problem: Problem, runs: Sequence[Run], optimum: Optimum, granted: float | None
+) -> Callable[[Array], Array]:
+    """Minus twice the log likelihood of unknowns (k, d), infinite outside twice the box.
+
+    granted: where the residual is a misfit, for how many independent samples it counts.
+    """
+
+    def cost(members: Array) -> Array:
+        sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
+        inside = problem.box.holds(sets)
+        values = np.full(len(members), np.inf)
+        if inside.any():
+            begun = np.ascontiguousarray(begun[:, inside])
+            values[inside] = total_cost(runs, sets[inside], 0.0, begun)
+        if granted is not None:
+            return granted * np.log(values / problem.count)
+        return values
+
+    return cost
+
+
+def granted_samples(problem: Problem, optimum: Optimum) -> float:
+    """Independent samples for which a misfit's position residual counts."""
+    residuals = [simulated(problem, optimum, i).y - log["y"] for i, log in enumerate(problem.logs)]
+    return float(np.clip(effective_samples(residuals), FEWEST, MOST))
+
+
+def _seeds(cloud: Cloud, rng: np.random.Generator) -> Array:
+    """Walkers (WALKERS, d) from the best members of a cloud that did not settle."""
+    order = np.argsort(cloud.costs)[: WALKERS // 2]
+    members = cloud.members[order]
+    pairs = rng.integers(0, len(members), (WALKERS - len(members), 2))
+    between = 0.5 * (members[pairs[:, 0]] + members[pairs[:, 1]])
+    return np.concatenate([members, between])
+
+
+def _widened(members: Array, covariance: Array) -> Array:
+    """Samples (k, d) spread, about their mean, at least as widely as `covariance` (d, d).
+
+    Walls in the likelihood can hold walkers in one of its chambers, narrower than the whole.
+    """
+    mean = np.mean(members, axis=0)
+    spread = np.maximum(np.std(members, axis=0), 1e-300)
+    factor = np.maximum(1.0, np.sqrt(np.diag(covariance)) / spread)
+    return np.asarray(mean + factor * (members - mean))
+
+
+def _jitter(runs: Sequence[Run], optimum: Optimum, count: int, rng: np.random.Generator) -> Array:
+    """Walkers (count, d) a percent around the optimum."""
+    theta = pack(runs, optimum.p, optimum.starts, optimum.free)
+    return theta + 0.01 * optimum.scale * rng.standard_normal((count, len(theta)))
+
+
+def _jittered_starts(
+    seeds: Array, problem: Problem, runs: Sequence[Run], rng: np.random.Generator
+) -> Array:
+    """Seeds (k, d) with the runs' starts spread by their noise, so that no two agree."""
+    low = len(problem.free)
+    out = seeds.copy()
+    for run in runs:
+        sigma = 1.0 / run.measured.weight_y
+        for entry in run.open:
+            spread = {START_Y: sigma, START_V: 0.1 * sigma / run.measured.h, START_G: 1e-3}[entry]
+            out[:, low] += spread * rng.standard_normal(len(seeds))
+            low += 1
+    return out
+
+
+def reweighed(run: Run, p: Array) -> Run:
+    """The run with its noise levels set to what the fit leaves."""
+    y = _channel(run, p, True)
+    force = _channel(run, p, False) if run.measured.weight_force > 0 else 0.0
+    measured = replace(
+        run.measured,
+        weight_y=1.0 / y,
+        weight_force=1.0 / force if force > 0 else 0.0,
+    )
+    return replace(run, measured=measured)
+
+
+def _bodies(problem: Problem, optimum: Optimum, index: int) -> tuple[float, float]:
+    """Robust spread of the position's residual [m] and weight of the force's (0: not compared)."""
+    run, log = simulated(problem, optimum, index), problem.logs[index]
+    floor = 1.0 / problem.runs[index].measured.weight_y
+    y = max(1.4826 * float(np.median(np.abs(run.y - log["y"]))), 0.5 * floor)
+    if problem.drive != "command":
+        return y, 0.0
+    return y, 1.0 / max(1.4826 * float(np.median(np.abs(run.F - log["F"]))), 1e-300)
+
+
+def _channel(run: Run, p: Array, position: bool) -> float:
+    """Root mean square residual of the position [m] or the force [N]."""
+    measured = replace(
+        run.measured,
+        weight_y=1.0 if position else 0.0,
+        weight_force=0.0 if position else 1.0,
+    )
+    one = replace(run, measured=measured)
+    return float(np.sqrt(total_cost([one], p[None], 0.0)[0] / len(measured.y)))
+
+
+def _centred(runs: Sequence[Run], optimum: Optimum, members: Array) -> Optimum:
+    """The optimum at the members' mean, or at the best point where the mean falls off a ridge."""
+    mean = np.mean(members, axis=0)
+    covariance = np.atleast_2d(np.cov(members.T))
+    center = moved(runs, optimum, mean, covariance)
+    if center.cost <= optimum.cost + 2.0 * len(mean) + 20.0:
+        return center
+    sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
+    costs = total_cost(runs, sets, 0.0, begun)
+    best = int(np.argmin(costs))
+    if costs[best] < optimum.cost:
+        return moved(runs, optimum, members[best], covariance)
+    return replace(optimum, covariance=covariance)

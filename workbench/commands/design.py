@@ -1,0 +1,66 @@
+"""`workbench design`: a model -> design.json and report.html."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options, progress
+
+
+@click.command(epilog="Example: workbench design runs/.../model.json --poles 20,0.9")
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.option("--poles", metavar="W_N,ZETA", help="Dominant poles [rad/s, -].  [default: searched]")
+@click.option(
+    "--auxiliary", metavar="Z,...", help="Other poles of the RST loop, values of z.  [default: "
+    "searched]",
+)  # fmt: skip
+@click.option("--integrator/--no-integrator", default=True, show_default=True)
+@click.option(
+    "--from",
+    "source",
+    type=click.Choice(["physical", "arx"]),
+    help="Plant to design on.  [default: physical where the mass is identified]",
+)
+@click.option("--design-period", type=float, metavar="S", help="Period of the position loop [s].")
+@click.option("--modulus", type=float, default=0.5, show_default=True, help="Least modulus margin.")
+@click.option(
+    "--delay", type=float, default=2.0, show_default=True, help="Least delay margin, in samples."
+)
+@output_options
+def command(
+    model_file: Path,
+    poles: str | None,
+    auxiliary: str | None,
+    integrator: bool,
+    source: Literal["physical", "arx"] | None,
+    design_period: float | None,
+    modulus: float,
+    delay: float,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Design PID and RST controllers by pole placement, with margins and the compensator.
+
+    Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
+    keeps the margins. Exit status 1: the model carries no design; 2: no controller meets what was
+    asked.
+    """
+    from design.tune import Asked, Goals
+    from workbench.design_views import design_view
+    from workbench.model import read_model
+    from workbench.options import parse_auxiliary, parse_poles
+    from workbench.report.reports import design_report
+    from workbench.tuning import design, design_document, effort_limit
+
+    model = read_model(model_file)
+    asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
+    goals = Goals(modulus, delay, effort_limit(model))
+    with OutputFolder("design", out, now=datetime.now()) as folder:
+        with progress("designing", as_json=as_json):
+            found = design(model, asked, goals=goals, source=source, period=design_period)
+        document = design_document(found)
+        folder.write_json("design.json", document)
+        folder.write_text("report.html", design_report(found))
+    emit({**document, "out": folder.final}, as_json, lambda: design_view(found, folder.final))

@@ -1,0 +1,93 @@
+"""`workbench predict`: a model on a log -> prediction.csv."""
+
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options
+
+if TYPE_CHECKING:
+    from workbench.predicting import Prediction
+
+
+@click.command(epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a")
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("log", metavar="LOG")
+@click.option("--card", required=True, help="Path of the card, or the name of a shipped one.")
+@click.option("--window", type=float, metavar="S", help="Restart from the measured state every S.")
+@click.option(
+    "--drive",
+    type=click.Choice(["force", "command"]),
+    help="What drives the run.  [default: the command where the model has an actuator]",
+)
+@output_options
+def command(
+    model_file: Path,
+    log: str,
+    card: str,
+    window: float | None,
+    drive: Literal["force", "command"] | None,
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Predict force and position of a log by a model; nothing is fitted on the log.
+
+    Writes prediction.csv: t, force_applied, force_predicted (inverse model), force_simulated
+    (actuator driven by the command), position_measured, position_simulated (free run).
+    """
+    from workbench.model import read_model
+    from workbench.predicting import predict, prediction_csv
+    from workbench.sources import read_sources
+
+    model = read_model(model_file)
+    sources = read_sources([log], card)
+    with OutputFolder("predict", out, now=datetime.now()) as folder:
+        found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
+        folder.write_text("prediction.csv", prediction_csv(found))
+    remarks = (*sources.remarks, *_other_card(model.card, sources.card.name))
+    summary = {
+        "drive": found[0].drive,
+        "window": window,
+        "samples": sum(len(one.t) for one in found),
+        **_errors(found),
+        "remarks": remarks,
+        "out": folder.final,
+    }
+    emit(summary, as_json, lambda: "\n".join(_lines(summary, model.rotary, remarks)))
+
+
+def _other_card(of_model: str, of_log: str) -> list[str]:
+    if of_model == of_log:
+        return []
+    return [f"the model is of {of_model}, the log of {of_log}"]
+
+
+def _errors(found: "list[Prediction]") -> dict[str, float | None]:
+    """Root mean squares over all runs of the log."""
+    import numpy as np
+
+    def rms(name: str) -> float | None:
+        pairs = [(getattr(one, name), len(one.t)) for one in found]
+        known = [(value, n) for value, n in pairs if value is not None]
+        if not known:
+            return None
+        return float(np.sqrt(sum(v * v * n for v, n in known) / sum(n for _, n in known)))
+
+    names = ("position_rms", "force_predicted_rms", "force_simulated_rms")
+    return {name: rms(name) for name in names}
+
+
+def _lines(summary: Mapping[str, object], rotary: bool, remarks: tuple[str, ...]) -> list[str]:
+    length, force = ("rad", "N m") if rotary else ("m", "N")
+    by = "the command" if summary["drive"] == "command" else "the applied force"
+    start = f"restarted every {summary['window']} s" if summary["window"] else "free run"
+    lines = [f"position ({start}, driven by {by}): {summary['position_rms']:.4g} {length} rms"]
+    if summary["force_predicted_rms"] is not None:
+        lines.append(f"force, inverse model: {summary['force_predicted_rms']:.4g} {force} rms")
+    if summary["force_simulated_rms"] is not None:
+        lines.append(f"force, simulated: {summary['force_simulated_rms']:.4g} {force} rms")
+    lines.extend(f"note: {line}" for line in remarks)
+    return [*lines, f"written: {Path(str(summary['out'])) / 'prediction.csv'}"]

@@ -1,0 +1,75 @@
+"""A design as tables and lines, for a terminal and a report."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workbench.tuning import Controller, Design
+from workbench.views import Row, table, written
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+HEAD = ("loop", "w_n rad/s", "zeta", "modulus margin", "worst", "gain", "phase", "delay", "|S_up|")
+
+
+def margin_rows(found: Design) -> list[Row]:
+    """One row a controller, by `HEAD`."""
+    return [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+
+
+def _margins(one: Controller) -> Row:
+    m = one.margins
+    delay = "any" if m.delay_s is None else f"{1e3 * m.delay_s:.3g} ms ({m.delay_samples:.2g} h)"
+    return (
+        f"{one.dominant[0]:.3g}",
+        f"{one.dominant[1]:.2g}",
+        f"{m.modulus:.3f}",
+        "unstable" if m.worst_modulus is None else f"{m.worst_modulus:.3f}",
+        "any" if m.gain_up is None else f"x {m.gain_up:.3g}",
+        "any" if m.phase_deg is None else f"{m.phase_deg:.3g} deg",
+        delay,
+        "-" if m.S_up_max_db is None else f"{m.S_up_max_db:.3g} dB",
+    )
+
+
+def design_lines(found: Design) -> list[str]:
+    """What the design rests on and what to know of it, in words."""
+    p, c = found.plant, found.compensator
+    lines = [f"recommended: {found.recommended.upper()}", f"plant: {p.source}, {p.why}"]
+    lines.append(f"position loop every {1e3 * p.h:.4g} ms")
+    if found.force:
+        f = found.force
+        lines.append(
+            f"force loop: k_i = {f.k_i:.4g} V/N, T_i = {f.T_i:.4g} s, every {1e3 * f.h:.4g} ms"
+        )
+    if found.pid and found.pid.gains:
+        g = found.pid.gains
+        lines.append(
+            f"PID: k_R = {g.k_R:.5g}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s, eps = {g.eps:.4g} s"
+        )
+    lines.append(f"compensator: N_c = {c.N_c:g}, e_T = {c.e_T:.3g}")
+    lines.extend(f"no {name.upper()}: {why}" for name, why in found.refused.items())
+    for name, one in found.controllers.items():
+        lines.extend(f"{name.upper()} misses: {missed}" for missed in one.missed)
+        if one.note:
+            lines.append(f"{name.upper()}: {one.note}")
+    return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def polynomial_lines(found: Design) -> list[str]:
+    """The coefficients, in ascending powers of z^-1."""
+    return [
+        f"{name.upper()} {letter}: [{', '.join(f'{v:.7g}' for v in getattr(one, letter))}]"
+        for name, one in found.controllers.items()
+        for letter in "RST"
+    ]
+
+
+def design_view(found: Design, folder: Path) -> "Group":
+    """The design for a terminal."""
+    from rich.console import Group
+
+    lines = (*design_lines(found), *polynomial_lines(found))
+    return Group(
+        table(HEAD, margin_rows(found)), *lines, written(folder, "design.json", "report.html")
+    )

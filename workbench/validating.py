@@ -1,0 +1,311 @@
+"""Model + Design -> Validation: the loop in simulation, on the identified plant and another."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from design.margins import margins
+from identification.arrays import Array
+from identification.errors import BadSpecification
+from workbench.closed_loop import ForcePI, Noise, Trace, simulate_loop
+from workbench.model import Model
+from workbench.tuning import Controller, Design, Linear, MarginValues, margin_values, sampled_plant
+
+STEP_SHARE = 0.25  # of the travel seen in the logs
+SMOOTH_SHARE = 0.4
+SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
+DWELLS = 30.0  # length of a step, in units of 1/w_n
+SHORTEST_DWELL = 1.0  # s
+LAST = 0.5  # part of a dwell that is judged
+CYCLES = 3  # reversals in the judged part that make a limit cycle
+ESCAPED = 10.0  # times the travel
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a loop must keep to pass: margins, standstill error relative to the step, and the
+    error along the smooth reference relative to its amplitude."""
+
+    modulus: float = 0.5
+    delay: float = 2.0
+    standstill: float = 0.05
+    tracking: float = 0.15
+
+
+@dataclass(frozen=True)
+class LimitCycle:
+    """A motion that goes on under a constant reference; peak to peak [m], period [s]."""
+
+    amplitude: float
+    period: float
+
+
+@dataclass(frozen=True)
+class Figures:
+    """A controller on a plant: errors in m, relative ones to step and amplitude; force in N.
+
+    standstill: largest error in the last half of a dwell. overshoot: relative to the step.
+    margins is None where the linear loop is unstable.
+    """
+
+    stable: bool
+    margins: MarginValues | None
+    step: float
+    standstill: float
+    standstill_relative: float
+    overshoot: float
+    step_rms: float
+    smooth_rms: float
+    smooth_relative: float
+    force_rms: float
+    limit_cycle: LimitCycle | None
+    missed: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.missed
+
+
+@dataclass(frozen=True)
+class Validation:
+    """Every controller on every plant (by names like "rst", then "model", "plant")."""
+
+    card: str
+    judged: Literal["rst", "pid"]
+    passed: bool
+    limits: Limits
+    figures: Mapping[str, Mapping[str, Figures]]
+    remarks: tuple[str, ...]
+    versions: Mapping[str, str]
+    schema: Literal["validation/1"] = "validation/1"
+
+
+@dataclass(frozen=True)
+class Traces:
+    """The simulated loops behind one entry of a validation."""
+
+    step: Trace
+    smooth: Trace
+
+
+def validate(
+    model: Model,
+    found: Design,
+    rng: np.random.Generator,
+    *,
+    plant: Model | None = None,
+    limits: Limits | None = None,
+) -> tuple[Validation, Mapping[tuple[str, str], Traces]]:
+    """The design on the model it was made for and on `plant`, with the noise of the logs.
+
+    The recommended controller is judged, on every plant. Raises BadModel where the design does
+    not fit the plant (a force loop without an actuator).
+    """
+    from workbench.model import versions
+
+    limits = limits or Limits()
+    plants = {"model": model} | ({"plant": plant} if plant else {})
+    figures: dict[str, dict[str, Figures]] = {}
+    traces: dict[tuple[str, str], Traces] = {}
+    for name, controller in found.controllers.items():
+        figures[name] = {}
+        for place, machine in plants.items():
+            run = _traces(machine, found, controller, rng)
+            traces[name, place] = run
+            figures[name][place] = _figures(machine, found, controller, run, limits)
+    judged = found.recommended if found.recommended in figures else next(iter(figures))
+    return Validation(
+        card=model.card,
+        judged="rst" if judged == "rst" else "pid",
+        passed=all(one.passed for one in figures[judged].values()),
+        limits=limits,
+        figures=figures,
+        remarks=tuple(_remarks(figures[judged], found)),
+        versions=versions(),
+    ), traces
+
+
+def _traces(machine: Model, found: Design, one: Controller, rng: np.random.Generator) -> Traces:
+    """Both references through the loop; levels from the travel that the logs have shown."""
+    low, high = machine.travel
+    step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
+    dwell = max(DWELLS / one.dominant[0], SHORTEST_DWELL)
+    h = found.force.h if found.force else found.plant.h
+    n = round(dwell / h)
+    levels = np.repeat(np.array([0.0, step, -step, 0.0]), n)
+    w = SMOOTH_SPEED * one.dominant[0]
+    t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
+    rise = np.clip(t * w / np.pi, 0.0, 1.0)
+    smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
+    return Traces(_run(machine, found, one, levels, rng), _run(machine, found, one, smooth, rng))
+
+
+def _run(
+    machine: Model, found: Design, one: Controller, r: Array, rng: np.random.Generator
+) -> Trace:
+    """One reference through the loop, with the noise and the limit of the machine."""
+    force = found.force
+    return simulate_loop(
+        machine.simulated,
+        one.rst,
+        ForcePI(force.k_i, force.T_i) if force else None,
+        r,
+        force.h if force else one.h,
+        rng,
+        noise=Noise(machine.fit.noise_y, machine.fit.noise_F),
+        limit=machine.rig.control_limit,
+    )
+
+
+def _figures(
+    machine: Model, found: Design, one: Controller, run: Traces, limits: Limits
+) -> Figures:
+    low, high = machine.travel
+    step = STEP_SHARE * (high - low)
+    stable = bool(np.all(np.abs(run.step.y) < ESCAPED * (high - low)))
+    judged = _judged(run.step)
+    standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
+    smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
+    amplitude = float(np.max(np.abs(run.smooth.r)))
+    margin = _linear_margins(machine, found, one)
+    result = Figures(
+        stable=stable,
+        margins=margin,
+        step=step,
+        standstill=standstill,
+        standstill_relative=standstill / step,
+        overshoot=_overshoot(run.step, step),
+        step_rms=float(np.sqrt(np.mean((run.step.r - run.step.y) ** 2))),
+        smooth_rms=smooth,
+        smooth_relative=smooth / amplitude,
+        force_rms=float(np.sqrt(np.mean(run.step.F**2))),
+        limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
+        missed=(),
+    )
+    return Figures(**{**_shallow(result), "missed": _missed(result, limits, found, machine)})
+
+
+def _shallow(value: Figures) -> dict[str, Any]:
+    return {name: getattr(value, name) for name in value.__dataclass_fields__}
+
+
+def _judged(trace: Trace) -> Any:
+    """The last half of every dwell, True at its samples."""
+    change = np.flatnonzero(np.diff(trace.r)) + 1
+    starts = np.concatenate([[0], change, [len(trace.r)]])
+    keep = np.zeros(len(trace.r), dtype=bool)
+    for low, high in zip(starts[:-1], starts[1:], strict=True):
+        keep[high - round(LAST * (high - low)) : high] = True
+    return keep
+
+
+def _overshoot(trace: Trace, step: float) -> float:
+    """Largest overshoot of a step, relative to its height."""
+    change = np.flatnonzero(np.diff(trace.r)) + 1
+    ends = np.append(change[1:], len(trace.r))
+    worst = 0.0
+    for low, high in zip(change, ends, strict=True):
+        height = float(trace.r[low] - trace.r[low - 1])
+        beyond = float(np.max(np.sign(height) * (trace.y[low:high] - trace.r[low])))
+        worst = max(worst, beyond / abs(height))
+    return worst
+
+
+def limit_cycle(trace: Trace, noise: float) -> LimitCycle | None:
+    """A motion under the last constant reference that does not end; None where it does.
+
+    It must reverse `CYCLES` times, by more than five times the position's noise, and the last
+    half of the dwell must not be calmer than the half before by more than half.
+    """
+    change = np.flatnonzero(np.diff(trace.r)) + 1
+    start = int(change[-1]) if change.size else 0
+    y = trace.y[start:]
+    early, late = y[len(y) // 3 : 2 * len(y) // 3], y[2 * len(y) // 3 :]
+    size, before = float(np.ptp(late)), float(np.ptp(early))
+    if size <= max(5.0 * noise, 1e-9) or size < 0.5 * before:
+        return None
+    turns = _reversals(y[len(y) // 3 :], 0.3 * size)
+    if len(turns) < CYCLES:
+        return None
+    h = float(trace.t[1] - trace.t[0])
+    return LimitCycle(size, 2.0 * h * float(np.mean(np.diff(turns))))
+
+
+def _reversals(y: Array, least: float) -> list[int]:
+    """Samples at which the motion has turned round by at least `least`."""
+    turns: list[int] = []
+    low = high = float(y[0])
+    way = 0
+    for k, value in enumerate(y.tolist()):
+        low, high = min(low, value), max(high, value)
+        if way >= 0 and high - value > least:
+            way, low = -1, value
+            turns.append(k)
+        elif way <= 0 and value - low > least:
+            way, high = 1, value
+            turns.append(k)
+    return turns
+
+
+def _linear_margins(machine: Model, found: Design, one: Controller) -> MarginValues | None:
+    """Margins of the controller on the machine's own linear plant; None where it is unstable."""
+    plant: Linear = found.plant if found.plant.source == "arx" else sampled_plant(machine, found)
+    try:
+        margin = margins(plant.A, plant.B, one.rst)
+    except BadSpecification:
+        return None
+    return margin_values(margin, margin.modulus)
+
+
+def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> tuple[str, ...]:
+    """What a controller does not keep, in words."""
+    unit = "rad" if machine.rotary else "m"
+    if not result.stable:
+        return ("the simulated loop runs away",)
+    missed: list[str] = []
+    if result.margins is None:
+        missed.append("the linear loop is unstable")
+    else:
+        if result.margins.modulus < limits.modulus:
+            said = f"{result.margins.modulus:.3f}, at least {limits.modulus:g} needed"
+            missed.append(f"modulus margin {said}")
+        samples = result.margins.delay_samples
+        if samples is not None and samples < limits.delay:
+            missed.append(f"delay margin {samples:.2f} samples, at least {limits.delay:g} needed")
+    if result.standstill_relative > limits.standstill:
+        missed.append(
+            f"error at standstill {result.standstill:.3g} {unit},"
+            f" {100 * result.standstill_relative:.1f} % of the step, at most"
+            f" {100 * limits.standstill:g} % allowed"
+        )
+    if result.smooth_relative > limits.tracking:
+        missed.append(
+            f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
+            f" amplitude, at most {100 * limits.tracking:g} % allowed"
+        )
+    return tuple(missed)
+
+
+def _remarks(figures: Mapping[str, Figures], found: Design) -> list[str]:
+    out = ["the compensator is not part of this loop yet: friction is met by feedback alone"]
+    for place, one in figures.items():
+        if one.limit_cycle:
+            out.append(
+                f"limit cycle on the {place}: {one.limit_cycle.amplitude:.3g} peak to peak every"
+                f" {one.limit_cycle.period:.3g} s, as an integrator against stiction makes"
+            )
+    if found.compensator.assumed:
+        out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")
+    return out
+
+
+def validation_document(found: Validation) -> dict[str, Any]:
+    """The validation as validation.json writes it, the schema first."""
+    document = asdict(found)
+    for name, places in found.figures.items():
+        for place, one in places.items():
+            document["figures"][name][place]["passed"] = one.passed
+    return {"schema": document.pop("schema"), **document}
