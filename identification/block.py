@@ -14,51 +14,72 @@ from identification.stepping import (
     A12,
     B1,
     COLUMNS,
-    D_F,
-    D_V,
     F_HI,
     F_LO,
     K1,
     K2,
+    L1,
+    L2,
     MODES,
     ORDER,
     P1,
     P2,
     P3,
+    STUCK,
     V_HI,
     V_LO,
     C,
+    Row,
+    exact_step,
     mode_table,
+    parameters,
     resolve,
     settled_mode,
 )
 
 WIDTH = 16
-# Rows of the work array: the mode's columns first, then state, inputs and the proposed step.
-Y, V, F, G, Y_NEXT, V_NEXT, F_NEXT, COUPLING = range(COLUMNS, COLUMNS + 8)
-ROWS = COLUMNS + 8
+# Rows of the work array: the mode's columns first, then state, input, k1, k2 and the last velocity.
+Y, V, F, G, GAIN, COUPLING, V_OLD = range(COLUMNS, COLUMNS + 7)
+ROWS = COLUMNS + 7
 
 
 @compiled_inline
-def propose(s: Array, flags: IntArray, h: float) -> int:
-    """Affine step of all lanes into the NEXT rows; flags lanes that left their region."""
-    flagged = 0
-    for i in range(WIDTH):
-        v, force, g = s[V * WIDTH + i], s[F * WIDTH + i], s[G * WIDTH + i]
-        c, d_f, d_v = s[C * WIDTH + i], s[D_F * WIDTH + i], s[D_V * WIDTH + i]
-        phi = force - c
-        moved = s[P1 * WIDTH + i] * v + s[P2 * WIDTH + i] * phi + s[P3 * WIDTH + i] * g
-        v_next = s[A11 * WIDTH + i] * v + s[A12 * WIDTH + i] * phi + s[B1 * WIDTH + i] * g
-        force_next = force + g * h - s[COUPLING * WIDTH + i] * moved
-        s[Y_NEXT * WIDTH + i] = s[Y * WIDTH + i] + moved
-        s[V_NEXT * WIDTH + i] = v_next
-        s[F_NEXT * WIDTH + i] = force_next
-        out = (v_next < s[V_LO * WIDTH + i]) | (v_next > s[V_HI * WIDTH + i])
-        out |= (force_next < s[F_LO * WIDTH + i]) | (force_next > s[F_HI * WIDTH + i])
-        dip = (d_f * phi - d_v * v < 0.0) & (d_f * (force_next - c) - d_v * v_next > 0.0)
-        flags[i] = out | dip
-        flagged += flags[i]
-    return flagged
+def lane_row(s: Array, i: int) -> Row:
+    """The step of a lane's mode."""
+    return (
+        s[A11 * WIDTH + i],
+        s[A12 * WIDTH + i],
+        s[B1 * WIDTH + i],
+        s[P1 * WIDTH + i],
+        s[P2 * WIDTH + i],
+        s[P3 * WIDTH + i],
+        s[C * WIDTH + i],
+        s[V_LO * WIDTH + i],
+        s[V_HI * WIDTH + i],
+        s[F_LO * WIDTH + i],
+        s[F_HI * WIDTH + i],
+        s[L1 * WIDTH + i],
+        s[L2 * WIDTH + i],
+    )
+
+
+@compiled_inline
+def advance(s: Array, i: int, h: float, force: float, g: float) -> int:
+    """Affine step of lane `i`; its bit where it left its region and must be resolved.
+
+    The old velocity is kept in V_OLD. The new state is stored in any case: a masked store would
+    stall the next step's loads.
+    """
+    v = s[V * WIDTH + i]
+    moved, v_next, force_next, left = exact_step(
+        lane_row(s, i), s[COUPLING * WIDTH + i], h, v, force, g
+    )
+    s[G * WIDTH + i] = g
+    s[V_OLD * WIDTH + i] = v
+    s[Y * WIDTH + i] += moved
+    s[V * WIDTH + i] = v_next
+    s[F * WIDTH + i] = force_next
+    return int(left) << i
 
 
 @compiled
@@ -73,9 +94,9 @@ def place(
     s: Array, modes: IntArray, tables: Array, p: Array, lane: int, y: float, v: float, force: float
 ) -> None:
     """Set a lane's state; a body inside the band with too little force is at rest."""
-    mode = settled_mode(p[lane], v, force)
+    mode = settled_mode(parameters(p, lane), v, force)
     s[Y * WIDTH + lane] = y
-    s[V * WIDTH + lane] = 0.0 if mode == 0 else v
+    s[V * WIDTH + lane] = 0.0 if mode == STUCK else v
     s[F * WIDTH + lane] = force
     modes[lane] = mode
     load_mode(s, tables, lane, mode)
@@ -83,42 +104,45 @@ def place(
 
 @compiled
 def prepare(p: Array, h: float, tables: Array, s: Array, c: Array) -> None:
-    """Step tables of all lanes and their coupling k2."""
+    """Step tables of all lanes, their k1 and k2; `c` is not used (see `work_space`)."""
     for lane in range(WIDTH):
-        mode_table(p[lane], h, c, tables[lane])
+        mode_table(parameters(p, lane), h, tables[lane])
+        s[GAIN * WIDTH + lane] = p[lane, K1]
         s[COUPLING * WIDTH + lane] = p[lane, K2]
 
 
 @compiled
 def settle_flagged(
-    s: Array, flags: IntArray, modes: IntArray, tables: Array, p: Array, h: float, c: Array
+    flagged: int,
+    s: Array,
+    modes: IntArray,
+    tables: Array,
+    p: Array,
+    h: float,
+    out: Array,
+    at: int,
 ) -> None:
-    """Follow the flagged lanes from switch to switch through the sample."""
+    """Follow the flagged lanes from switch to switch through the sample.
+
+    Their positions and forces before it are out[at:at + 2 * WIDTH]. A force that was set from
+    outside, beyond the region of the mode, changes the mode first.
+    """
     for lane in range(WIDTH):
-        if flags[lane]:
+        if flagged >> lane & 1:
+            v, force = s[V_OLD * WIDTH + lane], out[at + WIDTH + lane]
+            mode, plant = modes[lane], parameters(p, lane)
+            if force < s[F_LO * WIDTH + lane] or force > s[F_HI * WIDTH + lane]:
+                mode = settled_mode(plant, v, force)
+                v = 0.0 if mode == STUCK else v
             y, v, force, mode = resolve(
-                p[lane],
-                s[Y * WIDTH + lane],
-                s[V * WIDTH + lane],
-                s[F * WIDTH + lane],
-                modes[lane],
-                s[G * WIDTH + lane],
-                h,
-                c,
+                plant, out[at + lane], v, force, mode, s[G * WIDTH + lane], h
             )
-            s[Y_NEXT * WIDTH + lane] = y
-            s[V_NEXT * WIDTH + lane] = v
-            s[F_NEXT * WIDTH + lane] = force
+            s[Y * WIDTH + lane] = y
+            s[V * WIDTH + lane] = v
+            s[F * WIDTH + lane] = force
             if mode != modes[lane]:
                 modes[lane] = mode
                 load_mode(s, tables, lane, mode)
-
-
-@compiled
-def accept(s: Array) -> None:
-    """Make the proposed step the state."""
-    for i in range(3 * WIDTH):
-        s[Y * WIDTH + i] = s[Y_NEXT * WIDTH + i]
 
 
 @compiled
@@ -134,23 +158,16 @@ def march(
     out: Array,
 ) -> None:
     """Steps driven by a command: out[k, 0] positions, out[k, 1] forces before step k, per lane."""
+    flat = out.reshape(-1)
     for k in range(len(u)):
+        command, at, flagged = u[k], 2 * WIDTH * k, 0
         for i in range(WIDTH):
-            out[k, 0, i] = s[Y * WIDTH + i]
-            out[k, 1, i] = s[F * WIDTH + i]
-            s[G * WIDTH + i] = p[i, K1] * u[k]
-        if propose(s, flags, h) > 0:
-            settle_flagged(s, flags, modes, tables, p, h, c)
-        accept(s)
-
-
-@compiled
-def resettle(s: Array, modes: IntArray, tables: Array, p: Array) -> None:
-    """Modes of lanes whose force was set from outside and left the region of the mode."""
-    for lane in range(WIDTH):
-        force = s[F * WIDTH + lane]
-        if force < s[F_LO * WIDTH + lane] or force > s[F_HI * WIDTH + lane]:
-            place(s, modes, tables, p, lane, s[Y * WIDTH + lane], s[V * WIDTH + lane], force)
+            force = s[F * WIDTH + i]
+            flat[at + i] = s[Y * WIDTH + i]
+            flat[at + WIDTH + i] = force
+            flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * command)
+        if flagged:
+            settle_flagged(flagged, s, modes, tables, p, h, flat, at)
 
 
 @compiled
@@ -169,26 +186,28 @@ def march_held(
     out: Array,
 ) -> None:
     """Steps driven by a measured force: F + k2 (y_m - y) at every sample; `out` as in `march`."""
+    flat = out.reshape(-1)
     for k in range(len(y)):
-        outside = 0
+        y_k, force_k, slope_y_k, slope_k = y[k], force[k], slope_y[k], slope_force[k]
+        at, flagged = 2 * WIDTH * k, 0
         for i in range(WIDTH):
-            coupling = s[COUPLING * WIDTH + i]
-            f = force[k] + coupling * (y[k] - s[Y * WIDTH + i])
-            s[F * WIDTH + i] = f
-            s[G * WIDTH + i] = slope_force[k] + coupling * slope_y[k]
-            out[k, 0, i] = s[Y * WIDTH + i]
-            out[k, 1, i] = f
-            outside += (f < s[F_LO * WIDTH + i]) | (f > s[F_HI * WIDTH + i])
-        if outside > 0:
-            resettle(s, modes, tables, p)
-        if propose(s, flags, h) > 0:
-            settle_flagged(s, flags, modes, tables, p, h, c)
-        accept(s)
+            here, coupling = s[Y * WIDTH + i], s[COUPLING * WIDTH + i]
+            f = force_k + coupling * (y_k - here)
+            flat[at + i] = here
+            flat[at + WIDTH + i] = f
+            outside = (f < s[F_LO * WIDTH + i]) | (f > s[F_HI * WIDTH + i])
+            flagged |= int(outside) << i
+            flagged |= advance(s, i, h, f, slope_k + coupling * slope_y_k)
+        if flagged:
+            settle_flagged(flagged, s, modes, tables, p, h, flat, at)
 
 
 @compiled
 def work_space() -> tuple[Array, IntArray, IntArray, Array, Array]:
-    """Fresh work arrays of a block: state, modes, flags, tables, series."""
+    """Fresh work arrays of a block: state, modes, flags, tables, series.
+
+    Flags and series are not used any more; callers still hand them on.
+    """
     return (
         np.zeros(ROWS * WIDTH),
         np.zeros(WIDTH, dtype=np.int64),

@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.karnopp import NAMES, ROTARY_UNITS, UNITS
+from identification.karnopp import NAMES, NEGATIVE, ROTARY_UNITS, UNITS
 from identification.result import Estimate
 from identification.stepping import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
 
 NEEDED = 3  # events of a kind that make a parameter identifiable
 SLIDING = 50  # samples of sliding a direction needs
 WIDEST = 0.3  # sd relative to the value beyond which the value says nothing
+SMALL = 0.05  # sd relative to the force beside it at which a term is known to be small
 ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m"}
 ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad"}
 
@@ -116,17 +117,21 @@ def _missing(name: str, events: Events, log: str) -> str | None:
 def _too_wide(
     name: str, value: float, sd: float, value_of: Mapping[str, float], events: Events
 ) -> str | None:
-    """Reason where the spread is as large as what the parameter could mean."""
-    scale = abs(value)
+    """Reason where the sign is wrong, or the spread as large as what the parameter could mean."""
+    if value * (-1.0 if name in NEGATIVE else 1.0) < 0.0:
+        return (
+            f"found {value:.3g}, of the wrong sign: something else is in this force; see residual"
+        )
+    scale = 0.0
     side = 1 if name.endswith("n") else 0
     coulomb = abs(value_of.get(("F_cp", "F_cn")[side], 0.0))
     if name.startswith("F_v") and events.fastest[side] > 0:
         # A viscous term near zero is known when it is small beside the Coulomb force.
-        scale = max(scale, coulomb / events.fastest[side])
+        scale = coulomb / events.fastest[side]
     if name in ("F_cp", "F_cn"):
         other = abs(value_of.get(("F_vp", "F_vn")[side], 0.0)) * events.fastest[side]
-        scale = max(scale, other)
-    if sd <= WIDEST * scale:
+        scale = other
+    if sd <= max(WIDEST * abs(value), SMALL * scale):
         return None
     return (
         f"found {value:.3g} with a standard deviation of {sd:.2g}: the log does not tell it;"

@@ -15,6 +15,7 @@ import numpy as np
 from identification.actuator import ActuatorFit
 from identification.experiment import total_cost
 from identification.identifiability import Events, estimates, events_of
+from identification.imposed import fit_imposed, is_imposed
 from identification.karnopp import NAMES
 from identification.log import Log, Rig
 from identification.plant import Actuator
@@ -30,6 +31,7 @@ POPULATION = 64
 GENERATIONS = 150
 ATTEMPTS = 3
 FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
+LED = 50.0  # chi-square from which a force-driven run is not the body's own motion
 SAME = 0.02  # relative gain of a new search below which the misfit is the model's
 
 
@@ -49,6 +51,8 @@ def fit_karnopp(
     """
     report = on_progress or (lambda _stage, _share: None)
     problem = pose(logs, rig, drive)
+    if is_imposed(logs, problem.firsts, rig):
+        return fit_imposed(logs, problem.firsts, rng, rig)
     solution = solve(problem, rng, report)
     remarks: list[str] = []
     actuator = problem.actuator
@@ -65,6 +69,8 @@ def fit_karnopp(
         )
         problem = pose(logs, rig, "force")
         solution = solve(problem, rng, report)
+    if problem.drive == "force" and not problem.hold and solution.chi_square > LED:
+        return fit_imposed(logs, problem.firsts, rng, rig)
     return _result(problem, solution, actuator, rig, remarks)
 
 

@@ -288,7 +288,8 @@ def _quadratic(
         begin = np.ascontiguousarray(begun[index])
         gram = evaluate_block(sets, begin, run.measured, run.windows, cap, 1)[1][0]
         inner = slice(1, len(used) + 1)
-        cost += float(gram[0, 0])
+        cost += float(gram[0, 0]) if np.isfinite(gram[0, 0]) else np.inf
+        gram = np.nan_to_num(gram, nan=0.0, posinf=0.0, neginf=0.0)
         gradient[used] += gram[inner, 0] / delta[used]
         hessian[np.ix_(used, used)] += gram[inner, inner] / np.outer(delta[used], delta[used])
     return _Form(cost, gradient, hessian)

@@ -11,27 +11,18 @@ from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
 from identification.stepping import (
-    A11,
-    A12,
-    B1,
     COLUMNS,
-    D_F,
-    D_V,
     F_HI,
     F_LO,
     K1,
     K2,
     MODES,
-    ORDER,
-    P1,
-    P2,
-    P3,
     STUCK,
-    V_HI,
-    V_LO,
-    C,
+    exact_step,
     kernel_parameters,
+    mode_row,
     mode_table,
+    parameters,
     resolve,
     settled_mode,
 )
@@ -63,45 +54,42 @@ def run_kernel(
     out: Array,
     modes: IntArray,
 ) -> None:
-    """One plant along one log into out (3, n): position, velocity, force; and its modes (n,).
+    """One plant p (1, 11) along one log: out (3, n) takes position, velocity, force; modes (n,).
 
     held: take the force from `force` and `slope` at every sample, corrected by k2 (y_m - y);
     at, at_y, at_v, at_f: samples at which the run restarts, and from where.
     """
-    c = np.zeros(ORDER + 1)
     table = np.zeros((MODES, COLUMNS))
-    mode_table(p, h, c, table)
-    y, v, f = at_y[0], at_v[0], at_f[0]
-    mode = settled_mode(p, v, f)
+    plant = parameters(p, 0)
+    mode_table(plant, h, table)
+    k1, k2 = plant[K1], plant[K2]
+    y, v, f, mode = at_y[0], at_v[0], at_f[0], STUCK
+    row = mode_row(table, mode)
     window = 0
     for k in range(len(u)):
-        if window < len(at) and k == at[window]:
+        g = k1 * u[k]
+        before = mode
+        moved_here = window < len(at) and k == at[window]
+        if moved_here:
             y, v, f = at_y[window], at_v[window], at_f[window]
-            mode = settled_mode(p, v, f)
-            v = 0.0 if mode == STUCK else v
             window += 1
-        g = p[K1] * u[k]
         if held:
-            f = force[k] + p[K2] * (y_m[k] - y)
+            f = force[k] + k2 * (y_m[k] - y)
             following = k + 1 if k + 1 < len(u) else k
-            g = slope[k] + p[K2] * (y_m[following] - y_m[k]) / h
-            if f < table[mode, F_LO] or f > table[mode, F_HI]:
-                mode = settled_mode(p, v, f)
-                v = 0.0 if mode == STUCK else v
+            g = slope[k] + k2 * (y_m[following] - y_m[k]) / h
+        if moved_here or (held and (f < row[F_LO] or f > row[F_HI])):
+            mode = settled_mode(plant, v, f)
+            v = 0.0 if mode == STUCK else v
+        if mode != before:
+            row = mode_row(table, mode)
         out[0, k], out[1, k], out[2, k] = y, v, f
         modes[k] = mode
-        phi = f - table[mode, C]
-        moved = table[mode, P1] * v + table[mode, P2] * phi + table[mode, P3] * g
-        v_next = table[mode, A11] * v + table[mode, A12] * phi + table[mode, B1] * g
-        f_next = f + g * h - p[K2] * moved
-        inside = (v_next >= table[mode, V_LO]) & (v_next <= table[mode, V_HI])
-        inside &= (f_next >= table[mode, F_LO]) & (f_next <= table[mode, F_HI])
-        before = table[mode, D_F] * phi - table[mode, D_V] * v
-        after = table[mode, D_F] * (f_next - table[mode, C]) - table[mode, D_V] * v_next
-        if inside and not (before < 0.0 and after > 0.0):
-            y, v, f = y + moved, v_next, f_next
+        moved, v_next, f_next, left = exact_step(row, k2, h, v, f, g)
+        if left:
+            y, v, f, mode = resolve(plant, y, v, f, mode, g, h)
+            row = mode_row(table, mode)
         else:
-            y, v, f, mode = resolve(p, y, v, f, mode, g, h, c)
+            y, v, f = y + moved, v_next, f_next
 
 
 def force_slope(force: Array, h: float, hold: bool) -> Array:
@@ -145,7 +133,7 @@ def free_run(
     out = np.zeros((3, len(log)))
     modes = np.zeros(len(log), dtype=np.int64)
     run_kernel(
-        kernel_parameters(plant.friction.array, k1, k2),
+        kernel_parameters(plant.friction.array, k1, k2)[np.newaxis],
         log.h,
         held,
         log["u"] if "u" in log else np.zeros(len(log)),

@@ -21,95 +21,165 @@ MODES = 7
 M, F_CP, F_CN, F_VP, F_VN, DV_P, DV_N, F_SP, F_SN, K1, K2 = range(11)
 PARAMETERS = 11
 # Columns of a mode's row: v+ = a11 v + a12 (F-c) + b1 g, dy = p1 v + p2 (F-c) + p3 g, then the
-# region in which the step holds and the signed acceleration whose change of sign hides a dip.
-A11, A12, B1, P1, P2, P3, C, V_LO, V_HI, F_LO, F_HI, D_F, D_V = range(13)
+# region in which the step holds; l1 v + l2 (F-c) is a velocity that the sample cannot dip below.
+A11, A12, B1, P1, P2, P3, C, V_LO, V_HI, F_LO, F_HI, L1, L2 = range(13)
 COLUMNS = 13
-ORDER = 14  # terms of the power series; with RATE_STEP the remainder is below 1e-12
-RATE_STEP = 0.7  # longest stretch of one series, in units of the fastest rate
+Row = tuple[
+    float, float, float, float, float, float, float, float, float, float, float, float, float
+]
+ORDER = 11  # degree of the power series; with RATE_STEP the remainder is below 1e-14
+RATE_STEP = 0.35  # longest stretch of one series, in units of the fastest rate
+# Within a quarter of an oscillation acceleration rises while it is negative, and the force in the
+# band does not fall below its limit and come back; in longer samples every step is followed.
+QUARTER = 1.5
 SMALLEST_BAND = 1e-9  # m/s; a band of zero width would leave rest undefined
-RECIPROCALS = tuple(1.0 / (k + 1) for k in range(ORDER + 1))
 MAX_EVENTS = 200  # switches within one sample
+# Tuples, not arrays, go to what runs in an event: arrays would be counted in and out of each call.
+Parameters = tuple[float, float, float, float, float, float, float, float, float, float, float]
+Series = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
+
+
+@compiled_inline
+def parameters(p: Array, lane: int) -> Parameters:
+    """The kernel parameters of a lane of p (lanes, 11), in the order M ... K2."""
+    return (
+        p[lane, M],
+        p[lane, F_CP],
+        p[lane, F_CN],
+        p[lane, F_VP],
+        p[lane, F_VN],
+        p[lane, DV_P],
+        p[lane, DV_N],
+        p[lane, F_SP],
+        p[lane, F_SN],
+        p[lane, K1],
+        p[lane, K2],
+    )
+
+
+@compiled_inline
+def _term(k: int, alpha: float, beta: float, before: float, last: float) -> float:
+    """Coefficient k of the velocity's series from the two before it."""
+    return -(beta * (1.0 / (k * (k - 1)))) * before - alpha * (1.0 / k) * last
+
+
+@compiled_inline
+def series(v: float, phi: float, g: float, alpha: float, beta: float, w: float) -> Series:
+    """Power series in time of the velocity, of m v' = phi - f v, phi' = g - k2 v.
+
+    alpha = f/m, beta = k2/m, w = 1/m.
+    """
+    c1 = w * phi - alpha * v
+    c2 = 0.5 * (w * g - beta * v - alpha * c1)
+    c3 = _term(3, alpha, beta, c1, c2)
+    c4 = _term(4, alpha, beta, c2, c3)
+    c5 = _term(5, alpha, beta, c3, c4)
+    c6 = _term(6, alpha, beta, c4, c5)
+    c7 = _term(7, alpha, beta, c5, c6)
+    c8 = _term(8, alpha, beta, c6, c7)
+    c9 = _term(9, alpha, beta, c7, c8)
+    c10 = _term(10, alpha, beta, c8, c9)
+    c11 = _term(11, alpha, beta, c9, c10)
+    return v, c1, c2, c3, c4, c5, c6, c7, c8, c9, c10, c11
+
+
+@compiled_inline
+def power_sum(c: Series, t: float) -> float:
+    """Sum of c[k] t^k, by halves (Estrin), which is shorter than Horner's chain."""
+    t2 = t * t
+    t4 = t2 * t2
+    low = (c[0] + c[1] * t) + (c[2] + c[3] * t) * t2
+    middle = (c[4] + c[5] * t) + (c[6] + c[7] * t) * t2
+    high = (c[8] + c[9] * t) + (c[10] + c[11] * t) * t2
+    return low + (middle + high * t4) * t4
+
+
+@compiled_inline
+def motion(c: Series, t: float) -> tuple[float, float, float]:
+    """Distance [m], velocity [m/s] and acceleration [m/s^2] of the series `c` at `t` [s]."""
+    travel = (
+        c[0],
+        c[1] * (1.0 / 2.0),
+        c[2] * (1.0 / 3.0),
+        c[3] * (1.0 / 4.0),
+        c[4] * (1.0 / 5.0),
+        c[5] * (1.0 / 6.0),
+        c[6] * (1.0 / 7.0),
+        c[7] * (1.0 / 8.0),
+        c[8] * (1.0 / 9.0),
+        c[9] * (1.0 / 10.0),
+        c[10] * (1.0 / 11.0),
+        c[11] * (1.0 / 12.0),
+    )
+    slope = (
+        c[1],
+        2.0 * c[2],
+        3.0 * c[3],
+        4.0 * c[4],
+        5.0 * c[5],
+        6.0 * c[6],
+        7.0 * c[7],
+        8.0 * c[8],
+        9.0 * c[9],
+        10.0 * c[10],
+        11.0 * c[11],
+        0.0,
+    )
+    return t * power_sum(travel, t), power_sum(c, t), power_sum(slope, t)
+
+
+@compiled_inline
+def _quadratic_fall(value: float, slope: float, end: float, high: float) -> float:
+    """Time at which the parabola of these values at 0 and `high`, slope at 0, falls through 0."""
+    bend = (end - value - slope * high) / (high * high)
+    root = np.sqrt(max(0.0, slope * slope - 4.0 * bend * value))
+    tau = 2.0 * value / (root - slope) if slope <= 0.0 else (slope + root) / (-2.0 * bend)
+    return tau if 0.0 < tau < high else 0.5 * high
 
 
 @compiled
-def terms(x: float) -> int:
-    """Terms after which the series of exp(x), x <= RATE_STEP, is exact to about 1e-14."""
-    if x < 0.02:
-        return 6
-    if x < 0.1:
-        return 8
-    return 11 if x < 0.35 else ORDER
+def fall(
+    c: Series, at_0: float, g: float, k2: float, w: float, end: float, high: float
+) -> tuple[float, float]:
+    """Time in [0, high] at which at_0 + g t - k2 dy + w v falls through 0, and dy until then.
 
-
-@compiled
-def series(v: float, phi: float, g: float, m: float, f: float, k2: float, n: int, c: Array) -> None:
-    """Power series in time of velocity, c[0:n+1], of m v' = phi - f v, phi' = g - k2 v."""
-    per_mass = 1.0 / m
-    c[0] = v
-    drive = g
-    for k in range(n):
-        over = RECIPROCALS[k]
-        c[k + 1] = (phi - f * c[k]) * per_mass * over
-        phi = (drive - k2 * c[k]) * over
-        drive = 0.0
-
-
-@compiled
-def speed(c: Array, n: int, tau: float) -> float:
-    """Velocity [m/s] of the series `c` at time `tau` [s]."""
-    value = c[n]
-    for k in range(n - 1, -1, -1):
-        value = value * tau + c[k]
-    return value
-
-
-@compiled
-def travel(c: Array, n: int, tau: float) -> float:
-    """Distance [m] covered by the series `c` until `tau` [s]."""
-    value = c[n] * RECIPROCALS[n]
-    for k in range(n - 1, -1, -1):
-        value = value * tau + c[k] * RECIPROCALS[k]
-    return value * tau
-
-
-@compiled
-def acceleration(c: Array, n: int, tau: float) -> float:
-    """Acceleration [m/s^2] of the series `c` at time `tau` [s]."""
-    value = n * c[n]
-    for k in range(n - 1, 0, -1):
-        value = value * tau + k * c[k]
-    return value
-
-
-@compiled
-def speed_root(c: Array, n: int, level: float, low: float, high: float) -> float:
-    """Time in [low, high] at which the series passes `level`; one crossing is assumed."""
-    f_low = speed(c, n, low) - level
-    rising = f_low < 0.0
-    tau = 0.5 * (low + high)
-    for _ in range(60):
-        value = speed(c, n, tau) - level
-        if (value < 0.0) == rising:
+    end: the value at `high`, below 0. There is one such time: Newton within a bracket; the last
+    correction is of second order.
+    """
+    value = at_0 + w * c[0]
+    slope = g - k2 * c[0] + w * c[1]
+    if value <= 0.0 and slope <= 0.0:
+        return 0.0, 0.0
+    tau, low, top = _quadratic_fall(value, slope, end, high), 0.0, high
+    moved = 0.0
+    for _ in range(80):
+        moved, v, a = motion(c, tau)
+        value = at_0 + g * tau - k2 * moved + w * v
+        slope = g - k2 * v + w * a
+        if value > 0.0:
             low = tau
         else:
-            high = tau
-        slope = acceleration(c, n, tau)
-        change = value / slope if slope != 0.0 else high
-        if abs(change) <= 1e-15 + 1e-12 * high:
-            return tau - change
-        tau -= change
-        if not low < tau < high:
-            tau = 0.5 * (low + high)
-    return tau
+            top = tau
+        if slope < 0.0:
+            change = -value / slope
+            bend = change * (w * (c[2] + 3.0 * c[3] * tau) - 0.5 * k2 * a) / slope
+            near = abs(change) <= 1e-5 * high and abs(bend) <= 1e-6
+            if near or abs(change) <= 1e-15 + 1e-13 * high:
+                change -= change * bend
+                return tau + change, moved + change * (v + 0.5 * a * change)
+            tau += change
+        if slope >= 0.0 or not low < tau < top:
+            tau = 0.5 * (low + top)
+    return tau, moved
 
 
 @compiled
-def turning_point(c: Array, n: int, low: float, high: float) -> float:
-    """Time in [low, high] at which the acceleration changes sign."""
-    rising = acceleration(c, n, low) < 0.0
+def turning_point(c: Series, high: float) -> float:
+    """Time in [0, high] at which the acceleration, negative at first, changes sign."""
+    low = 0.0
     for _ in range(50):
         tau = 0.5 * (low + high)
-        if (acceleration(c, n, tau) < 0.0) == rising:
+        if motion(c, tau)[2] < 0.0:
             low = tau
         else:
             high = tau
@@ -117,114 +187,104 @@ def turning_point(c: Array, n: int, low: float, high: float) -> float:
 
 
 @compiled
-def force_root(
-    c: Array, n: int, force: float, g: float, k2: float, level: float, high: float
-) -> float:
-    """Last time in (0, high] at which force + g t - k2 dy(t) falls through `level`.
-
-    In the band the force is concave in time, so Newton from the right end stays on the right.
-    """
-    tau = high
-    for _ in range(60):
-        value = force + g * tau - k2 * travel(c, n, tau) - level
-        slope = g - k2 * speed(c, n, tau)
-        if slope >= 0.0:
-            return tau
-        step = value / slope
-        tau -= step
-        if tau <= 0.0:
-            return 0.0
-        if abs(step) <= 1e-15 + 1e-12 * tau:
-            return tau
-    return tau
-
-
-@compiled
-def settled_mode(p: Array, v: float, force: float) -> int:
+def settled_mode(p: Parameters, v: float, force: float) -> int:
     """Mode of a body at velocity `v` under `force`: eq. (1), with the edge of the band."""
-    slip_p = p[F_CP] + p[F_VP] * p[DV_P]
-    slip_n = -p[F_CN] + p[F_VN] * p[DV_N]
+    dv_p, dv_n, f_sp, f_sn = p[DV_P], p[DV_N], p[F_SP], p[F_SN]
+    slip_p = p[F_CP] + p[F_VP] * dv_p
+    slip_n = -p[F_CN] + p[F_VN] * dv_n
     mode = STUCK
-    if v > p[DV_P] or (v == p[DV_P] and force >= slip_p and force > p[F_SP]):
+    if v > dv_p or (v == dv_p and force >= slip_p and force > f_sp):
         mode = SLIP_P
-    elif v < p[DV_N] or (v == p[DV_N] and force <= slip_n and force < p[F_SN]):
+    elif v < dv_n or (v == dv_n and force <= slip_n and force < f_sn):
         mode = SLIP_N
-    elif force > p[F_SP]:
-        mode = EDGE_P if v == p[DV_P] else BAND_P
-    elif force < p[F_SN]:
-        mode = EDGE_N if v == p[DV_N] else BAND_N
+    elif force > f_sp:
+        mode = EDGE_P if v == dv_p else BAND_P
+    elif force < f_sn:
+        mode = EDGE_N if v == dv_n else BAND_N
     return mode
 
 
 @compiled
-def _first_exit(
-    mode: int, p: Array, v: float, force: float, g: float, left: float, c: Array
-) -> tuple[float, int, int]:
-    """Time until the mode ends and 1 (2: force limit), or time looked ahead and 0; series terms.
+def _sliding_exit(
+    slip: bool,
+    v: float,
+    force: float,
+    g: float,
+    left: float,
+    m: float,
+    coulomb: float,
+    viscous: float,
+    edge: float,
+    stick: float,
+    k2: float,
+) -> tuple[float, float, float, int]:
+    """Time, distance, velocity until a sliding (or band) mode in positive direction ends, and why.
 
-    Positive and negative direction are one case: mirrored by `side`.
+    Why: 1 at the edge of the band, 2 at the limit of the force, 0 where it lasts (the time is
+    then `left`, or less where one series does not reach that far).
     """
-    side = 1.0 if mode in (SLIP_P, BAND_P) else -1.0
-    slip = mode in (SLIP_P, SLIP_N)
-    k2 = p[K2]
-    if side > 0:
-        coulomb, viscous, edge, stick = p[F_CP], p[F_VP], p[DV_P], p[F_SP]
-    else:
-        coulomb, viscous, edge, stick = p[F_CN], p[F_VN], -p[DV_N], -p[F_SN]
-    f = viscous if slip else 0.0
-    rate = max(f / p[M], np.sqrt(k2 / p[M]))
-    span = min(left, RATE_STEP / rate) if rate > 0.0 else left
-    phi = side * force - (coulomb if slip else stick)
-    n = terms(rate * span)
-    series(side * v, phi, side * g, p[M], f, k2, n, c)
+    w = 1.0 / m
+    alpha, beta = (viscous * w if slip else 0.0), k2 * w
+    span = left
+    if alpha * left > RATE_STEP or beta * left * left > RATE_STEP * RATE_STEP:
+        span = min(left, RATE_STEP / max(alpha, np.sqrt(beta)))
+    c = series(v, force - (coulomb if slip else stick), g, alpha, beta, w)
+    moved, v_end, a_end = motion(c, span)
     if slip:
-        start, end = acceleration(c, n, 0.0), acceleration(c, n, span)
-        low = 0.0
-        if start > 0.0 and end < 0.0:
-            low = turning_point(c, n, 0.0, span)
-        elif start < 0.0 and end > 0.0:
-            dip = turning_point(c, n, 0.0, span)
-            if speed(c, n, dip) < edge:
-                return speed_root(c, n, edge, 0.0, dip), 1, n
-            return span, 0, n
-        if speed(c, n, span) < edge:
-            if c[0] <= edge and start <= 0.0:
-                return 0.0, 1, n
-            return speed_root(c, n, edge, low, span), 1, n
-        return span, 0, n
+        high = span
+        end = v_end
+        if end >= edge and c[1] < 0.0 < a_end and v + c[1] * span < edge:
+            high = turning_point(c, span)
+            end = motion(c, high)[1]
+        if end >= edge:
+            return span, moved, v_end, 0
+        tau, moved = fall(c, -edge, 0.0, 0.0, 1.0, end - edge, high)
+        return tau, moved, edge, 1
+    # Force first: in the band velocity rises as long as the force is above the limit, no longer.
     tau, found = span, 0
-    if speed(c, n, span) > edge:
-        tau, found = speed_root(c, n, edge, 0.0, span), 1
-    if side * force + side * g * tau - k2 * travel(c, n, tau) < stick:
-        tau, found = force_root(c, n, side * force, side * g, k2, stick, tau), 2
-    return tau, found, n
+    excess = force - stick
+    end = excess + g * span - k2 * moved
+    if end < 0.0:
+        tau, moved = fall(c, excess, g, k2, 0.0, end, span)
+        v_end, found = power_sum(c, tau), 2
+    if v_end > edge:
+        tau, moved = fall(c, edge, 0.0, 0.0, -1.0, edge - v_end, tau)
+        v_end, found = edge, 1
+    return tau, moved, v_end, found
 
 
-@compiled
-def _after_exit(mode: int, p: Array, force: float, found: int) -> tuple[float, int]:
+@compiled_inline
+def _after_exit(mode: int, p: Parameters, force: float, found: int) -> tuple[float, int]:
     """Velocity and mode after a sliding or band mode has ended at the edge or at the limit."""
     if found == 2:
         return 0.0, STUCK
+    f_sp, f_sn = p[F_SP], p[F_SN]
     if mode in (SLIP_P, BAND_P):
-        edge, slip = p[DV_P], p[F_CP] + p[F_VP] * p[DV_P]
-        if force > p[F_SP]:
-            return edge, (SLIP_P if mode == BAND_P and force >= slip else EDGE_P)
-        return (0.0, STUCK) if force >= p[F_SN] else (edge, BAND_N)
-    edge, slip = p[DV_N], -p[F_CN] + p[F_VN] * p[DV_N]
-    if force < p[F_SN]:
-        return edge, (SLIP_N if mode == BAND_N and force <= slip else EDGE_N)
-    return (0.0, STUCK) if force <= p[F_SP] else (edge, BAND_P)
+        edge = p[DV_P]
+        if force > f_sp:
+            slips = mode == BAND_P and force >= p[F_CP] + p[F_VP] * edge
+            return edge, (SLIP_P if slips else EDGE_P)
+        return (0.0, STUCK) if force >= f_sn else (edge, BAND_N)
+    edge = p[DV_N]
+    if force < f_sn:
+        slips = mode == BAND_N and force <= -p[F_CN] + p[F_VN] * edge
+        return edge, (SLIP_N if slips else EDGE_N)
+    return (0.0, STUCK) if force <= f_sp else (edge, BAND_P)
 
 
-@compiled
-def _held_exit(mode: int, p: Array, force: float, slope: float, left: float) -> tuple[float, int]:
+@compiled_inline
+def _held_exit(
+    mode: int, p: Parameters, force: float, slope: float, left: float
+) -> tuple[float, int]:
     """Time and next mode of a body at constant velocity (stuck, or along an edge)."""
     if mode == STUCK:
         low, high, below, above = p[F_SN], p[F_SP], BAND_N, BAND_P
     elif mode == EDGE_P:
-        low, high, below, above = p[F_SP], p[F_CP] + p[F_VP] * p[DV_P], STUCK, SLIP_P
+        low, below, above = p[F_SP], STUCK, SLIP_P
+        high = p[F_CP] + p[F_VP] * p[DV_P]
     else:
-        low, high, below, above = -p[F_CN] + p[F_VN] * p[DV_N], p[F_SN], SLIP_N, STUCK
+        high, below, above = p[F_SN], SLIP_N, STUCK
+        low = -p[F_CN] + p[F_VN] * p[DV_N]
     tau, following = left, mode
     if force + slope * left > high:
         tau, following = max(0.0, (high - force) / slope), above
@@ -235,44 +295,61 @@ def _held_exit(mode: int, p: Array, force: float, slope: float, left: float) -> 
 
 @compiled
 def resolve(
-    p: Array, y: float, v: float, force: float, mode: int, g: float, h: float, c: Array
+    p: Parameters, y: float, v: float, force: float, mode: int, g: float, h: float
 ) -> tuple[float, float, float, int]:
     """Position, velocity, force and mode after `h` [s], every switch on the way located.
 
-    p: parameters (11,); g: k1 u, or the slope of the force [N/s]; c: work space (ORDER + 1,).
+    p: from `parameters`; g: k1 u, or the slope of the force [N/s].
     """
-    left, k2 = h, p[K2]
-    for _ in range(MAX_EVENTS):
-        if left <= 0.0:
-            break
+    left, k2, switches = h, p[K2], 0
+    while left > 0.0 and switches < MAX_EVENTS:
         if mode in (STUCK, EDGE_P, EDGE_N):
             slope = g - k2 * v
             tau, following = _held_exit(mode, p, force, slope, left)
             y += v * tau
             force += slope * tau
             left -= tau
+            switches += 1
             if following == STUCK:
                 v = 0.0
             mode = following
             continue
-        tau, found, n = _first_exit(mode, p, v, force, g, left, c)
-        side = 1.0 if mode in (SLIP_P, BAND_P) else -1.0
-        moved = side * travel(c, n, tau)
+        if mode in (SLIP_P, BAND_P):
+            side, coulomb, viscous = 1.0, p[F_CP], p[F_VP]
+            edge, stick = p[DV_P], p[F_SP]
+        else:
+            side, coulomb, viscous = -1.0, p[F_CN], p[F_VN]
+            edge, stick = -p[DV_N], -p[F_SN]
+        tau, moved, v, found = _sliding_exit(
+            mode in (SLIP_P, SLIP_N),
+            side * v,
+            side * force,
+            side * g,
+            left,
+            p[M],
+            coulomb,
+            viscous,
+            edge,
+            stick,
+            k2,
+        )
+        v *= side
+        moved *= side
         y += moved
         force += g * tau - k2 * moved
-        v = side * speed(c, n, tau)
         left -= tau
         if found > 0:
+            switches += 1
             v, mode = _after_exit(mode, p, force, found)
     return y, v, force, mode
 
 
 @compiled
-def _free_response(m: float, f: float, k2: float, h: float, c: Array, row: Array) -> None:
+def _free_response(m: float, f: float, k2: float, h: float, row: Array) -> None:
     """Exact affine step over `h` of v and dy, from three basis responses, into `row`."""
     rate = max(f / m, np.sqrt(k2 / m))
-    pieces = int(np.ceil(rate * h / RATE_STEP)) if rate > 0.0 else 1
-    piece = h / max(1, pieces)
+    pieces = max(1, int(np.ceil(rate * h / RATE_STEP)))
+    piece = h / pieces
     for basis in range(3):
         v, phi, g, y = 0.0, 0.0, 0.0, 0.0
         if basis == 0:
@@ -281,80 +358,83 @@ def _free_response(m: float, f: float, k2: float, h: float, c: Array, row: Array
             phi = 1.0
         else:
             g = 1.0
-        for _ in range(max(1, pieces)):
-            series(v, phi, g, m, f, k2, ORDER, c)
-            moved = travel(c, ORDER, piece)
+        for _ in range(pieces):
+            moved, v, _ = motion(series(v, phi, g, f / m, k2 / m, 1.0 / m), piece)
             y += moved
             phi += g * piece - k2 * moved
-            v = speed(c, ORDER, piece)
         row[A11 + basis] = v
         row[P1 + basis] = y
 
 
 @compiled
-def mode_table(p: Array, h: float, c: Array, table: Array) -> None:
+def mode_table(p: Parameters, h: float, table: Array) -> None:
     """Fill `table` (MODES, COLUMNS) with the exact step of every mode over `h` [s]."""
+    m, f_sp, f_sn, k2 = p[M], p[F_SP], p[F_SN], p[K2]
     table[:, :] = 0.0
     table[:, V_LO] = -np.inf
     table[:, V_HI] = np.inf
     table[:, F_LO] = -np.inf
     table[:, F_HI] = np.inf
-    slip_p = p[F_CP] + p[F_VP] * p[DV_P]
-    slip_n = -p[F_CN] + p[F_VN] * p[DV_N]
-    table[STUCK, F_LO], table[STUCK, F_HI] = p[F_SN], p[F_SP]
+    table[STUCK, F_LO], table[STUCK, F_HI] = f_sn, f_sp
     for mode in (EDGE_P, EDGE_N):
         table[mode, A11], table[mode, P1] = 1.0, h
-    table[EDGE_P, F_LO], table[EDGE_P, F_HI] = p[F_SP], slip_p
-    table[EDGE_N, F_LO], table[EDGE_N, F_HI] = slip_n, p[F_SN]
+    table[EDGE_P, F_LO] = f_sp
+    table[EDGE_P, F_HI] = p[F_CP] + p[F_VP] * p[DV_P]
+    table[EDGE_N, F_LO] = -p[F_CN] + p[F_VN] * p[DV_N]
+    table[EDGE_N, F_HI] = f_sn
+    table[SLIP_P, C], table[SLIP_P, V_LO] = p[F_CP], p[DV_P]
+    table[SLIP_N, C], table[SLIP_N, V_HI] = -p[F_CN], p[DV_N]
+    table[BAND_P, C], table[BAND_P, V_HI], table[BAND_P, F_LO] = f_sp, p[DV_P], f_sp
+    table[BAND_N, C], table[BAND_N, V_LO], table[BAND_N, F_HI] = f_sn, p[DV_N], f_sn
     for mode in (SLIP_P, SLIP_N, BAND_P, BAND_N):
+        slip = mode in (SLIP_P, SLIP_N)
         f = 0.0
-        if mode == SLIP_P:
-            f, table[mode, C] = p[F_VP], p[F_CP]
-            table[mode, V_LO], table[mode, D_F], table[mode, D_V] = p[DV_P], 1.0, f
-        elif mode == SLIP_N:
-            f, table[mode, C] = p[F_VN], -p[F_CN]
-            table[mode, V_HI], table[mode, D_F], table[mode, D_V] = p[DV_N], -1.0, -f
-        elif mode == BAND_P:
-            table[mode, C], table[mode, V_HI], table[mode, F_LO] = p[F_SP], p[DV_P], p[F_SP]
-        else:
-            table[mode, C], table[mode, V_LO], table[mode, F_HI] = p[F_SN], p[DV_N], p[F_SN]
-        _free_response(p[M], f, p[K2], h, c, table[mode])
-        # With more than a third of an oscillation in a sample a dip could hide: always resolve.
-        if np.sqrt(p[K2] / p[M]) * h > 2.0 and mode in (SLIP_P, SLIP_N):
+        if slip:
+            f = p[F_VP] if mode == SLIP_P else p[F_VN]
+            table[mode, L1], table[mode, L2] = 1.0 - h * f / m, h / m
+        _free_response(m, f, k2, h, table[mode])
+        if np.sqrt(k2 / m) * h > QUARTER:  # an excursion could hide: always resolve
             table[mode, V_LO], table[mode, V_HI] = np.inf, -np.inf
 
 
 @compiled_inline
-def holds(row: Array, v: float, force: float, v_next: float, force_next: float) -> bool:
-    """Whether a step of the mode `row` stayed in its region, no dip within the sample."""
-    inside = v_next >= row[V_LO] and v_next <= row[V_HI]
-    inside = inside and force_next >= row[F_LO] and force_next <= row[F_HI]
-    before = row[D_F] * (force - row[C]) - row[D_V] * v
-    after = row[D_F] * (force_next - row[C]) - row[D_V] * v_next
-    return inside and not (before < 0.0 and after > 0.0)
+def mode_row(table: Array, mode: int) -> Row:
+    """The step of `mode` as local values, which the compiler keeps in registers."""
+    return (
+        table[mode, A11],
+        table[mode, A12],
+        table[mode, B1],
+        table[mode, P1],
+        table[mode, P2],
+        table[mode, P3],
+        table[mode, C],
+        table[mode, V_LO],
+        table[mode, V_HI],
+        table[mode, F_LO],
+        table[mode, F_HI],
+        table[mode, L1],
+        table[mode, L2],
+    )
 
 
-@compiled
-def step(
-    p: Array,
-    table: Array,
-    y: float,
-    v: float,
-    force: float,
-    mode: int,
-    g: float,
-    h: float,
-    c: Array,
-) -> tuple[float, float, float, int]:
-    """One sample: the exact step where the mode holds, else from event to event."""
-    row = table[mode]
+@compiled_inline
+def exact_step(
+    row: Row, k2: float, h: float, v: float, force: float, g: float
+) -> tuple[float, float, float, bool]:
+    """Distance, velocity and force after one sample in the mode `row`, and whether it left it.
+
+    In a sample that begins with negative acceleration and ends with positive, v + h v'(0) bounds
+    the dip in between (see QUARTER); in the modes other than sliding the bound is 0.
+    """
     phi = force - row[C]
     moved = row[P1] * v + row[P2] * phi + row[P3] * g
     v_next = row[A11] * v + row[A12] * phi + row[B1] * g
-    force_next = force + g * h - p[K2] * moved
-    if holds(row, v, force, v_next, force_next):
-        return y + moved, v_next, force_next, mode
-    return resolve(p, y, v, force, mode, g, h, c)
+    force_next = force + g * h - k2 * moved
+    bound = row[L1] * v + row[L2] * phi
+    out = (v_next < row[V_LO]) | (v_next > row[V_HI])
+    out |= (bound < row[V_LO]) | (bound > row[V_HI])
+    out |= (force_next < row[F_LO]) | (force_next > row[F_HI])
+    return moved, v_next, force_next, out
 
 
 def kernel_parameters(nine: Array, k1: float, k2: float) -> Array:

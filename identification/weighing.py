@@ -100,6 +100,8 @@ def weigh_correlated(
         # What the force does between samples is not known: it is taken as linear.
         floor = BETWEEN * np.abs(pack(runs, optimum.p, optimum.starts, optimum.free))
         covariance = 2.0 * covariance + np.diag(floor**2)
+    if not np.all(np.isfinite(covariance)):
+        covariance = np.diag(np.abs(pack(runs, optimum.p, optimum.starts, optimum.free)) ** 2)
     center = pack(runs, optimum.p, optimum.starts, optimum.free)
     members = rng.multivariate_normal(center, covariance, 1024, check_valid="ignore")
     keep_near(members, optimum.free, optimum.p)

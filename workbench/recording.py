@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from design.loop import ForcePI, LoopNoise, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
+from identification.arrays import Array
 from identification.errors import BadCard
 from identification.excitation import reference_signal
 from identification.karnopp import NAMES, UNITS
@@ -14,8 +16,9 @@ from identification.log import Log
 from identification.plant import Actuator, Motor
 from identification.simulate import free_run
 from workbench import recipe as recipes
-from workbench.closed_loop import ForcePI, Noise, simulate_loop
+from workbench.card import Card
 from workbench.recipe import Recipe
+from workbench.units import scale
 
 COLUMNS = ("t", "r", "y", "F", "u")
 
@@ -40,11 +43,29 @@ def record(name: str, recipe: Recipe, seed: int | None = None) -> Log:
         ForcePI(recipe.loop.force.k_i, recipe.loop.force.T_i) if recipe.loop.force else None,
         reference,
         recipe.h,
-        rng,
-        noise=Noise(recipe.noise_y, recipe.noise_F),
-        limit=recipe.loop.control_limit,
+        noise=LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng),
+        control_limit=recipe.loop.control_limit,
     )
-    return Log(name, {"t": recipe.t, "r": run.r, "y": run.y_m, "F": run.F_m, "u": run.u})
+    signals = {"r": run.r, "y": run.y_measured, "F": run.F_measured, "u": run.u}
+    return Log(name, {"t": recipe.t, **signals})
+
+
+def as_columns(log: Log, card: Card) -> dict[str, Array]:
+    """The log's signals by the card's columns and in its units, as `read_log` reads them back.
+
+    Raises BadCard where the card names a signal that the simulation does not make.
+    """
+    out: dict[str, Array] = {}
+    for name, spec in card.signals.items():
+        if name not in log:
+            raise BadCard(
+                f"{card.path}: signals.{name} is not simulated (there is: {', '.join(COLUMNS)});"
+                " take it out of the recipe's card"
+            )
+        factor, shift = scale(spec.unit, name, card.rig().motion)
+        values = (log[name] - shift) / factor
+        out[str(spec.column)] = spec.gain * values + spec.offset
+    return out
 
 
 def truth(name: str, recipe: Recipe, seed: int | None = None) -> dict[str, Any]:
@@ -66,18 +87,22 @@ def truth(name: str, recipe: Recipe, seed: int | None = None) -> dict[str, Any]:
 
 
 def _position(recipe: Recipe) -> RST:
-    """The recipe's position controller as RST at the recipe's period."""
+    """The recipe's position controller as RST at the recipe's period; volts for a motor."""
     assert recipe.loop is not None
     match recipe.loop.position:
         case recipes.PD(k_d, T_d, eps):
-            return pd_to_rst(k_d, T_d, eps, recipe.h)
+            found = pd_to_rst(k_d, T_d, eps, recipe.h)
         case recipes.PID(k_R, T_d, T_i, eps):
-            return pid_to_rst(k_R, T_i, T_d, eps, recipe.h)
+            found = pid_to_rst(k_R, T_i, T_d, eps, recipe.h)
         case recipes.RST(R, S, T):
-            return RST(np.array(R), np.array(S), np.array(T), recipe.h)
+            found = RST(np.array(R), np.array(S), np.array(T), recipe.h)
+    actuator = recipe.plant.actuator
+    if isinstance(actuator, Motor):
+        return RST(found.R / actuator.k_a, found.S, found.T / actuator.k_a, recipe.h)
+    return found
 
 
-def _open_loop(name: str, recipe: Recipe, u: Any, rng: np.random.Generator) -> Log:
+def _open_loop(name: str, recipe: Recipe, u: Array, rng: np.random.Generator) -> Log:
     """The reference as the command, no loop around the plant."""
     match recipe.plant.actuator:
         case Motor(k_a):

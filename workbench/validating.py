@@ -2,25 +2,30 @@
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from itertools import pairwise
 from typing import Any, Literal
 
 import numpy as np
 
+from design.loop import LoopRun
 from design.margins import margins
+from design.rst import closed_loop_poles
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from workbench.closed_loop import ForcePI, Noise, Trace, simulate_loop
+from workbench.closed_loop import loop_period, run_loop
 from workbench.model import Model
 from workbench.tuning import Controller, Design, Linear, MarginValues, margin_values, sampled_plant
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
 SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
-DWELLS = 30.0  # length of a step, in units of 1/w_n
+DWELLS = 15.0  # length of a step, in time constants of the slowest loop
 SHORTEST_DWELL = 1.0  # s
+LAST_DWELL = 10.0  # s
 LAST = 0.5  # part of a dwell that is judged
+WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
 CYCLES = 3  # reversals in the judged part that make a limit cycle
-ESCAPED = 10.0  # times the travel
+ESCAPED = 10.0  # times the step
 
 
 @dataclass(frozen=True)
@@ -87,8 +92,8 @@ class Validation:
 class Traces:
     """The simulated loops behind one entry of a validation."""
 
-    step: Trace
-    smooth: Trace
+    step: LoopRun
+    smooth: LoopRun
 
 
 def validate(
@@ -107,19 +112,21 @@ def validate(
     from workbench.model import versions
 
     limits = limits or Limits()
+    reference = references(model, found)
     plants = {"model": model} | ({"plant": plant} if plant else {})
     figures: dict[str, dict[str, Figures]] = {}
     traces: dict[tuple[str, str], Traces] = {}
     for name, controller in found.controllers.items():
         figures[name] = {}
         for place, machine in plants.items():
-            run = _traces(machine, found, controller, rng)
+            step, smooth = (run_loop(machine, found, controller, r, rng) for r in reference)
+            run = Traces(step, smooth)
             traces[name, place] = run
             figures[name][place] = _figures(machine, found, controller, run, limits)
-    judged = found.recommended if found.recommended in figures else next(iter(figures))
+    judged = judged_of(found)
     return Validation(
         card=model.card,
-        judged="rst" if judged == "rst" else "pid",
+        judged=judged,
         passed=all(one.passed for one in figures[judged].values()),
         limits=limits,
         figures=figures,
@@ -128,44 +135,45 @@ def validate(
     ), traces
 
 
-def _traces(machine: Model, found: Design, one: Controller, rng: np.random.Generator) -> Traces:
-    """Both references through the loop; levels from the travel that the logs have shown."""
+def references(machine: Model, found: Design) -> tuple[Array, Array]:
+    """Steps and the smooth reference [m], the same for every controller and plant.
+
+    Levels from the travel that the logs have shown; the last one is held for long, since a limit
+    cycle of an integrator against stiction may take seconds.
+    """
     low, high = machine.travel
     step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
-    dwell = max(DWELLS / one.dominant[0], SHORTEST_DWELL)
-    h = found.force.h if found.force else found.plant.h
-    n = round(dwell / h)
-    levels = np.repeat(np.array([0.0, step, -step, 0.0]), n)
-    w = SMOOTH_SPEED * one.dominant[0]
+    h = loop_period(found)
+    n = round(max(DWELLS * slowest(found), SHORTEST_DWELL) / h)
+    counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
+    levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
+    w = SMOOTH_SPEED * found.controllers[judged_of(found)].dominant[0]
     t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
-    smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
-    return Traces(_run(machine, found, one, levels, rng), _run(machine, found, one, smooth, rng))
+    return levels, amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
 
 
-def _run(
-    machine: Model, found: Design, one: Controller, r: Array, rng: np.random.Generator
-) -> Trace:
-    """One reference through the loop, with the noise and the limit of the machine."""
-    force = found.force
-    return simulate_loop(
-        machine.simulated,
-        one.rst,
-        ForcePI(force.k_i, force.T_i) if force else None,
-        r,
-        force.h if force else one.h,
-        rng,
-        noise=Noise(machine.fit.noise_y, machine.fit.noise_F),
-        limit=machine.rig.control_limit,
+def slowest(found: Design) -> float:
+    """Time constant [s] of the slowest pole of all loops on the design's plant."""
+    radius = max(
+        float(np.abs(closed_loop_poles(found.plant.A, found.plant.B, one.rst)[0]))
+        for one in found.controllers.values()
     )
+    return -found.plant.h / float(np.log(min(radius, 0.9999)))
+
+
+def judged_of(found: Design) -> Literal["rst", "pid"]:
+    """The controller that decides: the recommended one, or the one there is."""
+    if found.recommended in found.controllers:
+        return found.recommended
+    return "rst" if found.rst else "pid"
 
 
 def _figures(
     machine: Model, found: Design, one: Controller, run: Traces, limits: Limits
 ) -> Figures:
-    low, high = machine.travel
-    step = STEP_SHARE * (high - low)
-    stable = bool(np.all(np.abs(run.step.y) < ESCAPED * (high - low)))
+    step = float(np.max(run.step.r))
+    stable = bool(np.all(np.abs(run.step.y) < ESCAPED * step))
     judged = _judged(run.step)
     standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
     smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
@@ -192,17 +200,17 @@ def _shallow(value: Figures) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__dataclass_fields__}
 
 
-def _judged(trace: Trace) -> Any:
+def _judged(trace: LoopRun) -> Any:
     """The last half of every dwell, True at its samples."""
     change = np.flatnonzero(np.diff(trace.r)) + 1
     starts = np.concatenate([[0], change, [len(trace.r)]])
     keep = np.zeros(len(trace.r), dtype=bool)
-    for low, high in zip(starts[:-1], starts[1:], strict=True):
+    for low, high in pairwise(starts.tolist()):
         keep[high - round(LAST * (high - low)) : high] = True
     return keep
 
 
-def _overshoot(trace: Trace, step: float) -> float:
+def _overshoot(trace: LoopRun, step: float) -> float:
     """Largest overshoot of a step, relative to its height."""
     change = np.flatnonzero(np.diff(trace.r)) + 1
     ends = np.append(change[1:], len(trace.r))
@@ -214,7 +222,7 @@ def _overshoot(trace: Trace, step: float) -> float:
     return worst
 
 
-def limit_cycle(trace: Trace, noise: float) -> LimitCycle | None:
+def limit_cycle(trace: LoopRun, noise: float) -> LimitCycle | None:
     """A motion under the last constant reference that does not end; None where it does.
 
     It must reverse `CYCLES` times, by more than five times the position's noise, and the last
@@ -293,9 +301,11 @@ def _remarks(figures: Mapping[str, Figures], found: Design) -> list[str]:
     out = ["the compensator is not part of this loop yet: friction is met by feedback alone"]
     for place, one in figures.items():
         if one.limit_cycle:
+            weak = one.margins is None or one.margins.modulus < WEAK
+            cause = "too little margin" if weak else "as an integrator against stiction makes"
             out.append(
                 f"limit cycle on the {place}: {one.limit_cycle.amplitude:.3g} peak to peak every"
-                f" {one.limit_cycle.period:.3g} s, as an integrator against stiction makes"
+                f" {one.limit_cycle.period:.3g} s, {cause}"
             )
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")

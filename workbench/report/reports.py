@@ -1,5 +1,7 @@
 """The reports that commands write: which sections, in which order, under which words."""
 
+from collections.abc import Mapping
+
 from workbench.pipeline import Identified
 from workbench.predicting import fitted_run
 from workbench.report.controllers import (
@@ -10,10 +12,13 @@ from workbench.report.controllers import (
 )
 from workbench.report.fit import fit
 from workbench.report.friction import friction_curve
+from workbench.report.loop import judged, loop
 from workbench.report.page import Section, page, render
 from workbench.report.parameters import parameters
 from workbench.report.residual import residual
 from workbench.tuning import Design
+from workbench.validating import Traces, Validation
+from workbench.validation_views import verdict
 from workbench.views import fit_lines, summary
 
 
@@ -40,3 +45,12 @@ def design_report(found: Design) -> str:
     )
     sections = (controllers(found), step_response(found), sensitivity(found), coefficients(found))
     return page(f"Design for {found.card}", lead, sections)
+
+
+def validation_report(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool
+) -> str:
+    """HTML: whether the design holds in simulation, and what the loop does."""
+    places = dict.fromkeys(place for _, place in traces)
+    sections = (judged(found), *(loop(traces, place, rotary) for place in places))
+    return page(f"Validation for {found.card}", f"{verdict(found)}.", sections)

@@ -1,0 +1,332 @@
+"""Closed loop in simulation: position controller, force loop, noise, actuator, Karnopp plant.
+
+Paper, figure 5, its sampled version, figure 10, and figure 1, upper part (a motor); without the
+compensator. Continuous controllers are sampled at h by `design.pid`.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.signal import lfilter
+
+from design.loop_kernels import (
+    RECORD_F,
+    RECORD_MODE,
+    RECORD_U,
+    RECORD_V,
+    RECORD_Y,
+    RECORDS,
+    loop_kernel,
+    loops_kernel,
+    motor_kernel,
+)
+from design.rst import RST
+from identification.arrays import Array, IntArray, frozen
+from identification.block import WIDTH
+from identification.errors import BadModel
+from identification.plant import Actuator, Motor, Plant
+from identification.stepping import kernel_parameters
+
+
+@dataclass(frozen=True)
+class ForcePI:
+    """Force controller k_i (1 + h z^-1/(T_i (1 - z^-1))); k_i [V/N], T_i [s]. Paper, eq. (9).
+
+    Raises BadModel where a value is not finite or T_i is not positive.
+    """
+
+    k_i: float
+    T_i: float
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.k_i) and math.isfinite(self.T_i) and self.T_i > 0):
+            raise BadModel(f"k_i = {self.k_i:g} V/N, T_i = {self.T_i:g} s: need T_i > 0, finite")
+
+
+@dataclass(frozen=True, eq=False)
+class LoopNoise:
+    """Noise of the sensors, added to y [m] and F [N] at every sample: (n,), or (n, plants)."""
+
+    y: Array
+    F: Array
+
+    @classmethod
+    def draw(cls, n: int, sd_y: float, sd_F: float, rng: np.random.Generator) -> "LoopNoise":
+        """White noise of these standard deviations, `n` samples."""
+        return cls(frozen(sd_y * rng.standard_normal(n)), frozen(sd_F * rng.standard_normal(n)))
+
+
+@dataclass(frozen=True, eq=False)
+class LoopRun:
+    """One run of the loop: t [s], r, y [m], v [m/s], F [N], u [V] and mode, shape (n,).
+
+    y, v, F are the plant's own; y_measured, F_measured what the controllers see of them. From
+    `simulate_loops` all but t and r have the shape (n, plants).
+    """
+
+    t: Array
+    r: Array
+    y: Array
+    v: Array
+    F: Array
+    y_measured: Array
+    F_measured: Array
+    u: Array
+    mode: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCosts:
+    """Sums over the samples of a window, per plant: (r - y)^2 [m^2] and u^2 [V^2], (plants,)."""
+
+    squared_error: Array
+    squared_command: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedLoop:
+    """A loop as the kernels take it."""
+
+    motor: bool
+    reference: Array
+    feed: Array
+    R: Array
+    S: Array
+    x: Array
+    pi: tuple[float, float]
+    limit: float
+    noise: LoopNoise
+    start: tuple[float, float, float]
+
+
+def simulate_loop(
+    plant: Plant,
+    controller: RST,
+    force_controller: ForcePI | None,
+    reference: ArrayLike,
+    h: float,
+    *,
+    noise: LoopNoise | None = None,
+    control_limit: float | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> LoopRun:
+    """The loop of figure 5 (figure 10) with an Actuator, of figure 1 with a Motor.
+
+    controller: (T r - R y)/S gives the force reference [N], with a Motor the command [V], sampled
+    at h [s]; force_controller: from the force error to the command, None with a Motor; reference:
+    r [m], (n,); control_limit: |u| [V] at most. start: y [m], v [m/s], F [N] at the first sample,
+    before which the loop was at rest with r = y and no command.
+
+    A clipped command holds the PI's integral while the error would drive it further; with a Motor
+    the controller's recursion takes the command as clipped. The plant is stepped exactly: the run
+    does not depend on an internal step. Raises BadModel where the parts do not fit together.
+    """
+    loop = _prepared(
+        [plant], controller, force_controller, reference, h, noise, control_limit, start
+    )
+    n = len(loop.feed)
+    out, modes = np.empty((4, n)), np.empty(n, dtype=np.int64)
+    p, x = _parameters([plant]), loop.x.copy()
+    y_noise, f_noise = (np.ascontiguousarray(a[:, 0]) for a in (loop.noise.y, loop.noise.F))
+    common = (p, h, loop.feed, loop.R, loop.S, x)
+    if loop.motor:
+        motor_kernel(*common, loop.limit, y_noise, loop.start, out, modes)
+    else:
+        loop_kernel(*common, loop.pi, loop.limit, y_noise, f_noise, loop.start, out, modes)
+    y, v, F, u = out
+    return _run(loop, h, (y, v, F, u, modes), LoopNoise(y_noise, f_noise))
+
+
+def simulate_loops(
+    plants: Sequence[Plant],
+    controller: RST,
+    force_controller: ForcePI | None,
+    reference: ArrayLike,
+    h: float,
+    *,
+    noise: LoopNoise | None = None,
+    control_limit: float | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> LoopRun:
+    """`simulate_loop` for many plants under one controller, all at once: traces (n, plants).
+
+    noise: (n,) for all plants, or (n, plants). All plants have an Actuator, or all a Motor.
+    """
+    loop = _prepared(
+        plants, controller, force_controller, reference, h, noise, control_limit, start
+    )
+    traces, _ = _many(plants, loop, h, (0, 0), record=True)
+    keep = traces[:, :, : len(plants)]
+    modes = keep[RECORD_MODE].astype(np.int64)
+    run = keep[RECORD_Y], keep[RECORD_V], keep[RECORD_F], keep[RECORD_U], modes
+    noise_y, noise_F = (a[:, : len(plants)] for a in (loop.noise.y, loop.noise.F))
+    return _run(loop, h, run, LoopNoise(noise_y, noise_F))
+
+
+def loop_costs(
+    plants: Sequence[Plant],
+    controller: RST,
+    force_controller: ForcePI | None,
+    reference: ArrayLike,
+    h: float,
+    *,
+    noise: LoopNoise | None = None,
+    control_limit: float | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    window: tuple[int, int] | None = None,
+) -> LoopCosts:
+    """Squared error and command of `simulate_loops` over the samples `window`, no trace kept.
+
+    window: first sample and the one after the last; all samples where it is None.
+    """
+    loop = _prepared(
+        plants, controller, force_controller, reference, h, noise, control_limit, start
+    )
+    _, costs = _many(plants, loop, h, window or (0, len(loop.feed)), record=False)
+    return LoopCosts(costs[0, : len(plants)], costs[1, : len(plants)])
+
+
+def _many(
+    plants: Sequence[Plant], loop: PreparedLoop, h: float, window: tuple[int, int], record: bool
+) -> tuple[Array, Array]:
+    padded = -(-len(plants) // WIDTH) * WIDTH
+    p = _parameters([*plants, *[plants[-1]] * (padded - len(plants))])
+    n = len(loop.feed)
+    traces, costs = np.empty((RECORDS, n if record else 0, padded)), np.empty((2, padded))
+    common = (h, loop.motor, loop.reference, loop.feed, loop.R, loop.S, loop.x, loop.pi, loop.limit)
+    weights = np.zeros(n)
+    weights[window[0] : window[1]] = 1.0
+    noise = tuple(_in_blocks(a, padded) for a in (loop.noise.y, loop.noise.F))
+    loops_kernel(p, *common, noise[0], noise[1], loop.start, weights, traces, costs)
+    return traces, costs
+
+
+def _in_blocks(noise: Array, width: int) -> Array:
+    """Noise (n, plants) as the kernel takes it: (blocks, n, WIDTH); (n, 1) as (1, n, 1)."""
+    n, plants = noise.shape
+    if plants == 1:
+        return noise[np.newaxis]
+    blocks = np.pad(noise, ((0, 0), (0, width - plants))).reshape(n, -1, WIDTH)
+    return np.ascontiguousarray(blocks.transpose(1, 0, 2))
+
+
+def _run(
+    loop: PreparedLoop,
+    h: float,
+    traces: tuple[Array, Array, Array, Array, IntArray],
+    noise: LoopNoise,
+) -> LoopRun:
+    y, v, F, u, mode = traces
+    t = h * np.arange(len(loop.feed), dtype=np.float64)
+    return LoopRun(t, loop.reference, y, v, F, y + noise.y, F + noise.F, u, mode)
+
+
+def _parameters(plants: Sequence[Plant]) -> Array:
+    return np.stack([kernel_parameters(p.friction.array, *_actuation(p)) for p in plants])
+
+
+def _actuation(plant: Plant) -> tuple[float, float]:
+    match plant.actuator:
+        case Actuator(k1, k2):
+            return k1, k2
+        case Motor(k_a):
+            return k_a, 0.0  # the kernels take k_a in the place of k1
+        case None:
+            raise BadModel("the plant has no actuator: a loop needs one, or a motor")
+
+
+def prepared_loop(
+    plants: Sequence[Plant],
+    controller: RST,
+    force_controller: ForcePI | None,
+    reference: ArrayLike,
+    h: float,
+    noise: LoopNoise | None = None,
+    control_limit: float | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> tuple[PreparedLoop, Array]:
+    """What the kernels take of a loop, and its plants' parameters (plants, 11)."""
+    parts = (controller, force_controller, reference, h, noise, control_limit, start)
+    return _prepared(plants, *parts), _parameters(plants)
+
+
+def _prepared(
+    plants: Sequence[Plant],
+    controller: RST,
+    force_controller: ForcePI | None,
+    reference: ArrayLike,
+    h: float,
+    noise: LoopNoise | None,
+    control_limit: float | None,
+    start: tuple[float, float, float],
+) -> PreparedLoop:
+    r = frozen(reference)
+    motors = {isinstance(plant.actuator, Motor) for plant in plants}
+    if len(motors) != 1:
+        raise BadModel(
+            f"{len(plants)} plants, of {len(motors)} kinds: need one or more of one kind"
+        )
+    motor = motors.pop()
+    if motor == (force_controller is not None):
+        need = "no force controller" if motor else "a force controller"
+        raise BadModel(
+            f"the loop of a plant with {'a motor' if motor else 'an actuator'} has {need}"
+        )
+    if abs(controller.h - h) > 1e-9 * h:
+        raise BadModel(f"controller sampled at {controller.h:g} s, loop at {h:g} s; must be one")
+    if r.ndim != 1 or not np.all(np.isfinite(r)):
+        raise BadModel(f"reference of shape {r.shape}: need finite values, one per sample")
+    if control_limit is not None and not control_limit > 0:
+        raise BadModel(f"control limit {control_limit:g} V, must be > 0")
+    R, S, x = _observer_form(controller, start[0])
+    k_i, T_i = (force_controller.k_i, force_controller.T_i) if force_controller else (0.0, 1.0)
+    return PreparedLoop(
+        motor=motor,
+        reference=r,
+        feed=_feed(controller, r, start[0]),
+        R=R,
+        S=S,
+        x=x,
+        pi=(k_i, k_i * h / T_i),
+        limit=math.inf if control_limit is None else control_limit,
+        noise=_checked_noise(noise, len(r), len(plants), motor),
+        start=(0.0 + start[0], 0.0 + start[1], 0.0 + start[2]),
+    )
+
+
+def _checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) -> LoopNoise:
+    """Noise as (n, 1) or (n, plants); a motor's force is not measured."""
+    if noise is None:
+        return LoopNoise(np.zeros((n, 1)), np.zeros((n, 1)))
+    columns = []
+    for name, values in (("y", noise.y), ("F", noise.F)):
+        a = np.asarray(values, dtype=np.float64)
+        a = a[:, np.newaxis] if a.ndim == 1 else a
+        if a.shape not in ((n, 1), (n, plants)):
+            raise BadModel(f"noise of {name}: shape {values.shape}, need ({n},) or ({n}, {plants})")
+        columns.append(np.ascontiguousarray(a))
+    return LoopNoise(columns[0], np.zeros((n, 1)) if motor else columns[1])
+
+
+def _observer_form(controller: RST, y_0: float) -> tuple[Array, Array, Array]:
+    """R, S of one length (deg+1,), deg >= 2, S[0] = 1; the state that a past of y = y_0 leaves."""
+    size = max(controller.R.size, controller.S.size, 3)
+    R = np.pad(controller.R, (0, size - controller.R.size)) / controller.S[0]
+    S = np.pad(controller.S, (0, size - controller.S.size)) / controller.S[0]
+    x = np.append(-y_0 * np.cumsum(R[:0:-1])[::-1], 0.0)
+    return R, S, x
+
+
+def _feed(controller: RST, r: Array, y_0: float) -> Array:
+    """T B_m/A_m r, (n,), after a past of r = y_0."""
+    b = np.convolve(controller.T, controller.B_m) / controller.S[0]
+    steady = y_0 * b.sum() / controller.A_m.sum()
+    size = max(b.size, controller.A_m.size)
+    b = np.pad(b, (0, size - b.size)) / controller.A_m[0]
+    a = np.pad(controller.A_m, (0, size - controller.A_m.size)) / controller.A_m[0]
+    # State of the direct form II transposed at rest: input y_0, output `steady`.
+    z = np.cumsum((y_0 * b - steady * a)[:0:-1])[::-1]
+    return np.asarray(lfilter(b, a, r, zi=z)[0], dtype=np.float64)

@@ -1,0 +1,178 @@
+"""Friction where the motion is imposed and the force is what is measured.
+
+A rig that drives the body along a given path shows friction as a force, not in the response: a
+free run has nothing to follow there. The parameters then come from the force equation alone, and
+those that only a free body shows (mass in slow motion, stick limits, band) are not given.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.identifiability import Events, estimates
+from identification.inverse_model import NAMES as SLIDING_NAMES
+from identification.inverse_model import Regression, Smoothing, regression
+from identification.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
+from identification.log import Log, Rig
+from identification.residual_tests import effective_samples
+from identification.result import Estimate, KarnoppFit, LogFit
+from identification.start import measured_start
+from identification.three_step import FirstEstimate
+
+SLOW = 0.1  # share of the force below which inertia says nothing of a free body
+CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
+COLUMNS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
+WHY_NOT = {
+    "m": "inertia explains {share:.1%} of the force, so it is not told apart; log faster motion",
+    "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
+    " add runs at other speeds",
+    "stick": "the motion is imposed, so no force builds up against a stuck body that is free to"
+    " break away; log the body driven by a force",
+}
+
+
+@dataclass(frozen=True)
+class ForceFit:
+    """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia."""
+
+    used: tuple[int, ...]
+    theta: Array
+    covariance: Array
+    residuals: tuple[Array, ...]
+    rms: float
+    relative: float
+    share: float
+
+
+def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -> bool:
+    """Whether the logs show a body led along a path: no command, and inertia of no account."""
+    if rig.kind == "motor" or any("u" in log for log in logs):
+        return False
+    shares = []
+    for log, first in zip(logs, firsts, strict=True):
+        m = first.sliding.m if first.sliding is not None else 0.0
+        inertia = abs(m) * float(np.std(first.motion.a))
+        shares.append(inertia / max(float(np.std(log["F"])), 1e-300))
+    return float(np.median(shares)) < SLOW or all(first.sliding is None for first in firsts)
+
+
+def fit_imposed(
+    logs: Sequence[Log], firsts: Sequence[FirstEstimate], rng: np.random.Generator, rig: Rig
+) -> KarnoppFit:
+    """Sliding friction from the force equation, the rest named as not identifiable.
+
+    Raises NotIdentifiable where no log slides enough in both directions.
+    """
+    data = [regression(log, Smoothing()) for log in logs]
+    fit = _best(data)
+    center = np.zeros(5)
+    center[list(fit.used)] = fit.theta
+    samples = np.tile(center, (1024, 1))
+    drawn = rng.multivariate_normal(fit.theta, fit.covariance, 1024, check_valid="ignore")
+    samples[:, list(fit.used)] = drawn
+    nine = _assumed(center, firsts)
+    friction = Karnopp.from_array(nine)
+    found = _estimates(fit, nine, samples, data, rig, _name(logs))
+    names = tuple(SLIDING_NAMES[i] for i in fit.used)
+    return KarnoppFit(
+        friction=friction,
+        actuator=None,
+        estimates=found,
+        free=names,
+        covariance=fit.covariance,
+        samples=drawn,
+        drive="force",
+        stiffness=0.0,
+        noise_y=float(np.median([first.motion.noise for first in firsts])),
+        noise_F=fit.rms,
+        chi_square=1.0,
+        adequate=False,
+        logs=tuple(
+            LogFit(log.name, measured_start(log), float("nan"), float(np.std(part)), 1.0)
+            for log, part in zip(logs, fit.residuals, strict=True)
+        ),
+        breakaways=(0, 0),
+        evaluations=0,
+        remarks=(
+            "no free run follows this log (the motion is imposed, or an effect is missing): fitted"
+            f" on the force equation, which leaves {fit.rms:.3g} N, {100 * fit.relative:.1f} % of"
+            " the force",
+        ),
+    )
+
+
+def _best(data: Sequence[Regression]) -> ForceFit:
+    """The largest set of columns that the motion tells apart."""
+    columns = np.concatenate([part.columns for part in data])
+    force = np.concatenate([part.force for part in data])
+    inertia = 0.0
+    for name in ("all", "no mass", "constant"):
+        used = COLUMNS[name]
+        chosen = columns[:, used]
+        size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
+        theta = np.linalg.lstsq(chosen / size, force, rcond=None)[0] / size
+        residual = force - chosen @ theta
+        if name == "all":
+            size_of_force = max(float(np.std(force)), 1e-300)
+            inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / size_of_force
+            if theta[0] <= 0 or inertia < SLOW:
+                continue
+        if float(np.linalg.cond(chosen / size)) < CONDITION:
+            break
+    lengths = np.cumsum([len(part.force) for part in data])[:-1]
+    parts = tuple(np.split(residual, lengths))
+    independent = effective_samples([part for part in parts if len(part) > 8])
+    inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
+    variance = float(np.mean(residual**2)) * len(residual) / max(independent - len(used), 1.0)
+    return ForceFit(
+        used=used,
+        theta=theta,
+        covariance=inverse * variance,
+        residuals=parts,
+        rms=float(np.sqrt(np.mean(residual**2))),
+        relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),
+        share=inertia,
+    )
+
+
+def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
+    """All nine for simulation: the five of sliding kept to their signs, stick just above slip."""
+    nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
+    m = center[0] if center[0] > 0 else nine[0]
+    least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
+    coulomb = np.maximum(center[1:3], least)
+    viscous = np.maximum(center[3:5], 0.0)
+    fastest = float(np.median([float(np.max(np.abs(f.motion.v))) for f in firsts]))
+    edge = np.minimum(nine[5:7], 0.1 * fastest)
+    stick = coulomb + viscous * edge
+    return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
+
+
+def _estimates(
+    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Regression], rig: Rig, name: str
+) -> dict[str, Estimate]:
+    """The five with intervals, the others with the reason."""
+    units = ROTARY_UNITS if rig.motion == "rotary" else UNITS
+    up = int(sum(np.count_nonzero(part.columns[:, 1] > 0.5) for part in data))
+    down = int(sum(np.count_nonzero(part.columns[:, 2] < -0.5) for part in data))
+    fastest = float(max(np.max(np.abs(part.columns[:, 3:])) for part in data))
+    events = Events((99, 99), (99, 99), (up, down), (fastest, fastest))
+    used = [SLIDING_NAMES[i] for i in fit.used]
+    told = estimates(
+        used, fit.theta, samples[:, list(fit.used)], events, rig.motion == "rotary", name
+    )
+    out: dict[str, Estimate] = {}
+    for key, value in zip(NAMES, nine, strict=True):
+        if key in told:
+            out[key] = told[key]
+            continue
+        kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
+        reason = f"{name}: " + WHY_NOT[kind].format(share=fit.share)
+        out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
+    return out
+
+
+def _name(logs: Sequence[Log]) -> str:
+    return logs[0].name if len(logs) == 1 else f"{len(logs)} logs"

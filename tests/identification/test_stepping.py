@@ -1,0 +1,252 @@
+"""Exact steps against fine Euler steps, against themselves in finer samples, and case by case."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.arrays import Array, IntArray
+from identification.karnopp import Karnopp, slip_friction
+from identification.simulate import run_kernel
+from identification.stepping import (
+    BAND_N,
+    BAND_P,
+    EDGE_P,
+    K2,
+    SLIP_N,
+    SLIP_P,
+    STUCK,
+    kernel_parameters,
+    parameters,
+    resolve,
+    settled_mode,
+)
+from tests.identification.oracle import MUTANTS, euler
+from tests.identification.plants import ACTUATOR, command, table
+
+K1, COUPLING = ACTUATOR.k1, ACTUATOR.k2
+H = 1e-3
+State = tuple[float, float, float]
+
+
+def run(
+    nine: Karnopp,
+    u: Array,
+    h: float = H,
+    k1: float = K1,
+    k2: float = COUPLING,
+    start: State = (0.0, 0.0, 0.0),
+) -> tuple[Array, IntArray]:
+    """Position, velocity and force (3, n) of the kernel driven by a command, and modes."""
+    n = len(u)
+    out, modes, zero = np.zeros((3, n)), np.zeros(n, dtype=np.int64), np.zeros(n)
+    at, first = np.zeros(1, dtype=np.int64), [np.array([value]) for value in start]
+    p = kernel_parameters(nine.array, k1, k2)[np.newaxis]
+    run_kernel(p, h, False, u, zero, zero, zero, at, *first, out, modes)
+    return out, modes
+
+
+def followed(nine: Karnopp, state: State, mode: int, g: float, h: float) -> tuple[State, int]:
+    """One sample without coupling, switch by switch."""
+    p = parameters(kernel_parameters(nine.array, 1.0, 0.0)[np.newaxis], 0)
+    y, v, force, mode = resolve(p, *state, mode, g, h)
+    return (y, v, force), mode
+
+
+def excited(seconds: float, seed: int, h: float = H) -> Array:
+    """A command that reaches every mode."""
+    return command(h * np.arange(round(seconds / h), dtype=np.float64), seed)
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_fine_euler_steps_come_to_the_same(number: int) -> None:
+    nine, u = table(number), excited(2.0, 3)
+    exact, modes = run(nine, u)
+    fine = euler(nine, K1, COUPLING, u, H, 2000)
+    assert {SLIP_P, SLIP_N, BAND_P, BAND_N, STUCK} <= set(modes.tolist())
+    assert np.max(np.abs(exact[0] - fine[0])) < 2e-6
+    assert np.max(np.abs(exact[2] - fine[2])) < 2e-6 * COUPLING
+    assert np.median(np.abs(exact[1] - fine[1])) < 1e-6
+
+
+@pytest.mark.parametrize("wrong", MUTANTS)
+def test_wrong_variants_are_told_apart(wrong: int) -> None:
+    nine, u = table(3), excited(2.0, 3)
+    exact, _ = run(nine, u)
+    mutant = euler(nine, K1, COUPLING, u, H, 200, wrong)
+    assert np.max(np.abs(exact[0] - mutant[0])) > 1e-4
+
+
+@pytest.mark.parametrize("parts", [2, 5])
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_shorter_samples_change_nothing(number: int, parts: int) -> None:
+    nine, u = table(number), excited(40.0, 5)
+    whole, modes = run(nine, u)
+    split, split_modes = run(nine, np.repeat(u, parts), H / parts)
+    assert np.max(np.abs(whole[0] - split[0, ::parts])) < 1e-11
+    assert np.max(np.abs(whole[2] - split[2, ::parts])) < 1e-7
+    assert np.mean(modes != split_modes[::parts]) < 1e-3
+
+
+@pytest.mark.parametrize("h", [1e-2, 5e-2])
+def test_long_samples_with_several_switches_are_exact(h: float) -> None:
+    nine, u = replace(table(1), F_vp=900.0, F_vn=700.0, m=0.3), excited(40.0, 2, h)
+    whole, _ = run(nine, u, h)
+    split, _ = run(nine, np.repeat(u, 50), h / 50)
+    assert np.max(np.abs(whole[0] - split[0, ::50])) < 1e-10
+    fine = euler(nine, K1, COUPLING, u[:100], h, 50_000)
+    assert np.max(np.abs(whole[0, :100] - fine[0])) < 5e-6
+
+
+def test_no_coupling_and_no_viscous_friction() -> None:
+    nine = replace(table(1), F_vp=0.0, F_vn=0.0)
+    u = 0.1 * np.cos(2 * np.pi * 5.0 * H * np.arange(1000))
+    exact, modes = run(nine, u, k2=0.0)
+    fine = euler(nine, K1, 0.0, u, H, 2000)
+    assert {SLIP_P, SLIP_N} <= set(modes.tolist())
+    assert np.max(np.abs(exact[0] - fine[0])) < 2e-5 * np.max(np.abs(fine[0]))
+    p = kernel_parameters(nine.array, K1, 0.0)
+    assert p[K2] == 0.0
+
+
+def test_a_held_mode_of_closed_form() -> None:
+    nine, force, v = table(1), 60.0, 0.1
+    (y, v_end, _), mode = followed(nine, (0.0, v, force), SLIP_P, 0.0, 0.02)
+    rest = (force - nine.F_cp) / nine.F_vp
+    decay = np.exp(-nine.F_vp / nine.m * 0.02)
+    assert mode == SLIP_P
+    assert v_end == pytest.approx(rest + (v - rest) * decay, rel=1e-12)
+    assert y == pytest.approx(rest * 0.02 + (v - rest) * (1 - decay) / 300.0, rel=1e-11)
+
+
+def test_sticking_body_does_not_move() -> None:
+    nine, force = table(1), np.linspace(-23.0, 20.6, 400)
+    u = np.diff(force, prepend=0.0) / (K1 * H)
+    out, modes = run(nine, u[1:], start=(0.01, 0.0, -23.0))
+    assert set(modes.tolist()) == {STUCK}
+    assert np.all(out[0] == 0.01)
+    assert np.all(out[1] == 0.0)
+
+
+@pytest.mark.parametrize(("limit", "slope", "mode"), [(20.6, 1e3, BAND_P), (-23.0, -1e3, BAND_N)])
+def test_breakaway_at_the_limit(limit: float, slope: float, mode: int) -> None:
+    nine, before = table(1), 1e-3 * slope
+    state, after = followed(nine, (0.0, 0.0, limit - before), STUCK, slope, 1e-3 * (1 - 1e-9))
+    assert after == STUCK
+    assert state[:2] == (0.0, 0.0)
+    (y, v, force), after = followed(nine, (0.0, 0.0, limit - before), STUCK, slope, 3e-3)
+    assert after == mode
+    # a = slope t/m from the instant of breakaway on
+    assert v == pytest.approx(slope * 2e-3**2 / 2, rel=1e-9)
+    assert y == pytest.approx(slope * 2e-3**3 / 6, rel=1e-9)
+    assert force == pytest.approx(limit + 2 * before, rel=1e-12)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_band_with_too_little_force_stops_the_body_at_once(sign: float) -> None:
+    nine = table(1)
+    p = parameters(kernel_parameters(nine.array, 1.0, 0.0)[np.newaxis], 0)
+    assert settled_mode(p, sign * 0.039, sign * 15.0) == STUCK
+    (y, v, _), mode = followed(
+        nine, (0.0, sign * 0.05, sign * 15.0), SLIP_P if sign > 0 else SLIP_N, 0.0, 0.01
+    )
+    assert (mode, v) == (STUCK, 0.0)
+    assert 0.0 < sign * y < 0.05 * 0.01
+
+
+def test_slides_along_the_edge_where_slip_friction_holds_more_than_the_stick_limit() -> None:
+    nine = table(1)
+    at_edge = float(slip_friction(np.array([nine.dv_p]), nine)[0])
+    assert at_edge == 24.0 > nine.F_sp
+    (y, v, _), mode = followed(nine, (0.0, 0.0, 22.0), BAND_P, 0.0, 0.1)
+    assert (mode, v) == (EDGE_P, nine.dv_p)
+    reached = nine.m * nine.dv_p / (22.0 - nine.F_sp)
+    assert y == pytest.approx(nine.dv_p * (0.1 - reached / 2), rel=1e-12)
+    (_, v, _), mode = followed(nine, (0.0, nine.dv_p, 22.0), EDGE_P, 100.0, 0.03)
+    assert mode == SLIP_P
+    assert v > nine.dv_p
+    (_, v, _), mode = followed(nine, (0.0, nine.dv_p, 22.0), EDGE_P, -100.0, 0.03)
+    assert (mode, v) == (STUCK, 0.0)
+
+
+def test_band_is_left_and_entered_again_within_one_sample() -> None:
+    # Stiff coupling: out of the band, back through it and stuck before the sample is over.
+    nine = Karnopp(2.3, 19.7, 24.4, 275.0, 208.0, 0.0117, -0.00681, 16.8, -26.26)
+    out, modes = run(nine, np.full(1, 0.0), 1e-3, start=(0.0, -0.00608, -38.34), k2=1.185e6)
+    p = parameters(kernel_parameters(nine.array, K1, 1.185e6)[np.newaxis], 0)
+    g = 31.5e3
+    whole = resolve(p, *out[:, 0], int(modes[0]), g, 1e-3)
+    state, mode, seen = tuple(out[:, 0]), int(modes[0]), set()
+    for _ in range(64):
+        y, v, force, mode = resolve(p, *state, mode, g, 1e-3 / 64)
+        state = (y, v, force)
+        seen.add(mode)
+    assert {BAND_N, SLIP_N, STUCK} <= seen
+    assert whole[0] == pytest.approx(state[0], abs=1e-14)
+
+
+def mirrored(nine: Karnopp) -> Karnopp:
+    """The plant seen from the other side."""
+    return Karnopp(
+        nine.m,
+        nine.F_cn,
+        nine.F_cp,
+        nine.F_vn,
+        nine.F_vp,
+        -nine.dv_n,
+        -nine.dv_p,
+        -nine.F_sn,
+        -nine.F_sp,
+    )
+
+
+plants = st.builds(
+    Karnopp,
+    m=st.floats(0.2, 10.0),
+    F_cp=st.floats(0.0, 30.0),
+    F_cn=st.floats(0.0, 30.0),
+    F_vp=st.floats(0.0, 900.0),
+    F_vn=st.floats(0.0, 900.0),
+    dv_p=st.floats(1e-3, 0.1),
+    dv_n=st.floats(-0.1, -1e-3),
+    F_sp=st.floats(1.0, 40.0),
+    F_sn=st.floats(-40.0, -1.0),
+)
+couplings = st.sampled_from([0.0, 300.0, COUPLING, 1e6])
+
+
+@settings(max_examples=60)
+@given(plants, couplings, st.integers(0, 1000))
+def test_mirrored_plant_under_mirrored_command(nine: Karnopp, k2: float, seed: int) -> None:
+    u = excited(1.0, seed)
+    one, _ = run(nine, u, k2=k2)
+    other, _ = run(mirrored(nine), -u, k2=k2)
+    assert np.array_equal(one, -other)
+
+
+@settings(max_examples=60)
+@given(plants, couplings, st.integers(0, 1000))
+def test_halved_samples_of_any_plant(nine: Karnopp, k2: float, seed: int) -> None:
+    u = excited(1.0, seed)
+    whole, _ = run(nine, u, k2=k2)
+    split, _ = run(nine, np.repeat(u, 2), H / 2, k2=k2)
+    assert np.max(np.abs(whole[0] - split[0, ::2])) < 1e-9 * max(1.0, np.max(np.abs(whole[0])))
+
+
+@settings(max_examples=60)
+@given(plants, couplings, st.integers(0, 1000))
+def test_friction_never_drives(nine: Karnopp, k2: float, seed: int) -> None:
+    out, modes = run(nine, excited(1.0, seed), k2=k2)
+    y, v, force = out
+    # Work of the driving force covers the kinetic energy; its slope over a sample is linear in y
+    # and t, so a fine sum is within the size of its own steps.
+    fine, _ = run(nine, np.repeat(excited(1.0, seed), 20), H / 20, k2=k2)
+    work = np.cumsum(0.5 * (fine[2, 1:] + fine[2, :-1]) * np.diff(fine[0]))
+    energy = 0.5 * nine.m * fine[1, 1:] ** 2
+    assert np.all(energy <= work + 1e-3 * (1e-3 + np.max(np.abs(work))))
+    assert np.all(v[modes == STUCK] == 0.0)
+    stuck = force[modes == STUCK]
+    assert np.all((stuck <= nine.F_sp + 1e-9) & (stuck >= nine.F_sn - 1e-9))
+    assert np.all(np.isfinite(y))

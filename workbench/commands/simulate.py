@@ -1,0 +1,64 @@
+"""`workbench simulate`: a recipe -> its log, the truth beside it."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options, progress
+
+
+@click.command(epilog="Example: workbench simulate paper_table1 --seed 3 --format parquet")
+@click.argument("card_name", metavar="CARD")
+@click.option("--seed", type=click.IntRange(min=0), help="Instead of the recipe's.")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["csv", "parquet"]),
+    default="csv",
+    show_default=True,
+)
+@output_options
+def command(
+    card_name: str,
+    seed: int | None,
+    form: Literal["csv", "parquet"],
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Make the log of a recipe, its truth beside it.
+
+    CARD is a path or the name of a shipped card with a [recipe]. Writes <card>.csv or .parquet,
+    which the same card reads, and truth.json, which no command reads.
+    """
+    import pandas as pd
+
+    from identification.errors import BadCard
+    from workbench.card import load_card
+    from workbench.fetch import card_path
+    from workbench.recording import as_columns, record, truth
+
+    card = load_card(card_path(card_name))
+    if card.recipe is None:
+        raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
+    with OutputFolder("simulate", out, now=datetime.now()) as folder:
+        with progress("simulating", as_json=as_json):
+            log = record(card.name, card.recipe, seed)
+        name = f"{card.name}.{form}"
+        frame = pd.DataFrame(as_columns(log, card))
+        if form == "csv":
+            frame.to_csv(folder.path / name, index=False, float_format="%.12g")
+        else:
+            frame.to_parquet(folder.path / name, index=False)
+        known = truth(card.name, card.recipe, seed)
+        folder.write_json("truth.json", known)
+    result = {"log": folder.final / name, "samples": len(log), "seed": known["seed"], "h": log.h}
+    emit({**result, "out": folder.final}, as_json, lambda: _said(result, folder.final))
+
+
+def _said(result: dict[str, object], folder: Path) -> str:
+    return (
+        f"{result['samples']} samples every {result['h']:.4g} s, seed {result['seed']}\n"
+        f"written: {result['log']}, {folder / 'truth.json'}"
+    )

@@ -1,0 +1,71 @@
+"""`workbench validate`: a design on its model in simulation -> validation.json and report.html."""
+
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options, progress
+
+
+@click.command(epilog="Example: workbench validate runs/.../model.json runs/.../design.json")
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("design_file", metavar="DESIGN", type=click.Path(path_type=Path))
+@click.option(
+    "--plant",
+    "plant_file",
+    type=click.Path(path_type=Path),
+    metavar="MODEL",
+    help="Another machine on which the design has to work too.",
+)
+@click.option("--modulus", type=float, default=0.5, show_default=True, help="Least modulus margin.")
+@click.option(
+    "--delay", type=float, default=2.0, show_default=True, help="Least delay margin, in samples."
+)
+@click.option(
+    "--standstill", type=float, default=0.05, show_default=True,
+    help="Largest error at standstill, relative to the step.",
+)  # fmt: skip
+@click.option(
+    "--tracking", type=float, default=0.15, show_default=True,
+    help="Largest rms error along the smooth reference, relative to its amplitude.",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@output_options
+def command(
+    model_file: Path,
+    design_file: Path,
+    plant_file: Path | None,
+    modulus: float,
+    delay: float,
+    standstill: float,
+    tracking: float,
+    seed: int,
+    as_json: bool,
+    out: Path | None,
+) -> int:
+    """Check a design on a plant in simulation: margins, steps, a smooth reference, limit cycles.
+
+    Writes validation.json and report.html. Exit status 1: the recommended controller does not keep
+    the limits on every plant.
+    """
+    import numpy as np
+
+    from workbench.model import read_model
+    from workbench.report.reports import validation_report
+    from workbench.tuning import read_design
+    from workbench.validating import Limits, validate, validation_document
+    from workbench.validation_views import validation_view
+
+    model, found = read_model(model_file), read_design(design_file)
+    plant = read_model(plant_file) if plant_file else None
+    limits = Limits(modulus, delay, standstill, tracking)
+    with OutputFolder("validate", out, now=datetime.now()) as folder:
+        with progress("simulating the loop", as_json=as_json):
+            rng = np.random.default_rng(seed)
+            result, traces = validate(model, found, rng, plant=plant, limits=limits)
+        document = validation_document(result)
+        folder.write_json("validation.json", document)
+        folder.write_text("report.html", validation_report(result, traces, model.rotary))
+    emit({**document, "out": folder.final}, as_json, lambda: validation_view(result, folder.final))
+    return 0 if result.passed else 1

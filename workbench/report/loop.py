@@ -1,0 +1,57 @@
+"""Sections of a validation: verdict, steps and smooth reference in the simulated loop."""
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from design.loop import LoopRun
+from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, line, style
+from workbench.report.page import Section, render
+from workbench.validating import Traces, Validation
+from workbench.validation_views import HEAD, validation_lines, validation_rows
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+COLOURS = {"rst": REFERENCE, "pid": MODEL}
+
+
+def judged(found: Validation) -> Section:
+    """Every controller on every plant, and what it misses."""
+    html = render("table", head=HEAD, rows=validation_rows(found), lines=validation_lines(found))
+    return Section("Verdict", html)
+
+
+def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Section:
+    """Position, error and force in the loop on one plant, both controllers."""
+    length, force = ("rad", "N m") if rotary else ("m", "N")
+    with style():
+        drawn = figure(9.0, 6.2)
+        axes = drawn.subplots(3, 2, sharex="col")
+        runs = {name: run for (name, where), run in traces.items() if where == place}
+        for column, kind in enumerate(("step", "smooth")):
+            for number, (name, run) in enumerate(runs.items()):
+                trace = run.step if kind == "step" else run.smooth
+                _lines([row[column] for row in axes], trace, name, number == 0)
+            axes[2][column].set_xlabel("time [s]")
+        label(axes[0][0], "", f"position [{length}]", "steps")
+        label(axes[0][1], "", "", "smooth reference")
+        label(axes[1][0], "", f"error [{length}]")
+        label(axes[2][0], "time [s]", f"applied force [{force}]")
+        handles = axes[0][0].get_legend_handles_labels()
+        drawn.legend(*handles, loc="outside upper right", ncols=3)
+        svg = inline(drawn, f"loop-{place}", "simulated loop: position, error and force")
+    caption = (
+        "The loop with the identified Karnopp friction and the logs' noise, without compensator."
+        " Left and right have their own time axes."
+    )
+    title = "Loop on the identified plant" if place == "model" else "Loop on the other plant"
+    return Section(title, render("figure", svg=svg, caption=caption))
+
+
+def _lines(axes: "list[Axes]", trace: LoopRun, name: str, first: bool) -> None:
+    position, error, force = axes
+    if first:
+        line(position, trace.t, trace.r, color=OTHER, ls=":", label="reference")
+    line(position, trace.t, trace.y, color=COLOURS[name], label=name.upper())
+    line(error, trace.t, trace.r - trace.y, color=COLOURS[name])
+    line(force, trace.t, trace.F, color=COLOURS[name], lw=0.8)

@@ -1,0 +1,81 @@
+"""A validation as tables and lines, for a terminal and a report."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workbench.validating import Figures, Validation
+from workbench.views import Row, table, written
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+HEAD = (
+    "loop",
+    "on",
+    "passes",
+    "modulus margin",
+    "delay margin",
+    "standstill error",
+    "overshoot",
+    "smooth error",
+    "limit cycle",
+)
+
+
+def validation_rows(found: Validation) -> list[Row]:
+    """One row a controller and plant, by `HEAD`."""
+    return [
+        (name.upper(), place, *_row(one))
+        for name, places in found.figures.items()
+        for place, one in places.items()
+    ]
+
+
+def _row(one: Figures) -> Row:
+    m = one.margins
+    delay = "-"
+    if m:
+        delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g} h"
+    cycle = "none"
+    if one.limit_cycle:
+        cycle = f"{one.limit_cycle.amplitude:.2g} every {one.limit_cycle.period:.2g} s"
+    return (
+        "yes" if one.passed else "no",
+        f"{m.modulus:.3f}" if m else "unstable",
+        delay,
+        f"{100 * one.standstill_relative:.3g} %" if one.stable else "-",
+        f"{100 * one.overshoot:.3g} %" if one.stable else "-",
+        f"{100 * one.smooth_relative:.3g} %" if one.stable else "-",
+        cycle if one.stable else "-",
+    )
+
+
+def validation_lines(found: Validation) -> list[str]:
+    """What fails and what to know, in words."""
+    lines = [
+        f"{name.upper()} on the {place}: {missed}"
+        for name, places in found.figures.items()
+        for place, one in places.items()
+        for missed in one.missed
+    ]
+    first = next(iter(found.figures[found.judged].values()))
+    lines.append(f"steps of {first.step:.3g}; standstill and overshoot are relative to the step")
+    return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def verdict(found: Validation) -> str:
+    """Whether the judged controller passed, in one line."""
+    word = "passes" if found.passed else "fails"
+    return f"{found.judged.upper()} {word} in simulation"
+
+
+def validation_view(found: Validation, folder: Path) -> "Group":
+    """The validation for a terminal."""
+    from rich.console import Group
+
+    return Group(
+        verdict(found),
+        table(HEAD, validation_rows(found)),
+        *validation_lines(found),
+        written(folder, "validation.json", "report.html"),
+    )
