@@ -73,6 +73,7 @@ def tune_rst(
 ) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
+    T is a number: a step asks for no more force at first than the loop's speed needs.
     corners: other plants (A, B) on which the modulus margin must hold too. R holds 1 + z^-1, so
     that noise at half the sampling rate does not reach the force.
     Raises BadSpecification with the first reason where no poles of the search give a stable loop.
@@ -85,7 +86,7 @@ def tune_rst(
     ) -> tuple[RST, PID | None]:
         controller = design_rst(
             A, B, h, dominant=dominant, auxiliary=auxiliary, H_R=[1.0, 1.0], H_S=H_S,
-            T="keep-dominant",
+            T="unit-static",
         )  # fmt: skip
         return controller, None
 

@@ -22,6 +22,7 @@ from identification.start import measured_start
 from identification.three_step import FirstEstimate
 
 SLOW = 0.1  # share of the force below which inertia says nothing of a free body
+LED = 0.01  # share of the force below which the body is surely led
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 COLUMNS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
 WHY_NOT = {
@@ -55,7 +56,7 @@ def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -
         m = first.sliding.m if first.sliding is not None else 0.0
         inertia = abs(m) * float(np.std(first.motion.a))
         shares.append(inertia / max(float(np.std(log["F"])), 1e-300))
-    return float(np.median(shares)) < SLOW or all(first.sliding is None for first in firsts)
+    return float(np.median(shares)) < LED or all(first.sliding is None for first in firsts)
 
 
 def fit_imposed(

@@ -122,9 +122,10 @@ def free_run(
     k1, k2 = 0.0, stiffness
     if isinstance(plant.actuator, Actuator) and not held:
         k1, k2 = plant.actuator.k1, plant.actuator.k2
-    force = log["F"] if held else np.zeros(len(log))
     if isinstance(plant.actuator, Motor) and drive == "command":
         force = plant.actuator.k_a * log["u"]
+    else:
+        force = log["F"] if held else np.zeros(len(log))
     at, at_y, at_v = restarts if restarts else (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
     keep = at > 0
     at = np.concatenate([[0], at[keep]]).astype(np.int64)

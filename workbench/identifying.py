@@ -138,6 +138,7 @@ def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
         rows=source.rows,
         start=found.start,
         travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
+        force_peak=float(np.max(np.abs(log["F"]))),
         duration=log.duration,
         h=log.h,
         position_rms=found.position_rms,

@@ -62,7 +62,8 @@ class ArxPlant:
 class LogEntry:
     """One fitted run: its file, the state in which it starts (m, m/s, N) and what the fit leaves.
 
-    travel: lowest and highest measured position [m]; duration, h [s].
+    travel: lowest and highest measured position [m]; force_peak: largest applied force [N];
+    duration, h [s].
     """
 
     file: str
@@ -70,6 +71,7 @@ class LogEntry:
     rows: int
     start: tuple[float, float, float]
     travel: tuple[float, float]
+    force_peak: float
     duration: float
     h: float
     position_rms: float
@@ -151,6 +153,11 @@ class Model:
     def travel(self) -> tuple[float, float]:
         """Lowest and highest position in the logs [m]."""
         return (min(e.travel[0] for e in self.log), max(e.travel[1] for e in self.log))
+
+    @property
+    def force_peak(self) -> float:
+        """Largest applied force in the logs [N]."""
+        return max(entry.force_peak for entry in self.log)
 
     @property
     def rotary(self) -> bool:

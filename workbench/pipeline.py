@@ -1,6 +1,7 @@
 """The chain, each link callable alone: runs -> model -> design -> validation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -42,4 +43,42 @@ def identify_sources(
         options=options,
         on_progress=on_progress,
     )
+    if posterior:
+        model = replace(model, posterior=_posterior(sources, fit, seed, on_progress))
     return Identified(model, fit, sources.runs, sources.remarks)
+
+
+def _posterior(
+    sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
+) -> dict[str, Any]:
+    """What the walkers found, as model.json holds it."""
+    from identification.posterior import sample_posterior
+
+    report = on_progress or (lambda _stage, _share: None)
+    found = sample_posterior(
+        fit,
+        [source.log for source in sources.runs],
+        np.random.default_rng(seed),
+        rig=sources.rig,
+        on_progress=lambda share: report("posterior", share),
+    )
+    spread = np.std(found.samples, axis=0)
+    intervals = found.interval()
+    return {
+        "converged": found.converged,
+        "verdict": found.verdict,
+        "autocorrelation": found.autocorrelation,
+        "acceptance": found.acceptance,
+        "walkers": found.walkers,
+        "steps": found.steps,
+        "parameters": {
+            name: {
+                "value": intervals[name][1],
+                "unit": fit.estimates[name].unit,
+                "sd": float(sd),
+                "low": intervals[name][0],
+                "high": intervals[name][2],
+            }
+            for name, sd in zip(found.names, spread, strict=True)
+        },
+    }

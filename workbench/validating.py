@@ -24,6 +24,7 @@ SHORTEST_DWELL = 1.0  # s
 LAST_DWELL = 10.0  # s
 LAST = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
+BEYOND = 1.2  # times the largest force in the logs that the loop may ask for unremarked
 CYCLES = 3  # reversals in the judged part that make a limit cycle
 ESCAPED = 10.0  # times the step
 
@@ -65,6 +66,7 @@ class Figures:
     smooth_rms: float
     smooth_relative: float
     force_rms: float
+    force_peak: float
     limit_cycle: LimitCycle | None
     missed: tuple[str, ...]
 
@@ -130,7 +132,7 @@ def validate(
         passed=all(one.passed for one in figures[judged].values()),
         limits=limits,
         figures=figures,
-        remarks=tuple(_remarks(figures[judged], found)),
+        remarks=tuple(_remarks(figures[judged], found, plants)),
         versions=versions(),
     ), traces
 
@@ -190,6 +192,7 @@ def _figures(
         smooth_rms=smooth,
         smooth_relative=smooth / amplitude,
         force_rms=float(np.sqrt(np.mean(run.step.F**2))),
+        force_peak=float(max(np.max(np.abs(run.step.F)), np.max(np.abs(run.smooth.F)))),
         limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
         missed=(),
     )
@@ -297,7 +300,9 @@ def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> t
     return tuple(missed)
 
 
-def _remarks(figures: Mapping[str, Figures], found: Design) -> list[str]:
+def _remarks(
+    figures: Mapping[str, Figures], found: Design, plants: Mapping[str, Model]
+) -> list[str]:
     out = ["the compensator is not part of this loop yet: friction is met by feedback alone"]
     for place, one in figures.items():
         if one.limit_cycle:
@@ -306,6 +311,12 @@ def _remarks(figures: Mapping[str, Figures], found: Design) -> list[str]:
             out.append(
                 f"limit cycle on the {place}: {one.limit_cycle.amplitude:.3g} peak to peak every"
                 f" {one.limit_cycle.period:.3g} s, {cause}"
+            )
+        seen = plants[place].force_peak
+        if one.force_peak > BEYOND * seen:
+            out.append(
+                f"the loop on the {place} asks for {one.force_peak:.3g} of force, the logs show"
+                f" {seen:.3g} at most; see that the machine has it"
             )
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")

@@ -94,6 +94,8 @@ def fit_lines(model: Model) -> list[str]:
     if model.fit.force_relative is not None:
         share = 100 * model.fit.force_relative
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
+    if model.posterior is not None:
+        lines.append(f"posterior: {model.posterior['verdict']}")
     if model.plant is None:
         lines.append(f"no ARX plant: {model.plant_reason}")
     else:

@@ -9,8 +9,13 @@ import click
 
 from workbench.output import OutputFolder, emit, output_options, progress
 
-STAGES = {"searching": (0.0, 0.5), "searching near": (0.5, 0.6), "refining": (0.6, 0.65)}
-REST = (0.65, 1.0)
+STAGES = {
+    "searching": (0.0, 0.5),
+    "searching near": (0.5, 0.6),
+    "refining": (0.6, 0.65),
+    "posterior": (0.9, 1.0),
+}
+REST = (0.65, 0.9)
 
 
 @click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")

@@ -38,6 +38,8 @@ def sensitivity(found: Design) -> Section:
             left.semilogx(w, _db(s.S_yp), color=COLOURS[name], label=name.upper())
             right.semilogx(w, _db(s.S_up), color=COLOURS[name])
         left.axhline(20 * np.log10(2.0), color=OTHER, ls=":", label="modulus margin 0.5")
+        top = right.get_ylim()[1]
+        right.set_ylim(top - 80.0, top)
         label(left, "frequency [rad/s]", "|S_yp| [dB]", "disturbance to position")
         label(right, "frequency [rad/s]", "|S_up| [dB, N/m]", "measurement noise to force")
         left.legend(loc="lower right")

@@ -1,0 +1,96 @@
+"""The chain from a recipe to a validated design, beside the truth that only a recipe has."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.errors import BadCard
+from identification.karnopp import NAMES
+from workbench.card import Card
+from workbench.design_views import design_lines
+from workbench.identifying import Progress
+from workbench.output import dumps
+from workbench.pipeline import Identified, identify_sources
+from workbench.recording import as_columns, record, truth
+from workbench.sources import read_sources
+from workbench.tuning import Design, design
+from workbench.validating import Traces, Validation, validate
+from workbench.validation_views import HEAD, validation_lines, validation_rows, verdict
+from workbench.views import Row, in_digits, table, written
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+
+@dataclass(frozen=True)
+class Demonstration:
+    """What the chain found, and the recipe's truth."""
+
+    identified: Identified
+    design: Design
+    validation: Validation
+    traces: Mapping[tuple[str, str], Traces]
+    truth: Mapping[str, Any]
+
+    @property
+    def worst_error(self) -> float:
+        """Largest relative error of an identified parameter of the nine."""
+        known = self.identified.model.friction
+        errors: list[float] = [
+            abs(value / self.truth["friction"][name]["value"] - 1.0)
+            for name in NAMES
+            if (value := known[name].value) is not None
+        ]
+        return max(errors)
+
+
+def demonstrate(card: Card, folder: Path, seed: int, on_progress: Progress) -> Demonstration:
+    """Simulate the card's recipe into `folder`, read the log back, identify, design, validate."""
+    import pandas as pd
+
+    if card.recipe is None:
+        raise BadCard(f"{card.path}: has no [recipe]; name a card with one")
+    log = record(card.name, card.recipe)
+    path = folder / f"{card.name}.parquet"
+    pd.DataFrame(as_columns(log, card)).to_parquet(path, index=False)
+    known = truth(card.name, card.recipe)
+    (folder / "truth.json").write_text(dumps(known) + "\n", encoding="utf-8")
+    sources = read_sources([str(path.absolute())], str(card.path))
+    identified = identify_sources(sources, seed=seed, on_progress=on_progress)
+    on_progress("designing", 0.9)
+    found = design(identified.model)
+    validation, traces = validate(identified.model, found, np.random.default_rng(seed))
+    return Demonstration(identified, found, validation, traces, known)
+
+
+def demo_view(found: Demonstration, folder: Path) -> "Group":
+    """The demo for a terminal: truth beside estimate, then design and verdict."""
+    from rich.console import Group
+
+    return Group(
+        "A log of the paper's rig (table 2) was simulated; only the log was used below.",
+        table(("parameter", "estimate", "unit", "95 % interval", "truth"), _rows(found)),
+        f"worst error of an identified parameter: {100 * found.worst_error:.3g} %",
+        *design_lines(found.design),
+        "",
+        verdict(found.validation),
+        table(HEAD, validation_rows(found.validation)),
+        *validation_lines(found.validation),
+        "note: tracing what a model leaves to the missing effect is not part of this demo yet",
+        written(folder, "identification.html", "design.html", "report.html"),
+    )
+
+
+def _rows(found: Demonstration) -> list[Row]:
+    rows: list[Row] = []
+    for name, e in found.identified.model.friction.items():
+        true = f"{found.truth['friction'][name]['value']:g}"
+        if e.value is None or e.low is None or e.high is None:
+            rows.append((name, "-", e.unit, f"not identified: {e.reason}", true))
+            continue
+        value, low, high = in_digits((e.value, e.low, e.high), e.value, e.sd)
+        rows.append((name, value, e.unit, f"{low} to {high}", true))
+    return rows
