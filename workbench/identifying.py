@@ -141,7 +141,7 @@ def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
         force_peak=float(np.max(np.abs(log["F"]))),
         duration=log.duration,
         h=log.h,
-        position_rms=found.position_rms,
+        position_rms=found.position_rms if np.isfinite(found.position_rms) else None,
         force_rms=found.force_rms,
         chi_square=found.chi_square,
     )

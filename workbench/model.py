@@ -62,6 +62,7 @@ class ArxPlant:
 class LogEntry:
     """One fitted run: its file, the state in which it starts (m, m/s, N) and what the fit leaves.
 
+    position_rms is None where no free run follows the log: the motion is imposed on the body.
     travel: lowest and highest measured position [m]; force_peak: largest applied force [N];
     duration, h [s].
     """
@@ -74,7 +75,7 @@ class LogEntry:
     force_peak: float
     duration: float
     h: float
-    position_rms: float
+    position_rms: float | None
     force_rms: float | None
     chi_square: float
 
@@ -158,6 +159,11 @@ class Model:
     def force_peak(self) -> float:
         """Largest applied force in the logs [N]."""
         return max(entry.force_peak for entry in self.log)
+
+    @property
+    def imposed(self) -> bool:
+        """Whether the logged motion was imposed, so that only the force equation was fitted."""
+        return all(entry.position_rms is None for entry in self.log)
 
     @property
     def rotary(self) -> bool:

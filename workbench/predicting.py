@@ -94,8 +94,13 @@ def default_drive(model: Model, log: Log) -> Drive:
     return "command" if known and "u" in log else "force"
 
 
-def fitted_run(model: Model, log: Log, index: int) -> FreeRun:
-    """The run that the fit compared with one of its logs: from its start, coupled as it was."""
+def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
+    """The run that the fit compared with one of its logs: from its start, coupled as it was.
+
+    None where the motion was imposed: then no run was compared.
+    """
+    if model.imposed:
+        return None
     drive = model.fit.drive
     restarts = _restarts(log, FORCE_WINDOW) if drive == "force" else None
     return free_run(

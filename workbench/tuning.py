@@ -256,6 +256,11 @@ def _nominal(model: Model) -> tuple[float, float]:
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
     found = model.plant
     why_not = model.friction["m"].reason or "mass identified"
+    if model.imposed:
+        raise NotIdentifiable(
+            "no plant to design on: the logged motion was imposed on the body; log a run in which"
+            " the drive moves it freely"
+        )
     if found is None:
         raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); m: {why_not}")
     if found.simulation_relative is None or found.simulation_relative > FOLLOWS:

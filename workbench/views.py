@@ -90,7 +90,10 @@ def fit_lines(model: Model) -> list[str]:
         f"{e.file}: simulated position within {e.position_rms:.3g} {unit} rms over"
         f" {e.duration:.4g} s, driven by {by}"
         for e in model.log
+        if e.position_rms is not None
     ]
+    if model.imposed:
+        lines.append("the motion was imposed: the equation of motion was fitted, not a free run")
     if model.fit.force_relative is not None:
         share = 100 * model.fit.force_relative
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")

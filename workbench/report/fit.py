@@ -13,11 +13,12 @@ from workbench.report.page import Section, render
 ZOOM = 0.12  # part of the log shown enlarged
 
 
-def fit(model: Model, log: Log, run: FreeRun) -> Section:
+def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
     """Position and force of one log, the whole of it and its liveliest part."""
     length, force = ("rad", "N m") if model.rotary else ("m", "N")
     t = log["t"] - log["t"][0]
-    predicted = run.F
+    position = run.y if run else None
+    predicted = run.F if run else log["F"]
     if model.fit.drive == "force" or model.rig.kind == "motor":
         how = Smoothing(held=model.rig.kind == "motor")
         predicted = force_predicted(log, model.karnopp, how)
@@ -26,21 +27,24 @@ def fit(model: Model, log: Log, run: FreeRun) -> Section:
         axes = drawn.subplots(2, 2, width_ratios=[1.5, 1.0])
         part = liveliest(log["y"])
         for column, where in enumerate((slice(None), part)):
-            for row, (name, simulated) in enumerate((("y", run.y), ("F", predicted))):
+            for row, (name, simulated) in enumerate((("y", position), ("F", predicted))):
                 at = axes[row][column]
                 line(at, t[where], log[name][where], color=MEASURED, label="measured")
-                line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
+                if simulated is not None:
+                    line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
         label(axes[0][0], "", f"position [{length}]", "whole log")
         label(axes[0][1], "", "", "its liveliest part")
         label(axes[1][0], "time [s]", f"applied force [{force}]")
         label(axes[1][1], "time [s]", "")
-        drawn.legend(*axes[0][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
+        drawn.legend(*axes[1][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
         svg = inline(drawn, "fit", "measured and simulated position and force over time")
     return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
 
 
 def _caption(model: Model) -> str:
     inverse = " The model's force is that of the inverse model: what this motion needs."
+    if model.imposed:
+        return f"The motion is imposed, so no position is simulated.{inverse}"
     if model.fit.drive == "command":
         return (
             "The model is driven by the logged command alone, from the start of the log; it never"

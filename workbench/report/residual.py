@@ -15,7 +15,7 @@ from workbench.report.page import Section, render
 BAND_ALPHA = 0.45
 
 
-def residual(model: Model, log: Log, run: FreeRun) -> Section:
+def residual(model: Model, log: Log, run: FreeRun | None) -> Section:
     """Position's and force's residual over time, with the noise that a perfect model leaves."""
     length, force = ("rad", "N m") if model.rotary else ("m", "N")
     t = log["t"] - log["t"][0]
@@ -23,14 +23,15 @@ def residual(model: Model, log: Log, run: FreeRun) -> Section:
     with style():
         drawn = figure(9.0, 4.4)
         top, bottom = drawn.subplots(2, 1, sharex=True)
-        line(top, t, log["y"] - run.y, color=MODEL)
+        if run:
+            line(top, t, log["y"] - run.y, color=MODEL)
         top.axhspan(
             -2 * noise, 2 * noise, color=REFERENCE, alpha=BAND_ALPHA, lw=0, zorder=3,
             label="±2σ of the sensor",
         )  # fmt: skip
         label(top, "", f"position [{length}]", "measured less simulated")
         drawn.legend(*top.get_legend_handles_labels(), loc="outside upper right")
-        if model.fit.noise_F > 0:
+        if run and model.rig.kind != "motor" and model.fit.drive == "command":
             sigma = 2 * model.fit.noise_F
             line(bottom, t, log["F"] - run.F, color=MODEL)
             bottom.axhspan(-sigma, sigma, color=REFERENCE, alpha=BAND_ALPHA, lw=0, zorder=3)
@@ -59,6 +60,8 @@ def _force_residual(model: Model, log: Log) -> tuple[Array, Array]:
 
 def _caption(model: Model) -> str:
     how = np.sqrt(model.fit.chi_square)
+    if model.imposed:
+        return "No position is simulated where the motion is imposed; below, the force's residual."
     if model.fit.adequate:
         return f"What is left is {how:.2f} times the sensors' noise: nothing is missing."
     return (
