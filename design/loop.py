@@ -303,11 +303,12 @@ def _checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) ->
         return LoopNoise(np.zeros((n, 1)), np.zeros((n, 1)))
     columns = []
     for name, values in (("y", noise.y), ("F", noise.F)):
-        a = np.asarray(values, dtype=np.float64)
+        # A copy: numba would compile once more for read-only arrays.
+        a = np.array(values, dtype=np.float64, order="C")
         a = a[:, np.newaxis] if a.ndim == 1 else a
         if a.shape not in ((n, 1), (n, plants)):
             raise BadModel(f"noise of {name}: shape {values.shape}, need ({n},) or ({n}, {plants})")
-        columns.append(np.ascontiguousarray(a))
+        columns.append(a)
     return LoopNoise(columns[0], np.zeros((n, 1)) if motor else columns[1])
 
 

@@ -13,6 +13,7 @@ from identification.block import (
     V_OLD,
     WIDTH,
     F,
+    V,
     Y,
     advance,
     place,
@@ -283,10 +284,18 @@ def march_motor(
             force = s[GAIN * WIDTH + i] * u
             shift_lane(s, i, leading, measured, u)
             s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U * WIDTH + i] = y, force, u
+            s[F * WIDTH + i] = force
             count(s, i, r - y, u, weight)
             outside = (force < s[F_LO * WIDTH + i]) | (force > s[F_HI * WIDTH + i])
             flagged |= int(outside) << i
-            flagged |= advance(s, i, h, force, 0.0)
+        if flagged:
+            for i in range(WIDTH):
+                if flagged >> i & 1:
+                    y, v, force = s[Y * WIDTH + i], s[V * WIDTH + i], s[F * WIDTH + i]
+                    place(s, modes, tables, p, i, y, v, force)
+            flagged = 0
+        for i in range(WIDTH):
+            flagged |= advance(s, i, h, s[F * WIDTH + i], 0.0)
         for j in range(2, len(R) - 1):
             r_j, s_j, x = R[j + 1], S[j + 1], (STATE + j) * WIDTH
             for i in range(lanes):

@@ -158,8 +158,10 @@ def _best(
             missed = goals_missed(margin, goals, _integrates(A, controller))
             worst = margin.modulus if missed else worst_modulus(plants, controller)
             missed = missed or _worst_missed(worst, goals)
+            if not controller.stable:
+                missed = (*missed, "the controller itself has a pole outside the unit circle")
             found.append(Tuned(controller, margin, worst, dominant, others, missed, pid))
-        kept = [one for one in found if not one.missed and one.rst.stable]
+        kept = [one for one in found if not one.missed]
         if kept:
             return max(kept, key=lambda one: one.worst or 0.0)
     if not found:

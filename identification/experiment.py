@@ -25,6 +25,7 @@ from identification.simulate import force_slope
 from identification.start import measured_start
 from identification.three_step import FirstEstimate
 
+REST_SECONDS = 0.04  # that a body must stand still to be restarted from there
 SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
 
 
@@ -90,7 +91,9 @@ def prepare_run(
         weight_y=1.0 / sigma_y,
         weight_force=1.0 / sigma_f if by_command else 0.0,
     )
-    windows = restart_windows(first, h, window)
+    windows = (
+        restart_windows(first, h, window) if hold else rest_windows(y, sigma_y, h, window)
+    )
     y_0, v_0, _ = measured_start(log)
     start = np.array([y_0, v_0, constant])
     unknown = [] if hold else [START_Y]
@@ -112,6 +115,36 @@ def restart_windows(first: FirstEstimate, h: float, seconds: float) -> Windows:
     index: IntArray = np.array(at, dtype=np.int64)
     v = np.where(first.rest[index], 0.0, first.motion.v[index])
     return Windows(index, first.motion.y[index], v)
+
+
+def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> Windows:
+    """Restarts at sure rests only, at least `seconds` apart; the first one starts the log.
+
+    y: measured position [m] with noise `sigma` [m]. A restart in motion would carry the error of
+    a smoothed velocity into all that follows; a rest has v = 0 and its mean position.
+    """
+    width = max(8, round(REST_SECONDS / h))
+    at, level = [0], [float(y[0])]
+    if len(y) > 4 * width:
+        sums, squares = np.cumsum(y - y[0]), np.cumsum((y - y[0]) ** 2)
+        mean = (sums[width:] - sums[:-width]) / width
+        variance = (squares[width:] - squares[:-width]) / width - mean**2
+        # Still: no more spread than noise, and both halves at the same level.
+        half = width // 2
+        early = (sums[half:] - sums[:-half]) / half
+        drift = np.abs(early[half : half + len(mean)] - early[: len(mean)])
+        count = min(len(drift), len(mean))
+        still = (variance[:count] < (1.3 * sigma) ** 2) & (
+            drift[:count] < 3.0 * sigma / np.sqrt(half / 2)
+        )
+        step = round(seconds / h)
+        for k in np.flatnonzero(still):
+            middle = int(k) + 1 + half
+            if middle - at[-1] >= step:
+                at.append(middle)
+                level.append(float(mean[k] + y[0]))
+    index: IntArray = np.array(at, dtype=np.int64)
+    return Windows(index, np.array(level), np.zeros(len(at)))
 
 
 def total_cost(runs: Sequence[Run], p: Array, cap: float, starts: Array | None = None) -> Array:

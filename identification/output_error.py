@@ -31,6 +31,7 @@ POPULATION = 64
 GENERATIONS = 150
 ATTEMPTS = 3
 FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
+MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 LED = 50.0  # chi-square from which a force-driven run is not the body's own motion
 SAME = 0.02  # relative gain of a new search below which the misfit is the model's
 
@@ -62,6 +63,7 @@ def fit_karnopp(
         and not solution.adequate
         and actuator is not None
         and actuator.relative > 0.02
+        and actuator.rms > MISFIT * _sensor_noise(problem, actuator)
     ):
         remarks.append(
             f"the linear actuator leaves {100 * actuator.relative:.1f} % of the force (chi-square"
@@ -72,6 +74,15 @@ def fit_karnopp(
     if problem.drive == "force" and not problem.hold and solution.chi_square > LED:
         return fit_imposed(logs, problem.firsts, rng, rig)
     return _result(problem, solution, actuator, rig, remarks)
+
+
+def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:
+    """What the sensors alone leave of the actuator equation [N], root mean square."""
+    squares = []
+    for run in problem.runs:
+        y, force = 1.0 / run.measured.weight_y, 1.0 / run.measured.weight_force
+        squares.append(force**2 + (actuator.k2 * y) ** 2)
+    return float(np.sqrt(np.mean(squares)))
 
 
 def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solution:

@@ -1,7 +1,5 @@
 """Lanes of a block against one plant at a time."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -15,7 +13,11 @@ from identification.stepping import kernel_parameters
 from tests.identification.plants import ACTUATOR, command, table
 
 H = 1e-3
-Drive = Callable[[Array, float], tuple[Array, Array]]
+
+
+def excited(n: int, seed: int) -> Array:
+    """A command of `n` samples."""
+    return command(H * np.arange(n, dtype=np.float64), seed)
 
 
 def spread(nine: Karnopp, seed: int, size: float = 0.3) -> Array:
@@ -49,9 +51,9 @@ def alone(
     n = len(u)
     zero, at = np.zeros(n), np.zeros(1, dtype=np.int64)
     force, slope, y_m = held or (zero, zero, zero)
-    first = [np.array([value]) for value in start]
+    y, v, f = (np.array([value]) for value in start)
     out, modes = np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-    run_kernel(p[None], H, held is not None, u, force, slope, y_m, at, *first, out, modes)
+    run_kernel(p[None], H, held is not None, u, force, slope, y_m, at, y, v, f, out, modes)
     return out
 
 
@@ -59,7 +61,7 @@ def alone(
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_lanes_are_the_scalar_run(number: int, start: tuple[float, float, float]) -> None:
     p = spread(table(number), number)
-    u = command(H * np.arange(6000), number)
+    u = excited(6000, number)
     out = lanes(p, start, u)
     for lane in range(WIDTH):
         one = alone(p[lane], start, u)
@@ -71,7 +73,7 @@ def test_lanes_are_the_scalar_run(number: int, start: tuple[float, float, float]
 def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
     p = spread(table(2), 7)
     p[:, 9], p[:, 10] = 0.0, coupling
-    u = command(H * np.arange(4000), 4)
+    u = excited(4000, 4)
     truth = alone(spread(table(2), 7)[0], (0.0, 0.0, 0.0), u)
     y, force = truth[0], truth[2]
     slope_y, slope = (np.append(np.diff(a) / H, 0.0) for a in (y, force))
@@ -91,13 +93,13 @@ def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
 @given(st.permutations(list(range(WIDTH))), st.integers(0, 100))
 def test_lanes_do_not_see_each_other(order: list[int], seed: int) -> None:
     p = spread(table(1), seed)
-    u = command(H * np.arange(1500), seed)
+    u = excited(1500, seed)
     rest = (0.0, 0.0, 0.0)
     assert np.array_equal(lanes(p[order], rest, u), lanes(p, rest, u)[:, :, order])
 
 
 def test_parameters_given_are_not_changed() -> None:
-    p, u = spread(table(1), 1), command(H * np.arange(500), 1)
+    p, u = spread(table(1), 1), excited(500, 1)
     before = p.copy(), u.copy()
     lanes(p, (0.0, 0.0, 0.0), u)
     assert np.array_equal(p, before[0])

@@ -75,7 +75,8 @@ def test_motor_holds_its_force_over_the_sample() -> None:
     parts = 20
     fine = log_of(
         1e-2 / parts,
-        **{"y": np.zeros(len(log) * parts), "u": np.repeat(log["u"], parts)},
+        y=np.zeros(len(log) * parts),
+        u=np.repeat(log["u"], parts),
     )
     split = free_run(Plant(table(3), motor), fine, REST, "command")
     assert np.max(np.abs(split.y[::parts] - run.y)) < 1e-12

@@ -18,6 +18,7 @@ from identification.stepping import (
     SLIP_N,
     SLIP_P,
     STUCK,
+    Parameters,
     kernel_parameters,
     parameters,
     resolve,
@@ -42,16 +43,22 @@ def run(
     """Position, velocity and force (3, n) of the kernel driven by a command, and modes."""
     n = len(u)
     out, modes, zero = np.zeros((3, n)), np.zeros(n, dtype=np.int64), np.zeros(n)
-    at, first = np.zeros(1, dtype=np.int64), [np.array([value]) for value in start]
+    at = np.zeros(1, dtype=np.int64)
+    y, v, force = (np.array([value]) for value in start)
     p = kernel_parameters(nine.array, k1, k2)[np.newaxis]
-    run_kernel(p, h, False, u, zero, zero, zero, at, *first, out, modes)
+    run_kernel(p, h, False, u, zero, zero, zero, at, y, v, force, out, modes)
     return out, modes
 
 
 def followed(nine: Karnopp, state: State, mode: int, g: float, h: float) -> tuple[State, int]:
     """One sample without coupling, switch by switch."""
     p = parameters(kernel_parameters(nine.array, 1.0, 0.0)[np.newaxis], 0)
-    y, v, force, mode = resolve(p, *state, mode, g, h)
+    return traced(p, state, mode, g, h)
+
+
+def traced(p: Parameters, state: State, mode: int, g: float, h: float) -> tuple[State, int]:
+    """`resolve` from and to a state."""
+    y, v, force, mode = resolve(p, state[0], state[1], state[2], mode, g, h)
     return (y, v, force), mode
 
 
@@ -174,17 +181,15 @@ def test_slides_along_the_edge_where_slip_friction_holds_more_than_the_stick_lim
 def test_band_is_left_and_entered_again_within_one_sample() -> None:
     # Stiff coupling: out of the band, back through it and stuck before the sample is over.
     nine = Karnopp(2.3, 19.7, 24.4, 275.0, 208.0, 0.0117, -0.00681, 16.8, -26.26)
-    out, modes = run(nine, np.full(1, 0.0), 1e-3, start=(0.0, -0.00608, -38.34), k2=1.185e6)
     p = parameters(kernel_parameters(nine.array, K1, 1.185e6)[np.newaxis], 0)
-    g = 31.5e3
-    whole = resolve(p, *out[:, 0], int(modes[0]), g, 1e-3)
-    state, mode, seen = tuple(out[:, 0]), int(modes[0]), set()
+    state: State = (0.0, -0.00608, -38.34)
+    g, mode, seen = 31.5e3, BAND_N, set()
+    (whole, _, _), _ = traced(p, state, mode, g, 1e-3)
     for _ in range(64):
-        y, v, force, mode = resolve(p, *state, mode, g, 1e-3 / 64)
-        state = (y, v, force)
+        state, mode = traced(p, state, mode, g, 1e-3 / 64)
         seen.add(mode)
     assert {BAND_N, SLIP_N, STUCK} <= seen
-    assert whole[0] == pytest.approx(state[0], abs=1e-14)
+    assert whole == pytest.approx(state[0], abs=1e-14)
 
 
 def mirrored(nine: Karnopp) -> Karnopp:
