@@ -166,7 +166,8 @@ def _best(
             return max(kept, key=lambda one: one.worst or 0.0)
     if not found:
         raise refusal or BadSpecification("no poles to try; give --poles w_n,zeta")
-    taken = max(found, key=lambda one: (one.rst.stable, one.margins.modulus))
+    # None keeps every goal: the one nearest to it on all plants.
+    taken = max(found, key=lambda one: (one.rst.stable, len(one.missed) <= 1, one.worst or 0.0))
     return replace(taken, worst=worst_modulus(plants, taken.rst))
 
 

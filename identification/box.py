@@ -1,7 +1,7 @@
 """The box in which the global search looks, and its map to kernel parameters."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,6 +57,10 @@ class Box:
         inside: BoolArray = (values >= 0.5 * self.low) & (values <= 2.0 * self.high)
         every: BoolArray = np.all(inside, axis=1)
         return every
+
+    def wider(self, factor: float) -> "Box":
+        """The box with every bound moved out by `factor`."""
+        return replace(self, low=self.low / factor, high=self.high * factor)
 
     def _scaled(self) -> tuple[Array, Array, BoolArray]:
         logs = np.isin(self.free, LOGARITHMIC)

@@ -60,10 +60,12 @@ def ensemble(
     state = np.random.RandomState(int(rng.integers(2**32))).get_state()
     begin = emcee.State(first, random_state=state)
     chain = sampler.sample(begin, iterations=steps, skip_initial_state_check=True)
-    for done, _ in enumerate(chain, start=1):
-        if on_progress and done % 20 == 0:
-            on_progress(done / steps)
-    longest = float(np.max(sampler.get_autocorr_time(tol=0, discard=steps // 2)))
+    # A walker that starts where no member can be compares infinity with infinity, and stays.
+    with np.errstate(invalid="ignore"):
+        for done, _ in enumerate(chain, start=1):
+            if on_progress and done % 20 == 0:
+                on_progress(done / steps)
+        longest = float(np.max(sampler.get_autocorr_time(tol=0, discard=steps // 2)))
     kept = sampler.get_chain(discard=steps // 2, flat=True)
     length = steps - steps // 2
     return Ensemble(

@@ -91,9 +91,7 @@ def prepare_run(
         weight_y=1.0 / sigma_y,
         weight_force=1.0 / sigma_f if by_command else 0.0,
     )
-    windows = (
-        restart_windows(first, h, window) if hold else rest_windows(y, sigma_y, h, window)
-    )
+    windows = restart_windows(first, h, window) if hold else rest_windows(y, sigma_y, h, window)
     y_0, v_0, _ = measured_start(log)
     start = np.array([y_0, v_0, constant])
     unknown = [] if hold else [START_Y]

@@ -24,7 +24,7 @@ from identification.refine import Optimum, refine
 from identification.result import Drive, KarnoppFit, LogFit
 from identification.search import Population, evolve
 from identification.simulate import FreeRun
-from identification.stepping import DV_N, DV_P, K2
+from identification.stepping import DV_N, DV_P, F_SN, F_SP, K1, K2
 from identification.weighing import Progress, Solution, weigh_correlated, weigh_misfit, weigh_noise
 
 POPULATION = 64
@@ -32,6 +32,7 @@ GENERATIONS = 150
 ATTEMPTS = 3
 FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
 MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
+RIVAL = 3.0  # cost relative to the best up to which another optimum counts against it
 LED = 50.0  # chi-square from which a force-driven run is not the body's own motion
 SAME = 0.02  # relative gain of a new search below which the misfit is the model's
 
@@ -87,30 +88,42 @@ def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:
 
 def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solution:
     """Search, refine and weigh until the fit is found or the misfit is the model's own."""
-    best: Optimum | None = None
-    population: Population | None = None
-    spent = 0
+    optima: list[Optimum] = []
+    enough = problem.adequate * problem.count
     attempts = ATTEMPTS if problem.drive == "command" else ATTEMPTS - 1
     for attempt in range(attempts):
         size = POPULATION * (2 if attempt == ATTEMPTS - 1 else 1)
         found, population = _search(problem, rng, size, attempt, report)
-        spent += found.evaluations
+        before = min((one.cost for one in optima), default=np.inf)
+        optima.append(found)
         report("refining", attempt / attempts)
-        if best is None or found.cost < best.cost * (1 - SAME):
-            best = found
-        elif found.cost > best.cost * (1 - SAME):
-            best = found if found.cost < best.cost else best
-            if best.cost > problem.adequate * problem.count and attempt > 0:
-                break
-        if best.cost <= problem.adequate * problem.count:
+        if min(before, found.cost) <= enough:
             break
-    assert best is not None and population is not None
-    chi_square = best.cost / problem.count
-    if chi_square <= ADEQUATE and problem.drive == "command":
+        if attempt > 0 and found.cost > before * (1 - SAME):
+            break
+    best = min(optima, key=lambda one: one.cost)
+    if problem.drive == "command" and best.cost > enough:
+        optima.append(_through_force(problem, rng, report))
+        best = min(optima, key=lambda one: one.cost)
+    spent = sum(one.evaluations for one in optima)
+    if best.cost <= ADEQUATE * problem.count and problem.drive == "command":
         return weigh_noise(problem, best, rng, spent, report)
     if not problem.hold:
-        return weigh_correlated(problem, best, rng, spent)
+        rivals = [one.p for one in optima if one.cost < RIVAL * best.cost]
+        return weigh_correlated(problem, best, np.array(rivals), rng, spent)
     return weigh_misfit(problem, best, population, rng, spent, report)
+
+
+def _through_force(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
+    """A fit by command that starts from one by the measured force, whose landscape is smoother."""
+    other = pose(problem.logs, Rig("force"), "force")
+    found, _ = _search(other, rng, POPULATION, 0, report)
+    row = np.concatenate([found.p[:9], problem.row[[K1, K2]]])
+    cap = _cap(problem, 0)
+    near = refine(problem.runs, row, problem.free, cap=cap)
+    optimum = _search_near(problem, near, cap, rng)
+    spent = found.evaluations + near.evaluations + optimum.evaluations
+    return replace(optimum, evaluations=spent)
 
 
 def _search(
@@ -118,7 +131,8 @@ def _search(
 ) -> tuple[Optimum, Population]:
     """One global search over windows, and its best member refined over the whole run."""
     cap = _cap(problem, attempt)
-    box, runs = problem.box, problem.runs
+    # A search that failed may have looked around a bad first estimate.
+    box, runs = problem.box.wider(3.0**attempt), problem.runs
     # k1 and k2 come from the regression: searched over in the refinement only.
     population = evolve(
         lambda z: total_cost(runs, box.rows(z), cap),
@@ -152,14 +166,15 @@ def _search_near(problem: Problem, near: Optimum, cap: float, rng: np.random.Gen
     """
     row = near.p
     values = np.abs(row[problem.box.free])
-    close = np.where(np.isin(problem.box.free, (DV_P, DV_N, K2)), 0.1, 0.01)
+    close = np.where(np.isin(problem.box.free, (F_SP, F_SN)), 0.2, 0.02)
+    close = np.where(np.isin(problem.box.free, (DV_P, DV_N)), 0.5, close)
     low, high = values * (1 - close), values * (1 + close)
     box = replace(problem.box, low=low, high=high, row=row)
     whole = list(near.runs(problem.long_runs))
     found = evolve(
         lambda z: total_cost(whole, box.rows(z), cap),
         box.around(row, POPULATION, 0.2, rng),
-        GENERATIONS // 2,
+        GENERATIONS,
         rng,
     )
     optimum = refine(whole, box.rows(found.members[:1])[0], problem.free, cap=cap)

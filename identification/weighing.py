@@ -82,9 +82,12 @@ def weigh_noise(
 
 
 def weigh_correlated(
-    problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int
+    problem: Problem, optimum: Optimum, rivals: Array, rng: np.random.Generator, spent: int
 ) -> Solution:
-    """A fit whose residual is not white: outliers bounded, spread from stretches of the logs."""
+    """A fit whose residual is not white: outliers bounded, spread from stretches of the logs.
+
+    rivals: parameters (k, 11) of other optima about as good; how far they lie is spread as well.
+    """
     chi_square = optimum.cost / problem.count
     runs = list(optimum.runs(problem.long_runs))
     for _ in range(3):
@@ -100,6 +103,9 @@ def weigh_correlated(
         # What the force does between samples is not known: it is taken as linear.
         floor = BETWEEN * np.abs(pack(runs, optimum.p, optimum.starts, optimum.free))
         covariance = 2.0 * covariance + np.diag(floor**2)
+    away = rivals[:, optimum.free] - optimum.p[optimum.free]
+    shared = np.arange(len(optimum.free))
+    covariance[shared, shared] += np.max(away**2, axis=0)
     if not np.all(np.isfinite(covariance)):
         covariance = np.diag(np.abs(pack(runs, optimum.p, optimum.starts, optimum.free)) ** 2)
     center = pack(runs, optimum.p, optimum.starts, optimum.free)

@@ -67,6 +67,8 @@ def identify(
     """
     options = options or Options()
     logs = [source.log for source in sources]
+    for log in logs:  # wrong options are refused before the long part
+        decimation(log.h, options.design_period)
     fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
     if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
@@ -246,7 +248,9 @@ def decimation(h: float, period: float | None) -> int:
     if not wanted > 0:
         raise BadModel(f"design period {wanted:g} s, must be > 0")
     if period is not None and period < 0.99 * h:
-        raise BadModel(f"design period {period:g} s, the log is sampled every {h:g} s; ask for it")
+        raise BadModel(
+            f"design period {period:g} s, the log is sampled every {h:g} s; ask for no less"
+        )
     return max(1, round(wanted / h))
 
 

@@ -177,7 +177,8 @@ def design(
             refused[name] = str(error)
             continue
         found[name] = _controller(tuned)
-    if not found or ("rst" in refused and asked.dominant is not None):
+    by_hand = asked.dominant is not None or asked.auxiliary is not None
+    if not found or ("rst" in refused and by_hand):
         raise BadSpecification(refused["rst"])
     recommended: Literal["rst", "pid"] = "rst" if "rst" in found else "pid"
     if "pid" in found and found[recommended].missed and not found["pid"].missed:

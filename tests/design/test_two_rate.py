@@ -12,7 +12,7 @@ from identification.plant import Actuator, Motor, Plant
 
 PLANT = Plant(
     Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0), Actuator(19530.0, 10405.0)
-)  # noqa: E501
+)
 PI = ForcePI(0.02, 0.05)
 R = np.repeat([0.02, 0.1, -0.05, 0.0], 500)
 

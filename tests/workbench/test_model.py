@@ -77,7 +77,7 @@ def test_a_parameter_that_is_not_identified_says_why_and_what_stands_in(tmp_path
 
 def test_a_known_parameter_has_the_keys_of_the_contract(document: dict[str, Any]) -> None:
     assert set(document["friction"]["m"]) == {"value", "unit", "sd", "low", "high"}
-    assert list(document)[0] == "schema"
+    assert next(iter(document)) == "schema"
     keys = {"card", "log", "friction", "effects", "plant", "actuator", "fit", "versions"}
     assert keys <= set(document)
 

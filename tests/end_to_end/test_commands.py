@@ -1,0 +1,204 @@
+"""Every command in a folder of its own: what it writes, prints, refuses, and its exit status."""
+
+import csv
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.chain import CARD
+from workbench.cli import COMMANDS, main
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with card, log, model and design, each made by its command."""
+    folder = tmp_path_factory.mktemp("shop")
+    (folder / "card.toml").write_text(CARD, encoding="utf-8")
+    card = str(folder / "card.toml")
+    for arguments in (
+        ["simulate", card, "--out", str(folder / "log")],
+        ["identify", str(folder / "log/short.csv"), "--card", card, "--out", str(folder / "id")],
+        ["design", str(folder / "id/model.json"), "--out", str(folder / "design")],
+    ):
+        assert main(arguments) == 0
+    return folder
+
+
+def files(folder: Path) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def as_json(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status: int = 0) -> Any:
+    capsys.readouterr()
+    assert main([*arguments, "--json"]) == status
+    shown = capsys.readouterr()
+    assert shown.err == ""
+    return json.loads(shown.out)
+
+
+def refusal(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status: int) -> str:
+    """The one line on standard error of a command that ends with `status`."""
+    capsys.readouterr()
+    assert main(list(arguments)) == status
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert len(shown.err.splitlines()) == 1
+    return shown.err
+
+
+@pytest.mark.parametrize("command", list(COMMANDS))
+def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main([command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert f"Example: workbench {command}" in shown
+    assert "--json" in shown and "--out" in shown
+
+
+def test_simulate_writes_log_and_truth(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert files(shop / "log") == {"short.csv", "truth.json"}
+    assert "F_sp" not in (shop / "log/short.csv").read_text(encoding="utf-8")
+    known = json.loads((shop / "log/truth.json").read_text(encoding="utf-8"))
+    assert known["friction"]["F_sp"]["value"] == 20.6
+    out = str(tmp_path / "s")
+    card = str(shop / "card.toml")
+    found = as_json(capsys, ["simulate", card, "--seed", "9", "--format", "parquet", "--out", out])
+    assert found["seed"] == 9
+    assert files(tmp_path / "s") == {"short.parquet", "truth.json"}
+
+
+def test_identify_writes_model_and_report(shop: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert files(shop / "id") == {"model.json", "report.html"}
+    model = json.loads((shop / "id/model.json").read_text(encoding="utf-8"))
+    assert model["friction"]["m"]["value"] == pytest.approx(1.0, rel=5e-3)
+    assert len(model["log"][0]["sha256"]) == 64
+    card, log, out = str(shop / "card.toml"), str(shop / "log/short.csv"), str(shop / "id2")
+    found = as_json(
+        capsys, ["identify", log, "--card", card, "--orders", "3,2,1", "--seed", "4", "--out", out]
+    )
+    assert (found["plant"]["na"], found["plant"]["nb"], found["plant"]["nk"]) == (3, 2, 1)
+    assert found["out"] == out
+
+
+def test_predict_writes_the_columns_of_the_contract(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card, log = str(shop / "card.toml"), str(shop / "log/short.csv")
+    model, out = str(shop / "id/model.json"), str(tmp_path / "p")
+    found = as_json(capsys, ["predict", model, log, "--card", card, "--out", out])
+    assert found["position_rms"] < 5e-4
+    with (tmp_path / "p/prediction.csv").open(encoding="utf-8") as file:
+        rows = list(csv.reader(file))
+    assert rows[0] == [
+        "t",
+        "force_applied",
+        "force_predicted",
+        "force_simulated",
+        "position_measured",
+        "position_simulated",
+    ]
+    assert len(rows) == 3002
+    by_force = ["predict", model, log, "--card", card, "--drive", "force", "--window", "0.5"]
+    assert as_json(capsys, [*by_force, "--out", out])["drive"] == "force"
+
+
+def test_design_writes_controllers(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert files(shop / "design") == {"design.json", "report.html"}
+    model, out = str(shop / "id/model.json"), str(tmp_path / "d")
+    asked = ["--poles", "15,0.9", "--auxiliary", "0.5,0.3+0.1j,0.3-0.1j"]
+    found = as_json(capsys, ["design", model, *asked, "--out", out])
+    assert found["rst"]["dominant"] == [15.0, 0.9]
+    assert found["rst"]["auxiliary"] == [[0.5, 0.0], [0.3, 0.1], [0.3, -0.1]]
+    assert (
+        as_json(capsys, ["design", model, "--from", "arx", "--out", out])["plant"]["source"]
+        == "arx"
+    )
+    assert as_json(capsys, ["design", model, "--no-integrator", "--out", out])["pid"] is None
+
+
+def test_validate_passes_and_fails_with_its_status(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, design = str(shop / "id/model.json"), str(shop / "design/design.json")
+    command = ["validate", model, design, "--out", str(tmp_path / "v")]
+    assert as_json(capsys, command)["passed"] is True
+    assert files(tmp_path / "v") == {"validation.json", "report.html"}
+    assert as_json(capsys, [*command, "--standstill", "1e-7"], status=1)["passed"] is False
+    both = as_json(capsys, [*command, "--plant", model])
+    assert set(both["figures"]["rst"]) == {"model", "plant"}
+
+
+def test_a_table_is_shown_without_json(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["design", str(shop / "id/model.json"), "--out", str(tmp_path / "d")]) == 0
+    shown = capsys.readouterr()
+    assert "modulus margin" in shown.out and "RST" in shown.out
+    assert shown.err == ""
+
+
+def test_wrong_input_is_one_line_and_writes_nothing(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card, log = str(shop / "card.toml"), str(shop / "log/short.csv")
+    model, design = str(shop / "id/model.json"), str(shop / "design/design.json")
+    out = tmp_path / "out"
+    (tmp_path / "flat.csv").write_text(
+        "t,r,y,F,u\n" + "\n".join(f"{k * 0.001},0,0.5,1,0" for k in range(300)), encoding="utf-8"
+    )
+    (tmp_path / "bad.json").write_text('{"schema": "model/1"}', encoding="utf-8")
+    cases = (
+        (["identify", "no.csv", "--card", card], "no such file"),
+        (["identify", log, "--card", "papper_table1"], "did you mean 'paper_table1'"),
+        (["identify", log, log, "--card", card], "given twice"),
+        (["identify", str(tmp_path / "flat.csv"), "--card", card], "constant"),
+        (["identify", log, "--card", card, "--orders", "3,2"], "na,nb,nk needed"),
+        (["identify", log, "--card", card, "--design-period", "1e-4"], "sampled every"),
+        (["identify", "--card", card], "Missing argument"),
+        (["predict", model, "no.csv", "--card", card], "no such file"),
+        (["predict", log, log, "--card", card], "is not JSON"),
+        (["predict", model, log, "--card", card, "--window", "1e-9"], "window"),
+        (["design", design], "schema 'design/1', 'model/1' needed"),
+        (["design", str(tmp_path / "bad.json")], "has no 'card'"),
+        (["design", model, "--poles", "15"], "w_n,zeta needed"),
+        (["design", model, "--poles", "15,-1"], "damping"),
+        (["design", model, "--auxiliary", "1.5"], "not stable"),
+        (["design", model, "--auxiliary", "0.5,x"], "values of z needed"),
+        (["validate", model, model], "schema 'model/1', 'design/1' needed"),
+        (["validate", str(tmp_path / "none.json"), design], "no such file"),
+        (["simulate", "emps"], "has no [recipe]"),
+        (["simulate", "demo"], "effects stribeck cannot be simulated yet"),
+    )
+    for arguments, needed in cases:
+        assert needed in refusal(capsys, [*arguments, "--out", str(out)], 2), arguments
+        assert not out.exists(), arguments
+    assert not any(path.name.endswith(".part") for path in tmp_path.iterdir())
+
+
+def test_a_model_without_a_plant_is_a_refusal(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model = json.loads((shop / "id/model.json").read_text(encoding="utf-8"))
+    mass = model["friction"]["m"]
+    model["friction"]["m"] = {**mass, "value": None, "reason": "too slow", "assumed": 1.0}
+    model["plant"], model["plant_reason"] = None, "not fitted"
+    (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
+    out = tmp_path / "out"
+    command = ["design", str(tmp_path / "model.json"), "--out", str(out)]
+    text = refusal(capsys, command, 1)
+    assert text.startswith("refused: no ARX plant")
+    assert not out.exists()
+
+
+def test_demo_runs_the_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    found = as_json(capsys, ["demo", "--out", str(tmp_path / "demo")])
+    assert found["passed"] is True
+    assert found["worst_error"] < 5e-3
+    names = {"model.json", "design.json", "validation.json", "truth.json"}
+    assert names | {"report.html", "design.html", "identification.html"} <= files(tmp_path / "demo")

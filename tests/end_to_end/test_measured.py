@@ -1,0 +1,67 @@
+"""The measured sets through the commands, by the shipped cards' names."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from workbench.cli import main
+
+
+@pytest.fixture
+def data(workbench_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("WORKBENCH_DATA", str(workbench_data))
+    return workbench_data
+
+
+def read(path: Path) -> dict[str, object]:
+    found = json.loads(path.read_text(encoding="utf-8"))
+    assert isinstance(found, dict)
+    return found
+
+
+def test_emps_from_the_log_to_a_validated_loop(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert data.is_dir()
+    model = str(tmp_path / "id/model.json")
+    for arguments in (
+        ["identify", "DATA_EMPS.mat", "--card", "emps", "--out", str(tmp_path / "id")],
+        ["design", model, "--out", str(tmp_path / "d")],
+        ["validate", model, str(tmp_path / "d/design.json"), "--out", str(tmp_path / "v")],
+    ):
+        assert main(arguments) == 0
+    capsys.readouterr()
+    predict = ["predict", model, "DATA_EMPS_PULSES.mat", "--card", "emps"]
+    assert main([*predict, "--json", "--out", str(tmp_path / "p")]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["position_rms"] < 4.7e-3  # an output-error fit of the published model
+    report = (tmp_path / "id/report.html").read_text(encoding="utf-8")
+    assert "given by the card" in report
+
+
+def test_imposed_motion_gives_friction_but_no_design(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert data.is_dir()
+    log, out = "O-ring257_5bar.csv", tmp_path / "id"
+    assert main(["identify", log, "--card", "pneumatic_seals", "--out", str(out)]) == 0
+    model = read(out / "model.json")
+    friction = model["friction"]
+    assert isinstance(friction, dict)
+    assert friction["m"]["value"] is None and friction["m"]["reason"]
+    assert friction["F_cp"]["value"] is not None
+    capsys.readouterr()
+    assert main(["design", str(out / "model.json"), "--out", str(tmp_path / "d")]) == 1
+    assert "imposed" in capsys.readouterr().err
+    assert not (tmp_path / "d").exists()
+
+
+def test_a_servo_without_a_force_is_refused(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert data.is_dir()
+    log, out = "2026-01-15_10h28m10.json", tmp_path / "id"
+    assert main(["identify", log, "--card", "xl330_servo", "--out", str(out)]) == 2
+    assert "force_per_command" in capsys.readouterr().err
+    assert not out.exists()

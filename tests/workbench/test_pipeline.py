@@ -1,0 +1,242 @@
+"""The chain by its links: runs to model, model to design, design to validation, prediction."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from design.tune import Asked, Goals
+from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable
+from identification.karnopp import NAMES
+from identification.log import Log
+from identification.plant import Actuator
+from identification.result import Estimate
+from tests.chain import EMPS, TABLES, identified, model_of, short_recipe
+from workbench.identifying import arx_plant, closed_loop_remarks, decimated, decimation
+from workbench.model import Model
+from workbench.output import dumps
+from workbench.predicting import COLUMNS, predict, prediction_csv
+from workbench.recording import record, truth
+from workbench.tuning import design, design_document, effort_limit, read_design
+from workbench.validating import Limits, validate, validation_document
+
+ACTUATOR = Actuator(19530.0, 10405.0)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+def test_the_short_log_gives_all_nine_within_half_a_percent() -> None:
+    model = identified().model
+    for name in NAMES:
+        found = model.friction[name]
+        assert found.value is not None and found.low is not None and found.high is not None
+        assert found.value == pytest.approx(getattr(TABLES["paper_table1"], name), rel=5e-3)
+        assert found.low < found.value < found.high
+    assert model.actuator is not None and set(model.actuator) == {"k1", "k2"}
+    assert model.fit.adequate
+    assert model.log[0].rows == 3001
+    assert model.plant is not None and model.plant.h == pytest.approx(0.01)
+    assert any("closed loop" in line for line in model.fit.remarks)
+
+
+def test_the_arx_plant_takes_orders_and_period_as_asked() -> None:
+    log = identified().sources[0].log
+    found = arx_plant([log], (3, 2, 2), 0.02)
+    assert (found.na, found.nb, found.nk) == (3, 2, 2)
+    assert found.h == pytest.approx(0.02)
+    assert found.B[:2] == (0.0, 0.0) and len(found.B) == 4
+    assert found.input == "F"
+    with pytest.raises(BadModel, match="the log is sampled every"):
+        arx_plant([log], None, 1e-3)
+
+
+def test_decimation_keeps_outputs_and_means_inputs() -> None:
+    u, y = np.arange(10.0), np.arange(10.0) ** 2
+    mean, kept = decimated(u, y, 3)
+    assert mean.tolist() == [1.0, 4.0, 7.0]
+    assert kept.tolist() == [0.0, 9.0, 36.0]
+    assert decimation(1e-3, None) == 10
+    assert decimation(0.05, None) == 1
+    assert decimation(1e-3, 5e-3) == 5
+
+
+def test_a_loop_is_remarked_only_where_y_follows_r() -> None:
+    t = np.linspace(0.0, 1.0, 200)
+    follows = Log("a", {"t": t, "y": np.sin(9 * t), "r": np.sin(9 * t)})
+    not_so = Log("b", {"t": t, "y": np.sin(9 * t), "r": np.cos(90 * t)})
+    assert len(closed_loop_remarks([follows, not_so])) == 1
+
+
+@pytest.mark.parametrize("name", list(TABLES))
+def test_default_designs_of_the_paper_s_plants_pass_in_simulation(name: str) -> None:
+    model = model_of(TABLES[name], ACTUATOR)
+    found = design(model)
+    assert found.plant.source == "physical" and found.force is not None
+    assert found.rst is not None and found.rst.missed == ()
+    assert found.rst.margins.modulus >= 0.5
+    assert found.rst.margins.worst_modulus is not None
+    assert found.rst.margins.worst_modulus >= 0.5
+    assert found.rst.margins.delay_samples is not None
+    assert found.rst.margins.delay_samples >= 2.0
+    result, _ = validate(model, found, rng())
+    assert result.passed, result.figures
+
+
+def test_the_default_design_of_the_emps_axis_passes() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    found = design(model)
+    assert found.force is None
+    assert found.recommended == "rst"
+    result, _ = validate(model, found, rng())
+    assert result.passed, result.figures
+
+
+def test_a_design_comes_back_from_its_file(tmp_path: Path) -> None:
+    found = design(model_of(TABLES["paper_table2"], ACTUATOR))
+    path = tmp_path / "design.json"
+    path.write_text(dumps(design_document(found)), encoding="utf-8")
+    back = read_design(path)
+    assert dumps(design_document(back)) == dumps(design_document(found))
+    document = json.loads(path.read_text(encoding="utf-8"))
+    document["rst"]["Q"] = [1.0]
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(BadModel, match=r"\[rst\] unknown key 'Q'"):
+        read_design(path)
+
+
+def test_asked_poles_and_period_are_taken() -> None:
+    model = model_of(TABLES["paper_table2"], ACTUATOR)
+    found = design(model, Asked((12.0, 0.9)), period=0.02)
+    assert found.rst is not None and found.rst.dominant == (12.0, 0.9)
+    assert found.plant.h == 0.02 and found.rst.h == 0.02
+    with pytest.raises(BadSpecification, match="zeta"):
+        design(model, Asked((12.0, -0.9)))
+    plain = design(model, Asked(integrator=False))
+    assert plain.pid is None and "integrator" in plain.refused["pid"]
+
+
+def test_goals_are_taken() -> None:
+    model = model_of(TABLES["paper_table2"], ACTUATOR)
+    easy, strict = (design(model, goals=Goals(m, 2.0)).rst for m in (0.4, 0.6))
+    assert easy is not None and strict is not None
+    assert strict.margins.modulus >= 0.6
+    assert strict.dominant[0] < easy.dominant[0]
+    limit = effort_limit(model)
+    assert limit == pytest.approx(20 * np.log10(0.2 * 17.55 / 1e-5))
+
+
+def without_mass(model: Model) -> Model:
+    blank = Estimate(None, "kg", reason="no acceleration", assumed=1.0)
+    return replace(model, friction={**model.friction, "m": blank})
+
+
+def test_without_a_mass_the_arx_plant_carries_the_design() -> None:
+    model = without_mass(identified().model)
+    found = design(model)
+    assert found.plant.source == "arx"
+    assert found.rst is not None and found.rst.margins.modulus >= 0.5
+    asked = design(identified().model, source="arx")
+    assert asked.plant.A == found.plant.A
+    with pytest.raises(BadSpecification, match="identify again with --design-period"):
+        design(model, period=0.02)
+
+
+def test_a_model_that_carries_no_design_is_refused() -> None:
+    model = without_mass(model_of(TABLES["paper_table1"], ACTUATOR))
+    with pytest.raises(NotIdentifiable, match="no ARX plant"):
+        design(model)
+    plant = identified().model.plant
+    assert plant is not None
+    wild = replace(plant, simulation_relative=0.9)
+    with pytest.raises(NotIdentifiable, match="leaves 90 % of the motion"):
+        design(replace(model, plant=wild))
+    imposed = replace(model.log[0], position_rms=None)
+    with pytest.raises(NotIdentifiable, match="imposed"):
+        design(replace(model, log=(imposed,)))
+
+
+def test_another_plant_can_fail_what_the_model_passes() -> None:
+    model, other = (model_of(TABLES[f"paper_table{k}"], ACTUATOR) for k in (1, 3))
+    found = design(model)
+    result, traces = validate(model, found, rng(), plant=other)
+    assert set(result.figures["rst"]) == {"model", "plant"}
+    assert result.figures["rst"]["model"].passed
+    assert not result.figures["rst"]["plant"].passed
+    assert not result.passed
+    assert ("rst", "plant") in traces
+    document = validation_document(result)
+    assert document["schema"] == "validation/1"
+    assert document["figures"]["rst"]["plant"]["passed"] is False
+
+
+def test_limits_are_taken() -> None:
+    model = model_of(TABLES["paper_table1"], ACTUATOR)
+    found = design(model)
+    for limits in (Limits(modulus=0.95), Limits(delay=9.0), Limits(standstill=1e-6),
+                   Limits(tracking=1e-3)):  # fmt: skip
+        result, _ = validate(model, found, rng(), limits=limits)
+        assert not result.passed
+        assert len(result.figures[result.judged]["model"].missed) == 1
+
+
+def test_a_design_with_a_force_loop_does_not_fit_a_motor() -> None:
+    model = model_of(TABLES["paper_table1"], ACTUATOR)
+    with pytest.raises(BadModel, match="force loop"):
+        validate(model, design(model), rng(), plant=model_of(EMPS, k_a=35.0))
+
+
+def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
+    card, recipe = short_recipe()
+    log = record("other", recipe, seed=99)
+    found = predict(identified().model, log)
+    assert found.drive == "command"
+    assert found.position_rms < 2e-4
+    assert found.force_simulated_rms is not None and found.force_simulated_rms < 0.03
+    header, first, *_ = prediction_csv([found]).splitlines()
+    assert header == ",".join(COLUMNS)
+    assert len(first.split(",")) == len(COLUMNS)
+    assert card.recipe is not None
+
+
+def test_a_prediction_by_force_drifts_less_in_windows() -> None:
+    log = identified().sources[0].log
+    model = identified().model
+    free = predict(model, log, drive="force")
+    windows = predict(model, log, drive="force", window=0.5)
+    assert free.drive == "force"
+    assert windows.position_rms < free.position_rms
+    with pytest.raises(BadModel, match="window"):
+        predict(model, log, window=1e-3)
+
+
+def test_a_prediction_without_a_command_leaves_its_column_empty() -> None:
+    log = identified().sources[0].log
+    bare = Log("bare", {key: log[key] for key in ("t", "y", "F")})
+    found = predict(identified().model, bare)
+    assert found.drive == "force"
+    assert found.force_simulated_rms is None
+    assert prediction_csv([found]).splitlines()[1].split(",")[3] == ""
+    with pytest.raises(BadLog, match="no command u"):
+        predict(identified().model, bare, drive="command")
+
+
+def test_a_prediction_does_not_change_the_log() -> None:
+    log = identified().sources[0].log
+    before = {key: values.copy() for key, values in log.signals.items()}
+    predict(identified().model, log, window=0.5)
+    assert all(np.array_equal(before[key], log[key]) for key in before)
+
+
+def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
+    _, recipe = short_recipe(1.0)
+    one, again, other = (record("x", recipe, seed=s) for s in (1, 1, 2))
+    assert np.array_equal(one["y"], again["y"])
+    assert not np.array_equal(one["y"], other["y"])
+    assert set(one.signals) == {"t", "r", "y", "F", "u"}
+    known = truth("x", recipe, 2)
+    assert known["seed"] == 2
+    assert known["friction"]["F_sn"] == {"value": -23.0, "unit": "N"}

@@ -1,0 +1,111 @@
+"""Reports: whole, self-contained, labelled, small; lines keep their peaks."""
+
+import re
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from identification.plant import Actuator
+from tests.chain import TABLES, identified, model_of
+from workbench.report.figures import POINTS, spread, thinned
+from workbench.report.fit import liveliest
+from workbench.report.page import Section, page
+from workbench.report.reports import design_report, identification_report, validation_report
+from workbench.tuning import design
+from workbench.validating import validate
+
+LARGEST = 2_000_000
+VOID = {"meta", "br", "img", "hr"}
+
+
+class Balance(HTMLParser):
+    """Whether every tag is closed in order."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        pass
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag
+
+
+def checked(html: str, figures: int) -> str:
+    parser = Balance()
+    parser.feed(html)
+    assert parser.open == []
+    assert len(html) < LARGEST
+    assert html.count("<svg") == figures
+    assert "<script" not in html
+    # Names of XML vocabularies are no addresses that a browser would fetch.
+    fetched = re.findall(r'(?:src|href)="(?!#|data:)([^"]+)"|url\((?!#)([^)]+)\)', html)
+    assert fetched == []
+    ids = re.findall(r' id="([^"]+)"', html)
+    assert len(ids) == len(set(ids))
+    assert not re.search(r"\bnan\b", html)
+    return html
+
+
+def test_identification_report() -> None:
+    html = checked(identification_report(identified()), 3)
+    for text in ("position [m]", "applied force [N]", "velocity [m/s]", "friction force [N]",
+                 "time [s]", "moving mass", "95 % interval", "short.csv", "a remark"):  # fmt: skip
+        assert text in html
+
+
+def test_design_report() -> None:
+    html = checked(design_report(design(identified().model)), 2)
+    for text in ("frequency [rad/s]", "|S_yp| [dB]", "modulus margin", "RST S:", "compensator"):
+        assert text in html
+
+
+def test_validation_report_shows_both_plants() -> None:
+    model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
+    result, traces = validate(model, design(model), np.random.default_rng(0), plant=other)
+    html = checked(validation_report(result, traces, rotary=False), 2)
+    assert "Loop on the identified plant" in html and "Loop on the other plant" in html
+    rotary = validation_report(result, traces, rotary=True)
+    assert "position [rad]" in rotary and "applied force [N m]" in rotary
+
+
+def test_text_is_escaped() -> None:
+    html = page("<b>x</b>", "a & b", [Section("<i>", "<p>kept</p>")])
+    assert "<b>x</b>" not in html
+    assert "a &amp; b" in html
+    assert "<p>kept</p>" in html
+
+
+def test_thinning_keeps_ends_and_peaks() -> None:
+    x = np.arange(100_000.0)
+    y = np.sin(x / 5e3)
+    y[54_321] = 7.0
+    y[12_345] = -9.0
+    xs, ys = thinned(x, y)
+    assert len(xs) <= POINTS + 4
+    assert ys.max() == 7.0 and ys.min() == -9.0
+    assert (xs[0], xs[-1]) == (0.0, 99_999.0)
+    assert np.all(np.diff(xs) > 0)
+    short, _ = thinned(x[:50], y[:50])
+    assert len(short) == 50
+
+
+@pytest.mark.parametrize(("count", "most"), [(10, 100), (1000, 100), (1001, 100)])
+def test_spread_is_even_and_bounded(count: int, most: int) -> None:
+    index = spread(count, most)
+    assert len(index) <= most
+    assert len(set(np.diff(index).tolist())) <= 1
+
+
+def test_the_liveliest_part_is_where_it_moves() -> None:
+    y = np.zeros(10_000)
+    y[6000:7000] = np.sin(np.linspace(0, 20, 1000))
+    part = liveliest(y)
+    assert part.start <= 6100 and part.stop >= 6900
+    assert liveliest(y[:20]) == slice(0, 20)
