@@ -59,8 +59,9 @@ class Box:
         return every
 
     def wider(self, factor: float) -> "Box":
-        """The box with every bound moved out by `factor`."""
-        return replace(self, low=self.low / factor, high=self.high * factor)
+        """The box with the bounds of the nine moved out by `factor`; a coupling keeps its own."""
+        by = np.where(self.free == K2, 1.0, factor)
+        return replace(self, low=self.low / by, high=self.high * by)
 
     def _scaled(self) -> tuple[Array, Array, BoolArray]:
         logs = np.isin(self.free, LOGARITHMIC)

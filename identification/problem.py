@@ -100,9 +100,10 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     )
     stiffness = None if by_command or hold else _stiffness_bounds(logs, firsts)
     box, row = search_box(firsts, k1, k2, stiffness)
-    free = box.free
+    # A coupling is chosen by the search alone: the refinement would stiffen it without end.
+    free: IntArray = np.arange(9, dtype=np.int64)
     if by_command:
-        free = np.concatenate([box.free, np.array([K1, K2], dtype=np.int64)])
+        free = np.concatenate([free, np.array([K1, K2], dtype=np.int64)])
     return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator)
 
 

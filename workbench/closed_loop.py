@@ -8,8 +8,8 @@ from design.two_rate import simulate_two_rate
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.plant import Actuator, Motor
+from workbench.design_values import Controller, Design
 from workbench.model import Model
-from workbench.tuning import Controller, Design
 
 
 def run_loop(

@@ -10,13 +10,14 @@ import numpy as np
 from identification.errors import BadCard
 from identification.karnopp import NAMES
 from workbench.card import Card
+from workbench.design_values import Design
 from workbench.design_views import design_lines
 from workbench.identifying import Progress
 from workbench.output import dumps
 from workbench.pipeline import Identified, identify_sources
 from workbench.recording import as_columns, record, truth
 from workbench.sources import read_sources
-from workbench.tuning import Design, design
+from workbench.tuning import design
 from workbench.validating import Traces, Validation, validate
 from workbench.validation_views import HEAD, validation_lines, validation_rows, verdict
 from workbench.views import Row, in_digits, table, written

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.tuning import Controller, Design
+from workbench.design_values import Controller, Design
 from workbench.views import Row, table, written
 
 if TYPE_CHECKING:

@@ -1,7 +1,7 @@
 """The model of one machine: what identification found, and model.json, which holds all of it."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -11,7 +11,6 @@ from identification.karnopp import NAMES, Karnopp
 from identification.log import Rig
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive, Estimate
-from workbench.logs import Fingerprint
 from workbench.reading import read_result
 
 SCHEMA = "model/1"
@@ -220,12 +219,6 @@ def as_number(estimate: Estimate) -> dict[str, Any]:
 def read_model(path: Path) -> Model:
     """The model in the file `path`; raises BadModel in one line where it is none."""
     return read_result(path, Model, SCHEMA)
-
-
-def log_entries(prints: Sequence[Fingerprint], entries: Sequence[LogEntry]) -> tuple[LogEntry, ...]:
-    """The entries with the file, hash and rows of their files."""
-    pairs = zip(prints, entries, strict=True)
-    return tuple(replace(e, file=p.file, sha256=p.sha256, rows=p.rows) for p, e in pairs)
 
 
 def versions() -> dict[str, str]:

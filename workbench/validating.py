@@ -13,8 +13,10 @@ from design.rst import closed_loop_poles
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from workbench.closed_loop import loop_period, run_loop
-from workbench.model import Model
-from workbench.tuning import Controller, Design, Linear, MarginValues, margin_values, sampled_plant
+from workbench.design_values import Controller, Design, Linear, MarginValues, margin_values
+from workbench.limit_cycle import LimitCycle, limit_cycle
+from workbench.model import Model, versions
+from workbench.tuning import sampled_plant
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -25,7 +27,6 @@ LAST_DWELL = 10.0  # s
 LAST = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
 BEYOND = 1.2  # times the largest force in the logs that the loop may ask for unremarked
-CYCLES = 3  # reversals in the judged part that make a limit cycle
 ESCAPED = 10.0  # times the step
 
 
@@ -38,14 +39,6 @@ class Limits:
     delay: float = 2.0
     standstill: float = 0.05
     tracking: float = 0.15
-
-
-@dataclass(frozen=True)
-class LimitCycle:
-    """A motion that goes on under a constant reference; peak to peak [m], period [s]."""
-
-    amplitude: float
-    period: float
 
 
 @dataclass(frozen=True)
@@ -111,8 +104,6 @@ def validate(
     The recommended controller is judged, on every plant. Raises BadModel where the design does
     not fit the plant (a force loop without an actuator).
     """
-    from workbench.model import versions
-
     limits = limits or Limits()
     reference = references(model, found)
     plants = {"model": model} | ({"plant": plant} if plant else {})
@@ -223,42 +214,6 @@ def _overshoot(trace: LoopRun, step: float) -> float:
         beyond = float(np.max(np.sign(height) * (trace.y[low:high] - trace.r[low])))
         worst = max(worst, beyond / abs(height))
     return worst
-
-
-def limit_cycle(trace: LoopRun, noise: float) -> LimitCycle | None:
-    """A motion under the last constant reference that does not end; None where it does.
-
-    It must reverse `CYCLES` times, by more than five times the position's noise, and the last
-    half of the dwell must not be calmer than the half before by more than half.
-    """
-    change = np.flatnonzero(np.diff(trace.r)) + 1
-    start = int(change[-1]) if change.size else 0
-    y = trace.y[start:]
-    early, late = y[len(y) // 3 : 2 * len(y) // 3], y[2 * len(y) // 3 :]
-    size, before = float(np.ptp(late)), float(np.ptp(early))
-    if size <= max(5.0 * noise, 1e-9) or size < 0.5 * before:
-        return None
-    turns = _reversals(y[len(y) // 3 :], 0.3 * size)
-    if len(turns) < CYCLES:
-        return None
-    h = float(trace.t[1] - trace.t[0])
-    return LimitCycle(size, 2.0 * h * float(np.mean(np.diff(turns))))
-
-
-def _reversals(y: Array, least: float) -> list[int]:
-    """Samples at which the motion has turned round by at least `least`."""
-    turns: list[int] = []
-    low = high = float(y[0])
-    way = 0
-    for k, value in enumerate(y.tolist()):
-        low, high = min(low, value), max(high, value)
-        if way >= 0 and high - value > least:
-            way, low = -1, value
-            turns.append(k)
-        elif way <= 0 and value - low > least:
-            way, high = 1, value
-            turns.append(k)
-    return turns
 
 
 def _linear_margins(machine: Model, found: Design, one: Controller) -> MarginValues | None:

@@ -5,6 +5,7 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.karnopp import NAMES, Karnopp
 from identification.log import Log, Rig
@@ -75,7 +76,8 @@ def test_two_logs_make_one_fit_with_smaller_spread() -> None:
 
 def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
     t = np.arange(8000, dtype=np.float64) * 1e-3
-    pushes: Array = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0) * (np.sin(2 * np.pi * 2.0 * t) > -0.2)
+    both = (np.sin(2 * np.pi * 0.5 * t) > 0) & (np.sin(2 * np.pi * 2.0 * t) > -0.2)
+    pushes: Array = np.where(both, 0.05, 0.0)
     log = made_log(table(2), u=pushes, seconds=8.0)
     assert np.min(np.diff(log["y"][::100])) > -1e-4
     fit = fitted(log)

@@ -14,12 +14,13 @@ from identification.log import Log
 from identification.plant import Actuator
 from identification.result import Estimate
 from tests.chain import EMPS, TABLES, identified, model_of, short_recipe
+from workbench.design_values import design_document, read_design
 from workbench.identifying import arx_plant, closed_loop_remarks, decimated, decimation
 from workbench.model import Model
 from workbench.output import dumps
 from workbench.predicting import COLUMNS, predict, prediction_csv
 from workbench.recording import record, truth
-from workbench.tuning import design, design_document, effort_limit, read_design
+from workbench.tuning import design, effort_limit
 from workbench.validating import Limits, validate, validation_document
 
 ACTUATOR = Actuator(19530.0, 10405.0)

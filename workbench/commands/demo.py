@@ -22,10 +22,10 @@ def command(seed: int, as_json: bool, out: Path | None) -> None:
     """
     from workbench.card import load_card
     from workbench.demonstration import demo_view, demonstrate
+    from workbench.design_values import design_document
     from workbench.fetch import card_path
     from workbench.model import model_document
     from workbench.report.reports import design_report, identification_report, validation_report
-    from workbench.tuning import design_document
     from workbench.validating import validation_document
 
     card = load_card(card_path(RECIPE))

@@ -48,11 +48,12 @@ def command(
     asked.
     """
     from design.tune import Asked, Goals
+    from workbench.design_values import design_document
     from workbench.design_views import design_view
     from workbench.model import read_model
     from workbench.options import parse_auxiliary, parse_poles
     from workbench.report.reports import design_report
-    from workbench.tuning import design, design_document, effort_limit
+    from workbench.tuning import design, effort_limit
 
     model = read_model(model_file)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)

@@ -51,9 +51,9 @@ def command(
     """
     import numpy as np
 
+    from workbench.design_values import read_design
     from workbench.model import read_model
     from workbench.report.reports import validation_report
-    from workbench.tuning import read_design
     from workbench.validating import Limits, validate, validation_document
     from workbench.validation_views import validation_view
 

@@ -6,10 +6,10 @@ from scipy.signal import lfilter
 from design.margins import sensitivities
 from design.rst import closed_loop
 from identification.arrays import Array
+from workbench.design_values import Controller, Design
 from workbench.design_views import HEAD, design_lines, margin_rows, polynomial_lines
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, style
 from workbench.report.page import Section, render
-from workbench.tuning import Controller, Design
 
 COLOURS = {"rst": REFERENCE, "pid": MODEL}
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 
+from workbench.design_values import Design
 from workbench.pipeline import Identified
 from workbench.predicting import fitted_run
 from workbench.report.controllers import (
@@ -16,7 +17,6 @@ from workbench.report.loop import judged, loop
 from workbench.report.page import Section, page, render
 from workbench.report.parameters import parameters
 from workbench.report.residual import residual
-from workbench.tuning import Design
 from workbench.validating import Traces, Validation
 from workbench.validation_views import verdict
 from workbench.views import fit_lines, summary
