@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.actuator import ActuatorFit
+from identification.arrays import Array
 from identification.experiment import total_cost
 from identification.identifiability import Events, estimates, events_of
 from identification.imposed import fit_imposed, is_imposed
@@ -22,7 +23,7 @@ from identification.plant import Actuator
 from identification.problem import ADEQUATE, Problem, plant_of, pose, simulated, start_of
 from identification.refine import Optimum, refine
 from identification.result import Drive, KarnoppFit, LogFit
-from identification.search import Population, evolve
+from identification.search import evolve
 from identification.simulate import FreeRun
 from identification.stepping import DV_N, DV_P, F_SN, F_SP, K1, K2
 from identification.weighing import Progress, Solution, weigh_correlated, weigh_misfit, weigh_noise
@@ -93,7 +94,7 @@ def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solut
     attempts = ATTEMPTS if problem.drive == "command" else ATTEMPTS - 1
     for attempt in range(attempts):
         size = POPULATION * (2 if attempt == ATTEMPTS - 1 else 1)
-        found, population = _search(problem, rng, size, attempt, report)
+        found, members = _search(problem, rng, size, attempt, report)
         before = min((one.cost for one in optima), default=np.inf)
         optima.append(found)
         report("refining", attempt / attempts)
@@ -111,7 +112,7 @@ def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solut
     if not problem.hold:
         rivals = [one.p for one in optima if one.cost < RIVAL * best.cost]
         return weigh_correlated(problem, best, np.array(rivals), rng, spent)
-    return weigh_misfit(problem, best, population, rng, spent, report)
+    return weigh_misfit(problem, best, members, rng, spent, report)
 
 
 def _through_force(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
@@ -128,8 +129,9 @@ def _through_force(problem: Problem, rng: np.random.Generator, report: Progress)
 
 def _search(
     problem: Problem, rng: np.random.Generator, size: int, attempt: int, report: Progress
-) -> tuple[Optimum, Population]:
-    """One global search over windows, and its best member refined over the whole run."""
+) -> tuple[Optimum, Array]:
+    """One global search over windows, its best member refined over the whole run, and all members
+    as kernel parameters (k, 11), best first."""
     cap = _cap(problem, attempt)
     # A search that failed may have looked around a bad first estimate.
     box, runs = problem.box.wider(3.0**attempt), problem.runs
@@ -155,7 +157,7 @@ def _search(
         rescued = _search_near(problem, near, cap, rng)
         spent += rescued.evaluations
         optimum = rescued if rescued.cost < optimum.cost else optimum
-    return replace(optimum, evaluations=spent), population
+    return replace(optimum, evaluations=spent), box.rows(population.members)
 
 
 def _search_near(problem: Problem, near: Optimum, cap: float, rng: np.random.Generator) -> Optimum:

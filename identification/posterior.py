@@ -16,7 +16,7 @@ from identification.stepping import kernel_parameters
 from identification.weighing import granted_samples, log_cost, reweighed
 
 WALKERS = 64
-STEPS = 1500
+STEPS = 4000
 
 
 @dataclass(frozen=True)

@@ -65,7 +65,9 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
         [m, coulomb_p, coulomb_n, viscous_p, viscous_n, edge_p, -edge_n, stick_p, -stick_n]
     )
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
-    low = np.array([m / WIDE, 0, 0, 0, 0, fastest / 3000, fastest / 3000, 0, 0])
+    # A motor's force has no ramps that would show a narrow band: do not look for one.
+    narrow = fastest / (500 if held else 3000)
+    low = np.array([m / WIDE, 0, 0, 0, 0, narrow, narrow, 0, 0])
     high = np.array(
         [
             m * WIDE,

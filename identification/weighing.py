@@ -26,7 +26,6 @@ from identification.refine import (
     unpack,
 )
 from identification.residual_tests import effective_samples
-from identification.search import Population
 from identification.stepping import K1, K2
 
 Progress = Callable[[str, float], None]
@@ -37,7 +36,7 @@ STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated
 ROUGH = 1.15  # what the walls of the likelihood add to its spread: coverage of 40 seeds chose it
 WALKERS = 64
 STEPS = 200
-LONG_WALK = 600
+LONG_WALK = 1000
 
 
 @dataclass(frozen=True)
@@ -118,20 +117,21 @@ def weigh_correlated(
 def weigh_misfit(
     problem: Problem,
     optimum: Optimum,
-    population: Population,
+    searched: Array,
     rng: np.random.Generator,
     spent: int,
     report: Progress,
 ) -> Solution:
     """A fit that leaves more than noise: the mean over all sets that explain the log as well.
 
+    searched: parameters (k, 11) that the search ended with, where half of the walkers begin.
     The residual counts for as many independent samples as its correlation leaves of it, at least
     FEWEST; a set is then as likely as (mean square)^(-n/2).
     """
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
     granted = granted_samples(problem, optimum)
-    rows = problem.box.rows(population.members[: WALKERS // 2])
+    rows = searched[problem.box.holds(searched)][: WALKERS // 2]
     rows[:, [K1, K2]] = np.where(problem.free[-1] == K2, rows[:, [K1, K2]], optimum.p[[K1, K2]])
     seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
     around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
@@ -139,9 +139,24 @@ def weigh_misfit(
     members = walk(problem, runs, optimum, seeds, LONG_WALK, granted, rng, report)
     spent += WALKERS * LONG_WALK
     covariance = np.cov(members.T)
-    optimum = moved(runs, optimum, np.mean(members, axis=0), covariance)
+    optimum = moved(runs, optimum, _central(runs, optimum, members), covariance)
     adequate = chi_square <= problem.adequate
     return Solution(optimum, members, chi_square, adequate, spent)
+
+
+def _central(runs: Sequence[Run], optimum: Optimum, members: Array) -> Array:
+    """Mean (d,) of the members, or the nearest good member where the mean itself fits badly.
+
+    The likely sets can lie on a bent ridge, beside which their mean falls.
+    """
+    sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
+    costs = total_cost(runs, sets, 0.0, begun)
+    mean: Array = np.mean(members, axis=0)
+    if moved(runs, optimum, mean, optimum.covariance).cost <= float(np.median(costs)):
+        return mean
+    good = members[costs <= np.quantile(costs, 0.25)]
+    away = np.sum(((good - mean) / np.maximum(np.std(members, axis=0), 1e-300)) ** 2, axis=1)
+    return np.asarray(good[np.argmin(away)])
 
 
 def walk(
