@@ -55,7 +55,7 @@ def ensemble(
         d,
         log_probability,
         vectorize=True,
-        moves=[(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)],
+        moves=[(emcee.moves.DEMove(), 0.7), (emcee.moves.StretchMove(), 0.3)],
     )
     state = np.random.RandomState(int(rng.integers(2**32))).get_state()
     begin = emcee.State(first, random_state=state)

@@ -16,7 +16,7 @@ from identification.stepping import kernel_parameters
 from identification.weighing import granted_samples, log_cost, reweighed
 
 WALKERS = 64
-STEPS = 4000
+STEPS = 6000
 
 
 @dataclass(frozen=True)
@@ -93,6 +93,8 @@ def sample_posterior(
 
 
 def _verdict(converged: bool, steps: int, autocorrelation: float) -> str:
+    if not np.isfinite(autocorrelation):
+        return "not converged: the chain is too short to tell; take more steps"
     length = f"{steps - steps // 2} kept steps are {(steps - steps // 2) / autocorrelation:.0f}"
     if converged:
         return f"converged: {length} autocorrelation times long"

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.box import Box
 from identification.ensemble import ensemble
 from identification.experiment import Run, total_cost
 from identification.objective import START_G, START_V, START_Y
@@ -26,7 +27,7 @@ from identification.refine import (
     unpack,
 )
 from identification.residual_tests import effective_samples
-from identification.stepping import K1, K2
+from identification.stepping import F_SN, F_SP, K1, K2
 
 Progress = Callable[[str, float], None]
 FEWEST, MOST = 12.0, 400.0  # independent samples granted to a residual that is not noise
@@ -34,9 +35,11 @@ OUTLIER = 25.0  # bound of a squared residual where stops may be missed
 BETWEEN = 5e-4  # relative sd that the force between samples adds where it drives the run
 STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated residuals
 ROUGH = 1.15  # what the walls of the likelihood add to its spread: coverage of 40 seeds chose it
+TRUST = 1.5  # factor around the force equation's parameters in which a misfit is averaged
+SLIDING, STICKING = np.arange(0, 5), np.array([F_SP, F_SN])
 WALKERS = 64
 STEPS = 200
-LONG_WALK = 1000
+LONG_WALK = 1500
 
 
 @dataclass(frozen=True)
@@ -128,20 +131,41 @@ def weigh_misfit(
     The residual counts for as many independent samples as its correlation leaves of it, at least
     FEWEST; a set is then as likely as (mean square)^(-n/2).
     """
+    problem = replace(problem, box=_trusted(problem))
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
     granted = granted_samples(problem, optimum)
-    rows = searched[problem.box.holds(searched)][: WALKERS // 2]
+    rows = searched[: WALKERS // 2].copy()
     rows[:, [K1, K2]] = np.where(problem.free[-1] == K2, rows[:, [K1, K2]], optimum.p[[K1, K2]])
     seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
     around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
     seeds = np.concatenate([around, _jittered_starts(seeds, problem, runs, rng)])
+    shared = len(problem.box.free)
+    seeds[:, :shared] = problem.box.moved_inside(seeds[:, :shared])
     members = walk(problem, runs, optimum, seeds, LONG_WALK, granted, rng, report)
     spent += WALKERS * LONG_WALK
     covariance = np.cov(members.T)
     optimum = moved(runs, optimum, _central(runs, optimum, members), covariance)
     adequate = chi_square <= problem.adequate
     return Solution(optimum, members, chi_square, adequate, spent)
+
+
+def _trusted(problem: Problem) -> Box:
+    """The search's box cut to what the force equation, regressed alone, allows by a wide margin.
+
+    A position that drifts for a whole log bounds the parameters poorly; the force does not.
+    """
+    box = problem.box
+    found = [first.nine for first in problem.firsts if first.sliding is not None]
+    if not found:
+        return box
+    nine = np.abs(np.median(found, axis=0))
+    low, high = box.low.copy(), box.high.copy()
+    low[SLIDING] = np.maximum(low[SLIDING], nine[SLIDING] / TRUST * 2.0)
+    high[SLIDING] = np.minimum(high[SLIDING], nine[SLIDING] * TRUST / 2.0)
+    stick = nine[[1, 2]] * TRUST / 2.0
+    high[STICKING] = np.minimum(high[STICKING], stick)
+    return replace(box, low=low, high=high)
 
 
 def _central(runs: Sequence[Run], optimum: Optimum, members: Array) -> Array:
@@ -171,6 +195,10 @@ def walk(
 ) -> Array:
     """Samples (k, d) of walkers from `seeds`; granted: independent samples of a misfit."""
     cost = log_cost(problem, runs, optimum, granted)
+    center = pack(runs, optimum.p, optimum.starts, optimum.free)
+    seeds = np.where(np.isfinite(seeds), seeds, center)
+    # No two walkers may agree: their differences are the steps.
+    seeds = seeds + 1e-9 * optimum.scale * rng.standard_normal(seeds.shape)
     found = ensemble(cost, seeds, steps, rng, lambda share: report("weighing", share))
     keep = rng.choice(len(found.samples), min(1024, len(found.samples)), replace=False)
     return found.samples[keep]
