@@ -52,16 +52,16 @@ class Box:
         return z
 
     def holds(self, rows: Array) -> BoolArray:
-        """Which rows (k, 11) lie in a box twice as wide, (k,)."""
+        """Which rows (k, 11) lie in the box, (k,)."""
         values = rows[:, self.free] * SIGN[self.free]
-        inside: BoolArray = (values >= 0.5 * self.low) & (values <= 2.0 * self.high)
+        inside: BoolArray = (values >= self.low) & (values <= self.high)
         every: BoolArray = np.all(inside, axis=1)
         return every
 
     def moved_inside(self, values: Array) -> Array:
-        """Values (k, d) of the free parameters, clipped to a box twice as wide."""
+        """Values (k, d) of the free parameters, clipped to the box."""
         sign = SIGN[self.free]
-        clipped: Array = sign * np.clip(sign * values, 0.5 * self.low, 2.0 * self.high)
+        clipped: Array = sign * np.clip(sign * values, self.low, self.high)
         return clipped
 
     def wider(self, factor: float) -> "Box":

@@ -76,7 +76,7 @@ def sample_posterior(
     center = pack(runs, optimum.p, optimum.starts, optimum.free)
     spread = np.sqrt(np.diag(optimum.covariance)) if granted is None else 0.01 * optimum.scale
     first = center + spread * rng.standard_normal((walkers, len(center)))
-    cost = log_cost(problem, runs, optimum, granted)
+    cost = log_cost(problem, runs, optimum, problem.box.wider(4.0), granted)
     walk = ensemble(cost, first, steps, rng, on_progress)
     names = tuple(fit.free)
     samples = walk.samples[:, : len(names)]

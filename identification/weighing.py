@@ -72,7 +72,8 @@ def weigh_noise(
         index = rng.choice(len(cloud.weights), 1024, p=cloud.weights)
         members = cloud.members[index]
     else:
-        members = walk(problem, runs, optimum, _seeds(cloud, rng), STEPS, None, rng, report)
+        cost = log_cost(problem, runs, optimum, problem.box.wider(2.0), None)
+        members = walk(cost, _seeds(cloud, rng), STEPS, rng, report)
         members = _widened(members, optimum.covariance)
         spent += WALKERS * STEPS
     members = np.mean(members, axis=0) + ROUGH * (members - np.mean(members, axis=0))
@@ -131,7 +132,7 @@ def weigh_misfit(
     The residual counts for as many independent samples as its correlation leaves of it, at least
     FEWEST; a set is then as likely as (mean square)^(-n/2).
     """
-    problem = replace(problem, box=_trusted(problem))
+    box = _trusted(problem)
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
     granted = granted_samples(problem, optimum)
@@ -140,9 +141,10 @@ def weigh_misfit(
     seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
     around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
     seeds = np.concatenate([around, _jittered_starts(seeds, problem, runs, rng)])
-    shared = len(problem.box.free)
-    seeds[:, :shared] = problem.box.moved_inside(seeds[:, :shared])
-    members = walk(problem, runs, optimum, seeds, LONG_WALK, granted, rng, report)
+    shared = len(box.free)
+    seeds[:, :shared] = box.moved_inside(seeds[:, :shared])
+    cost = log_cost(problem, runs, optimum, box, granted)
+    members = walk(cost, seeds, LONG_WALK, rng, report)
     spent += WALKERS * LONG_WALK
     covariance = np.cov(members.T)
     optimum = moved(runs, optimum, _central(runs, optimum, members), covariance)
@@ -155,15 +157,15 @@ def _trusted(problem: Problem) -> Box:
 
     A position that drifts for a whole log bounds the parameters poorly; the force does not.
     """
-    box = problem.box
+    box = problem.box.wider(2.0)
     found = [first.nine for first in problem.firsts if first.sliding is not None]
     if not found:
         return box
     nine = np.abs(np.median(found, axis=0))
     low, high = box.low.copy(), box.high.copy()
-    low[SLIDING] = np.maximum(low[SLIDING], nine[SLIDING] / TRUST * 2.0)
-    high[SLIDING] = np.minimum(high[SLIDING], nine[SLIDING] * TRUST / 2.0)
-    stick = nine[[1, 2]] * TRUST / 2.0
+    low[SLIDING] = np.maximum(low[SLIDING], nine[SLIDING] / TRUST)
+    high[SLIDING] = np.minimum(high[SLIDING], nine[SLIDING] * TRUST)
+    stick = nine[[1, 2]] * TRUST
     high[STICKING] = np.minimum(high[STICKING], stick)
     return replace(box, low=low, high=high)
 
@@ -184,37 +186,34 @@ def _central(runs: Sequence[Run], optimum: Optimum, members: Array) -> Array:
 
 
 def walk(
-    problem: Problem,
-    runs: Sequence[Run],
-    optimum: Optimum,
+    cost: Callable[[Array], Array],
     seeds: Array,
     steps: int,
-    granted: float | None,
     rng: np.random.Generator,
     report: Progress,
 ) -> Array:
-    """Samples (k, d) of walkers from `seeds`; granted: independent samples of a misfit."""
-    cost = log_cost(problem, runs, optimum, granted)
-    center = pack(runs, optimum.p, optimum.starts, optimum.free)
-    seeds = np.where(np.isfinite(seeds), seeds, center)
+    """At most 1024 samples (k, d) of walkers from `seeds`."""
+    sound = seeds[np.all(np.isfinite(seeds), axis=1)]
+    seeds = sound[np.arange(len(seeds)) % len(sound)]
     # No two walkers may agree: their differences are the steps.
-    seeds = seeds + 1e-9 * optimum.scale * rng.standard_normal(seeds.shape)
+    size = 1e-9 * np.maximum(np.abs(seeds), np.std(seeds, axis=0))
+    seeds = seeds + size * rng.standard_normal(seeds.shape)
     found = ensemble(cost, seeds, steps, rng, lambda share: report("weighing", share))
     keep = rng.choice(len(found.samples), min(1024, len(found.samples)), replace=False)
     return found.samples[keep]
 
 
 def log_cost(
-    problem: Problem, runs: Sequence[Run], optimum: Optimum, granted: float | None
+    problem: Problem, runs: Sequence[Run], optimum: Optimum, box: Box, granted: float | None
 ) -> Callable[[Array], Array]:
-    """Minus twice the log likelihood of unknowns (k, d), infinite outside twice the box.
+    """Minus twice the log likelihood of unknowns (k, d), infinite outside `box`.
 
     granted: where the residual is a misfit, for how many independent samples it counts.
     """
 
     def cost(members: Array) -> Array:
         sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
-        inside = problem.box.holds(sets)
+        inside = box.holds(sets)
         values = np.full(len(members), np.inf)
         if inside.any():
             begun = np.ascontiguousarray(begun[:, inside])
