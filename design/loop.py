@@ -292,12 +292,12 @@ def _prepared(
         x=x,
         pi=(k_i, k_i * h / T_i),
         limit=math.inf if control_limit is None else control_limit,
-        noise=_checked_noise(noise, len(r), len(plants), motor),
+        noise=checked_noise(noise, len(r), len(plants), motor),
         start=(0.0 + start[0], 0.0 + start[1], 0.0 + start[2]),
     )
 
 
-def _checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) -> LoopNoise:
+def checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) -> LoopNoise:
     """Noise as (n, 1) or (n, plants); a motor's force is not measured."""
     if noise is None:
         return LoopNoise(np.zeros((n, 1)), np.zeros((n, 1)))

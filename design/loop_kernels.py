@@ -332,12 +332,12 @@ def loops_kernel(
     (RECORDS, n, plants), or (RECORDS, 0, plants) for none; costs: (2, plants) takes the sums of
     the squared error and command, weighted by weights (n,).
     """
-    _, modes, _, tables, c = work_space()
+    _, modes, tables = work_space()
     s = np.zeros((STATE + len(x)) * WIDTH)
     for base in range(0, len(p), WIDTH):
         plants = p[base : base + WIDTH]
         s[:] = 0.0
-        prepare(plants, h, tables, s, c)
+        prepare(plants, h, tables, s)
         for i in range(WIDTH):
             place(s, modes, tables, plants, i, start[0], start[1], start[2])
             for j in range(len(x)):

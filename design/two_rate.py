@@ -9,7 +9,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.loop import ForcePI, LoopNoise, LoopRun, prepared_loop
+from design.loop import ForcePI, LoopNoise, LoopRun, checked_noise, prepared_loop
 from design.loop_kernels import force_command, shift
 from design.rst import RST
 from identification.arrays import Array, IntArray, frozen
@@ -109,7 +109,8 @@ def simulate_two_rate(
         start=(y_0, 0.0, 0.0),
     )
     n = len(r)
-    noise = noise or LoopNoise(np.zeros(n), np.zeros(n))
+    checked = checked_noise(noise, n, 1, motor=False)
+    noise = LoopNoise(checked.y[:, 0], checked.F[:, 0])
     pi = (force_controller.k_i, force_controller.k_i * h / force_controller.T_i)
     limit = math.inf if control_limit is None else control_limit
     out, modes = np.empty((4, n)), np.empty(n, dtype=np.int64)

@@ -21,7 +21,6 @@ from identification.stepping import (
     L1,
     L2,
     MODES,
-    ORDER,
     P1,
     P2,
     P3,
@@ -103,8 +102,8 @@ def place(
 
 
 @compiled
-def prepare(p: Array, h: float, tables: Array, s: Array, c: Array) -> None:
-    """Step tables of all lanes, their k1 and k2; `c` is not used (see `work_space`)."""
+def prepare(p: Array, h: float, tables: Array, s: Array) -> None:
+    """Step tables of all lanes, their k1 and k2."""
     for lane in range(WIDTH):
         mode_table(parameters(p, lane), h, tables[lane])
         s[GAIN * WIDTH + lane] = p[lane, K1]
@@ -151,10 +150,8 @@ def march(
     tables: Array,
     s: Array,
     modes: IntArray,
-    flags: IntArray,
     u: Array,
     h: float,
-    c: Array,
     out: Array,
 ) -> None:
     """Steps driven by a command: out[k, 0] positions, out[k, 1] forces before step k, per lane."""
@@ -176,13 +173,11 @@ def march_held(
     tables: Array,
     s: Array,
     modes: IntArray,
-    flags: IntArray,
     y: Array,
     force: Array,
     slope_y: Array,
     slope_force: Array,
     h: float,
-    c: Array,
     out: Array,
 ) -> None:
     """Steps driven by a measured force: F + k2 (y_m - y) at every sample; `out` as in `march`."""
@@ -203,15 +198,10 @@ def march_held(
 
 
 @compiled
-def work_space() -> tuple[Array, IntArray, IntArray, Array, Array]:
-    """Fresh work arrays of a block: state, modes, flags, tables, series.
-
-    Flags and series are not used any more; callers still hand them on.
-    """
+def work_space() -> tuple[Array, IntArray, Array]:
+    """Fresh work arrays of a block: state, modes, step tables."""
     return (
         np.zeros(ROWS * WIDTH),
         np.zeros(WIDTH, dtype=np.int64),
-        np.zeros(WIDTH, dtype=np.int64),
         np.zeros((WIDTH, MODES, COLUMNS)),
-        np.zeros(ORDER + 1),
     )

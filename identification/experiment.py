@@ -91,7 +91,7 @@ def prepare_run(
         weight_y=1.0 / sigma_y,
         weight_force=1.0 / sigma_f if by_command else 0.0,
     )
-    windows = restart_windows(first, h, window) if hold else rest_windows(y, sigma_y, h, window)
+    windows = rest_windows(y, sigma_y, h, window)
     y_0, v_0, _ = measured_start(log)
     start = np.array([y_0, v_0, constant])
     unknown = [] if hold else [START_Y]
@@ -100,19 +100,6 @@ def prepare_run(
     if by_command:
         unknown.append(START_G)
     return Run(log.name, measured, windows, start, tuple(unknown))
-
-
-def restart_windows(first: FirstEstimate, h: float, seconds: float) -> Windows:
-    """Restarts about every `seconds`, at rest where the body rests nearby."""
-    n = len(first.rest)
-    step = max(20, round(seconds / h))
-    at = [0]
-    for low in range(step, n - step // 2, step):
-        resting = np.flatnonzero(first.rest[low : low + step // 2])
-        at.append(low + int(resting[len(resting) // 2]) if len(resting) else low)
-    index: IntArray = np.array(at, dtype=np.int64)
-    v = np.where(first.rest[index], 0.0, first.motion.v[index])
-    return Windows(index, first.motion.y[index], v)
 
 
 def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> Windows:

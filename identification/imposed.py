@@ -11,15 +11,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
+from identification.errors import NotIdentifiable
 from identification.identifiability import Events, estimates
 from identification.inverse_model import NAMES as SLIDING_NAMES
 from identification.inverse_model import Regression, Smoothing, regression
 from identification.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.log import Log, Rig
+from identification.problem import Problem
 from identification.residual_tests import effective_samples
 from identification.result import Estimate, KarnoppFit, LogFit
 from identification.start import measured_start
-from identification.three_step import FirstEstimate
+from identification.three_step import FirstEstimate, usable_cutoffs
 
 SLOW = 0.1  # share of the force below which inertia says nothing of a free body
 LED = 0.01  # share of the force below which the body is surely led
@@ -29,8 +31,8 @@ WHY_NOT = {
     "m": "inertia explains {share:.1%} of the force, so it is not told apart; log faster motion",
     "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
     " add runs at other speeds",
-    "stick": "the motion is imposed, so no force builds up against a stuck body that is free to"
-    " break away; log the body driven by a force",
+    "stick": "no free run was fitted (see the remarks), and the force equation does not hold it;"
+    " log the body driven by a force, from rest",
 }
 
 
@@ -53,20 +55,28 @@ def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -
         return False
     shares = []
     for log, first in zip(logs, firsts, strict=True):
-        m = first.sliding.m if first.sliding is not None else 0.0
+        if first.sliding is None:
+            return False
+        m = first.sliding.m
         inertia = abs(m) * float(np.std(first.motion.a))
         shares.append(inertia / max(float(np.std(log["F"])), 1e-300))
-    return float(np.median(shares)) < LED or all(first.sliding is None for first in firsts)
+    return float(np.median(shares)) < LED
 
 
 def fit_imposed(
-    logs: Sequence[Log], firsts: Sequence[FirstEstimate], rng: np.random.Generator, rig: Rig
+    problem: Problem,
+    rng: np.random.Generator,
+    rig: Rig,
+    why: str,
+    remarks: Sequence[str] = (),
 ) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
+    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`.
     Raises NotIdentifiable where no log slides enough in both directions.
     """
-    data = [regression(log, Smoothing()) for log in logs]
+    logs, firsts = problem.logs, problem.firsts
+    data = [_regression(log) for log in logs]
     fit = _best(data)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
@@ -87,21 +97,38 @@ def fit_imposed(
         drive="force",
         stiffness=0.0,
         noise_y=float(np.median([first.motion.noise for first in firsts])),
-        noise_F=fit.rms,
-        chi_square=1.0,
+        noise_F=problem.noise[1],
+        chi_square=(fit.rms / problem.noise[1]) ** 2,
         adequate=False,
         logs=tuple(
-            LogFit(log.name, measured_start(log), float("nan"), float(np.std(part)), 1.0)
+            LogFit(
+                log=log.name,
+                start=measured_start(log),
+                position_rms=float("nan"),
+                force_rms=float(np.std(part)),
+                chi_square=float(np.mean(part**2)) / problem.noise[1] ** 2,
+            )
             for log, part in zip(logs, fit.residuals, strict=True)
         ),
         breakaways=(0, 0),
         evaluations=0,
         remarks=(
-            "no free run follows this log (the motion is imposed, or an effect is missing): fitted"
-            f" on the force equation, which leaves {fit.rms:.3g} N, {100 * fit.relative:.1f} % of"
-            " the force",
+            *remarks,
+            f"{why}: fitted on the force equation, which leaves {100 * fit.relative:.1f} % of the"
+            " force",
         ),
     )
+
+
+def _regression(log: Log) -> Regression:
+    """Sliding samples, with more smoothing where the motion is slow. Raises NotIdentifiable."""
+    usable = usable_cutoffs(log)
+    for cutoff in usable[:-1]:
+        try:
+            return regression(log, Smoothing(cutoff=cutoff))
+        except NotIdentifiable:
+            continue
+    return regression(log, Smoothing(cutoff=usable[-1]))
 
 
 def _best(data: Sequence[Regression]) -> ForceFit:
@@ -159,7 +186,8 @@ def _estimates(
     up = int(sum(np.count_nonzero(part.columns[:, 1] > 0.5) for part in data))
     down = int(sum(np.count_nonzero(part.columns[:, 2] < -0.5) for part in data))
     fastest = float(max(np.max(np.abs(part.columns[:, 3:])) for part in data))
-    events = Events((99, 99), (99, 99), (up, down), (fastest, fastest))
+    # Sliding is all that these parameters need.
+    events = Events((0, 0), (0, 0), (up, down), (fastest, fastest))
     used = [SLIDING_NAMES[i] for i in fit.used]
     told = estimates(
         used, fit.theta, samples[:, list(fit.used)], events, rig.motion == "rotary", name

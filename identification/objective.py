@@ -123,10 +123,10 @@ def evaluate(
     samples: [0, 0] is r'r of lane 0, [0, i] is d_i' r, [i, j] d_i' d_j with
     d_i the change of the residual from lane 0 to lane i.
     """
-    s, modes, flags, tables, c = work_space()
+    s, modes, tables = work_space()
     out = np.zeros((CHUNK, 2, WIDTH))
     rows = np.zeros((2 * CHUNK, WIDTH))
-    prepare(p, h, tables, s, c)
+    prepare(p, h, tables, s)
     cost[:] = 0.0
     gram[:, :, :] = 0.0
     n = len(y)
@@ -144,20 +144,18 @@ def evaluate(
         for low in range(first, last, CHUNK):
             high = min(low + CHUNK, last)
             if drive == COMMAND:
-                march(p, tables, s, modes, flags, u[low:high], h, c, out)
+                march(p, tables, s, modes, u[low:high], h, out)
             else:
                 march_held(
                     p,
                     tables,
                     s,
                     modes,
-                    flags,
                     y[low:high],
                     force[low:high],
                     slope_y[low:high],
                     slope_force[low:high],
                     h,
-                    c,
                     out,
                 )
             if len(gram) > 0:

@@ -15,10 +15,11 @@ import numpy as np
 from identification.actuator import ActuatorFit
 from identification.arrays import Array
 from identification.experiment import total_cost
-from identification.identifiability import Events, estimates, events_of
+from identification.identifiability import estimates, events_of
 from identification.imposed import fit_imposed, is_imposed
 from identification.karnopp import NAMES
 from identification.log import Log, Rig
+from identification.objective import START_V, START_Y
 from identification.plant import Actuator
 from identification.problem import ADEQUATE, Problem, plant_of, pose, simulated, start_of
 from identification.refine import Optimum, refine
@@ -34,6 +35,7 @@ ATTEMPTS = 3
 FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
 MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 RIVAL = 3.0  # cost relative to the best up to which another optimum counts against it
+LED_WHY = "the motion is imposed: inertia is of no account in the force"
 LED = 50.0  # chi-square from which a force-driven run is not the body's own motion
 SAME = 0.02  # relative gain of a new search below which the misfit is the model's
 
@@ -55,7 +57,7 @@ def fit_karnopp(
     report = on_progress or (lambda _stage, _share: None)
     problem = pose(logs, rig, drive)
     if is_imposed(logs, problem.firsts, rig):
-        return fit_imposed(logs, problem.firsts, rng, rig)
+        return fit_imposed(problem, rng, rig, LED_WHY)
     solution = solve(problem, rng, report)
     remarks: list[str] = []
     actuator = problem.actuator
@@ -74,7 +76,8 @@ def fit_karnopp(
         problem = pose(logs, rig, "force")
         solution = solve(problem, rng, report)
     if problem.drive == "force" and not problem.hold and solution.chi_square > LED:
-        return fit_imposed(logs, problem.firsts, rng, rig)
+        why = f"no free run follows this log (chi-square {solution.chi_square:.3g})"
+        return fit_imposed(problem, rng, rig, why, remarks)
     return _result(problem, solution, actuator, rig, remarks)
 
 
@@ -90,11 +93,13 @@ def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:
 def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solution:
     """Search, refine and weigh until the fit is found or the misfit is the model's own."""
     optima: list[Optimum] = []
+    members: list[Array] = []
     enough = problem.adequate * problem.count
     attempts = ATTEMPTS if problem.drive == "command" else ATTEMPTS - 1
     for attempt in range(attempts):
         size = POPULATION * (2 if attempt == ATTEMPTS - 1 else 1)
-        found, members = _search(problem, rng, size, attempt, report)
+        found, searched = _search(problem, rng, size, attempt, report)
+        members.append(searched)
         before = min((one.cost for one in optima), default=np.inf)
         optima.append(found)
         report("refining", attempt / attempts)
@@ -109,10 +114,37 @@ def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solut
     spent = sum(one.evaluations for one in optima)
     if best.cost <= ADEQUATE * problem.count and problem.drive == "command":
         return weigh_noise(problem, best, rng, spent, report)
+    if problem.hold:
+        opened = _opened(problem)
+        closer = min((_closer(opened, one, rng) for one in optima), key=lambda one: one.cost)
+        if closer.cost <= ADEQUATE * problem.count:
+            return weigh_noise(opened, closer, rng, spent, report)
     if not problem.hold:
         rivals = [one.p for one in optima if one.cost < RIVAL * best.cost]
         return weigh_correlated(problem, best, np.array(rivals), rng, spent)
-    return weigh_misfit(problem, best, members, rng, spent, report)
+    of_best = members[[one.cost for one in optima].index(best.cost)]
+    return weigh_misfit(problem, best, of_best, rng, spent, report)
+
+
+def _closer(opened: Problem, found: Optimum, rng: np.random.Generator) -> Optimum:
+    """The optimum with its starts fitted too: over windows, near by, then over the whole."""
+    cap = _cap(opened, 0)
+    near = refine(opened.runs, found.p, opened.free, cap=cap)
+    whole = refine(near.runs(opened.long_runs), near.p, opened.free, cap=cap)
+    whole = refine(whole.runs(opened.long_runs), whole.p, opened.free)
+    if whole.cost > ADEQUATE * opened.count and near.cost < FOLLOWS * opened.count:
+        rescued = _search_near(opened, near, cap, rng)
+        whole = rescued if rescued.cost < whole.cost else whole
+    return whole
+
+
+def _opened(problem: Problem) -> Problem:
+    """The problem with each run's first position and velocity unknown."""
+    runs = tuple(
+        replace(run, open=(START_Y, START_V) if run.start[START_V] != 0.0 else (START_Y,))
+        for run in problem.runs
+    )
+    return replace(problem, runs=runs)
 
 
 def _through_force(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
@@ -226,21 +258,15 @@ def _result(
         samples=samples[:, keep],
         drive="command" if problem.hold else problem.drive,
         stiffness=0.0 if problem.drive == "command" or problem.hold else float(optimum.p[K2]),
-        noise_y=1.0 / problem.runs[0].measured.weight_y,
-        noise_F=_noise_force(problem, runs),
+        noise_y=solution.noise[0],
+        noise_F=solution.noise[1],
         chi_square=solution.chi_square,
         adequate=solution.adequate,
         logs=tuple(_log_fit(problem, optimum, runs[i], i) for i in range(len(runs))),
         breakaways=events.breakaways,
         evaluations=solution.evaluations,
-        remarks=(*remarks, *_remarks(problem, solution, events)),
+        remarks=(*remarks, *_remarks(problem, solution)),
     )
-
-
-def _noise_force(problem: Problem, runs: Sequence[FreeRun]) -> float:
-    if problem.drive != "command":
-        return 0.0
-    return 1.0 / problem.runs[0].measured.weight_force
 
 
 def _log_fit(problem: Problem, optimum: Optimum, run: FreeRun, index: int) -> LogFit:
@@ -259,7 +285,7 @@ def _log_fit(problem: Problem, optimum: Optimum, run: FreeRun, index: int) -> Lo
     )
 
 
-def _remarks(problem: Problem, solution: Solution, events: Events) -> list[str]:
+def _remarks(problem: Problem, solution: Solution) -> list[str]:
     out = []
     if not solution.adequate:
         out.append(

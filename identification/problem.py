@@ -25,7 +25,8 @@ LONGEST = 40.0  # s; a run without a stiffness that holds it is compared at most
 
 @dataclass(frozen=True)
 class Problem:
-    """Logs, how they are driven, and where to look."""
+    """Logs, how they are driven, and where to look; noise of position [m] and force [N]; the
+    motor's k_a [N/V], 0 for other rigs."""
 
     logs: tuple[Log, ...]
     runs: tuple[Run, ...]
@@ -36,6 +37,8 @@ class Problem:
     drive: Drive
     hold: bool
     actuator: ActuatorFit | None
+    noise: tuple[float, float]
+    k_a: float
 
     @property
     def adequate(self) -> float:
@@ -67,11 +70,24 @@ class Problem:
 
 def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     """The logs as a fitting problem: drive chosen, noise estimated, search box drawn."""
+    if rig.kind == "motor" and not rig.force_per_command:
+        raise BadLog(
+            f"{logs[0].name}: a motor needs its force_per_command, not 0; set it in the card"
+        )
+    if rig.kind == "motor" and drive == "force":
+        raise BadLog(
+            f"{logs[0].name}: a motor is driven by its command; leave out the drive by force"
+        )
     for log in logs:
         if "F" not in log:
             raise BadLog(
                 f"{log.name}: no applied force; give the card F, both pressures, or"
                 " force_per_command with u"
+            )
+        if np.ptp(log["F"]) == 0.0:
+            raise BadLog(
+                f"{log.name}: the applied force is constant ({log['F'][0]:g}), so nothing drives"
+                " the body; check the force's columns in the card"
             )
     hold = rig.kind == "motor"
     firsts = tuple(first_estimate(log, held=hold) for log in logs)
@@ -85,7 +101,7 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     by_command = chosen == "command" and actuator is not None
     k1 = actuator.k1 if actuator and by_command else 0.0
     k2 = actuator.k2 if actuator and by_command else 0.0
-    window = 5.0 if hold else (1.0 if by_command else 2.0)
+    window = 1.0 if by_command or hold else 2.0
     runs = tuple(
         prepare_run(
             log,
@@ -104,7 +120,11 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     free: IntArray = np.arange(9, dtype=np.int64)
     if by_command:
         free = np.concatenate([free, np.array([K1, K2], dtype=np.int64)])
-    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator)
+    noise = _noise(logs[0], firsts[0], actuator if by_command else None)
+    if hold:
+        noise = (noise[0], 0.0)
+    k_a = rig.force_per_command or 0.0
+    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator, noise, k_a)
 
 
 def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tuple[float, float]:
@@ -148,9 +168,7 @@ def plant_of(problem: Problem, optimum: Optimum) -> Plant:
     if problem.drive == "command":
         return Plant(friction, Actuator(float(optimum.p[K1]), float(optimum.p[K2])))
     if problem.hold:
-        log = problem.logs[0]
-        moved_most = int(np.argmax(np.abs(log["u"])))
-        return Plant(friction, Motor(float(log["F"][moved_most] / log["u"][moved_most])))
+        return Plant(friction, Motor(problem.k_a))
     return Plant(friction)
 
 

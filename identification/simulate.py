@@ -148,4 +148,10 @@ def free_run(
         out,
         modes,
     )
+    if not np.all(np.isfinite(out[0])):
+        lost = float(log["t"][int(np.argmin(np.isfinite(out[0])))])
+        raise BadModel(
+            f"{log.name}: the simulated run cannot be followed beyond t = {lost:g} s (too many"
+            " switches within one sample, or numbers without bound); check mass and band"
+        )
     return FreeRun(out[0], out[1], out[2], modes)

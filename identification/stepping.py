@@ -341,7 +341,8 @@ def resolve(
         if found > 0:
             switches += 1
             v, mode = _after_exit(mode, p, force, found)
-    return y, v, force, mode
+    # More switches than any machine makes: no answer is better than one with time missing.
+    return (y if left <= 0.0 else np.nan), v, force, mode
 
 
 @compiled

@@ -18,8 +18,11 @@ from identification.errors import NotIdentifiable
 from identification.inverse_model import InverseModel, Smoothing, fit_inverse
 from identification.log import Log
 
+STILL = 1.5  # times the noise below which a position's own spread is no motion
 SURE = 5.0  # times the noise of the velocity: faster samples move
 BEFORE_STOP = 0.02  # s of motion looked at before a stop
+CUTOFFS = (None, 10.0, 3.0)  # Hz; slow motion needs more smoothing to stand out of its noise
+PERIODS = 40.0  # of a cut-off that a log must last
 WIDE = 4.0  # the search goes this factor beyond a first estimate
 FASTEST = 0.995  # quantile of the speed taken as the largest
 
@@ -49,7 +52,7 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     motion = differentiate(log["y"], log.h)
     moving = np.abs(motion.v) > SURE * motion.v_noise
     fastest = float(np.quantile(np.abs(motion.v), FASTEST))
-    if fastest <= SURE * motion.v_noise:
+    if fastest <= SURE * motion.v_noise or float(np.std(log["y"])) < STILL * motion.noise:
         raise NotIdentifiable(
             f"{log.name}: no motion above the noise of the velocity ({motion.v_noise:.3g} m/s);"
             " record a run in which the body moves"
@@ -84,11 +87,18 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     return FirstEstimate(nine, low, high, motion, rest, sliding)
 
 
+def usable_cutoffs(log: Log) -> list[float | None]:
+    """Of CUTOFFS those that the log's sampling and length allow."""
+    return [c for c in CUTOFFS if c is None or (c * log.h < 0.4 and c * log.duration > PERIODS)]
+
+
 def _sliding(log: Log, held: bool) -> InverseModel | None:
-    try:
-        return fit_inverse(log, "directional", Smoothing(held=held))
-    except NotIdentifiable:
-        return None
+    for cutoff in usable_cutoffs(log):
+        try:
+            return fit_inverse(log, "directional", Smoothing(cutoff=cutoff, held=held))
+        except NotIdentifiable:
+            continue
+    return None
 
 
 def _magnitudes(

@@ -17,10 +17,12 @@ def run_loop(
 ) -> LoopRun:
     """One reference r [m], (n,) at `loop_period`, through the loop, with the machine's noise.
 
-    A machine without an actuator takes the force reference as its force. Raises BadModel where
+    A machine without an actuator takes the force reference as its force, and the rig's limit of
+    the command [V] says nothing of it. Raises BadModel where
     the design has a force loop and the machine nothing for it to drive, or the other way round.
     """
-    plant, limit = machine.simulated, machine.rig.control_limit
+    plant = machine.simulated
+    limit = None if plant.actuator is None else machine.rig.control_limit
     noise = LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng)
     if isinstance(plant.actuator, Actuator):
         if found.force is None:

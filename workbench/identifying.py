@@ -30,6 +30,7 @@ Orders = tuple[int, int, int]
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
 LARGEST = 4  # na, nb and nk tried where no orders are given
+MEETS = 1e-2  # relative difference up to which two periods count as one
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
 
 
@@ -190,9 +191,8 @@ def arx_plant(
     BadLog, BadModel.
     """
     key: Literal["F", "u"] = "F" if all("F" in log for log in logs) else "u"
-    step = decimation(logs[0].h, period)
-    h = step * logs[0].h
-    runs = [decimated(log[key], log["y"], step) for log in logs]
+    h, steps = common_period(logs, period)
+    runs = [decimated(log[key], log["y"], n) for log, n in zip(logs, steps, strict=True)]
     ends = [round(SPLIT * len(y)) for _, y in runs]
     held = [(u[n:], y[n:]) for (u, y), n in zip(runs, ends, strict=True)]
     if orders is None:
@@ -242,16 +242,40 @@ def _tests(model: ArxModel, runs: Sequence[tuple[Array, Array]]) -> ArxTests | N
     return ArxTests(found.whiteness.p_value, cross.p_value if cross else None, found.lag_step)
 
 
+def common_period(logs: Sequence[Log], period: float | None) -> tuple[float, tuple[int, ...]]:
+    """The design period [s] of all logs and the samples of each in it, set by the slowest log.
+
+    Raises BadLog where a log's own period does not meet it, BadModel as `decimation`.
+    """
+    slowest = max(logs, key=lambda log: log.h)
+    h = decimation(slowest.h, period) * slowest.h
+    steps = tuple(max(1, round(h / log.h)) for log in logs)
+    for log, step in zip(logs, steps, strict=True):
+        if abs(step * log.h - h) > MEETS * h:
+            raise BadLog(
+                f"{log.name}: sampled every {log.h:g} s, {slowest.name} every {slowest.h:g} s: no"
+                f" whole number of its samples makes the design period {h:g} s; give a"
+                " --design-period that is a multiple of both"
+            )
+    return h, steps
+
+
 def decimation(h: float, period: float | None) -> int:
-    """Samples of the log in one design period; raises BadModel where the log is slower."""
+    """Samples of the log in one design period; raises BadModel where an asked one holds none, or
+    no whole number of them."""
     wanted = DESIGN_PERIOD if period is None else period
-    if not wanted > 0:
-        raise BadModel(f"design period {wanted:g} s, must be > 0")
+    if not (np.isfinite(wanted) and wanted > 0):
+        raise BadModel(f"design period {wanted:g} s, must be finite and > 0")
     if period is not None and period < 0.99 * h:
         raise BadModel(
             f"design period {period:g} s, the log is sampled every {h:g} s; ask for no less"
         )
-    return max(1, round(wanted / h))
+    step = max(1, round(wanted / h))
+    if period is not None and abs(step * h - period) > MEETS * period:
+        raise BadModel(
+            f"design period {period:g} s is no multiple of the log's {h:g} s; ask for {step * h:g}"
+        )
+    return step
 
 
 def decimated(u: Array, y: Array, step: int) -> tuple[Array, Array]:

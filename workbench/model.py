@@ -218,7 +218,13 @@ def as_number(estimate: Estimate) -> dict[str, Any]:
 
 def read_model(path: Path) -> Model:
     """The model in the file `path`; raises BadModel in one line where it is none."""
-    return read_result(path, Model, SCHEMA)
+    found = read_result(path, Model, SCHEMA)
+    if found.effects:
+        raise BadModel(
+            f"{path}: [effects] {', '.join(found.effects)} cannot be simulated yet; give a model"
+            " without effects"
+        )
+    return found
 
 
 def versions() -> dict[str, str]:

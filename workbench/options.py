@@ -2,8 +2,28 @@
 
 import cmath
 import math
+from typing import Any
 
 import click
+
+
+class Positive(click.FloatRange):
+    """A finite number above 0: a period, a margin, a limit."""
+
+    def __init__(self) -> None:
+        super().__init__(min=0, min_open=True)
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> float:
+        """The number; a usage error where it is none, not finite, or 0 or less."""
+        found = float(super().convert(value, param, ctx))
+        if not math.isfinite(found):
+            self.fail(f"{value} is not finite; a number above 0 needed.", param, ctx)
+        return found
+
+
+POSITIVE = Positive()
 
 
 def parse_orders(text: str | None) -> tuple[int, int, int] | None:

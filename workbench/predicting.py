@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.arrays import Array, IntArray
 from identification.clean import applied_force
@@ -31,7 +32,9 @@ COLUMNS = (
 class Prediction:
     """Columns of prediction.csv, each (n,); force_simulated is NaN without a command.
 
-    drive: what drove the position; the errors are root mean squares [N], [m], None where empty.
+    sliding: True outside the stick band, where the inverse model predicts the force; inside it
+    repeats the applied one. drive: what drove the position; the errors are root mean squares [N],
+    [m], None where empty.
     """
 
     t: Array
@@ -40,6 +43,7 @@ class Prediction:
     force_simulated: Array
     position_measured: Array
     position_simulated: Array
+    sliding: NDArray[np.bool_]
     drive: Drive
 
     @property
@@ -49,8 +53,8 @@ class Prediction:
 
     @property
     def force_predicted_rms(self) -> float | None:
-        """Root mean square of applied less predicted force, where both are."""
-        return _rms_where(self.force_applied - self.force_predicted)
+        """Root mean square of applied less predicted force on sliding samples; None without any."""
+        return _rms_where((self.force_applied - self.force_predicted)[self.sliding])
 
     @property
     def force_simulated_rms(self) -> float | None:
@@ -72,20 +76,27 @@ def predict(
     if chosen == "command" and "u" not in log:
         raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
     log = _with_force(log, model)
-    restarts = _restarts(log, window) if window else None
-    motor = model.rig.kind == "motor"
+    restarts = None if window is None else _restarts(log, window)
+    how = Smoothing(held=model.rig.kind == "motor")
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
     run = free_run(model.simulated, log, measured_start(log), chosen, restarts=restarts)
     return Prediction(
         t=log["t"],
         force_applied=applied,
-        force_predicted=force_predicted(log, model.karnopp, Smoothing(held=motor)),
+        force_predicted=force_predicted(log, model.karnopp, how),
         force_simulated=run.F if chosen == "command" else _commanded(model, log, restarts, blank),
         position_measured=log["y"],
         position_simulated=run.y,
+        sliding=_sliding(log, model, how),
         drive=chosen,
     )
+
+
+def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
+    """Samples whose velocity, as the inverse model takes it, lies outside the stick band."""
+    v, p = differentiate(log["y"], log.h, how.cutoff, how.method).v, model.karnopp
+    return np.asarray((v > p.dv_p) | (v < p.dv_n))
 
 
 def default_drive(model: Model, log: Log) -> Drive:

@@ -94,20 +94,45 @@ def linear_of(
     if source == "arx" or (source is None and not known):
         plant = _arx(model, period, known)
         return plant, _force_loop(model, plant.h)
-    if not known and source is None:
-        raise NotIdentifiable(f"no plant to design on: m: {model.friction['m'].reason}")
+    if not known:
+        raise NotIdentifiable(f"no physical plant to design on: m: {model.friction['m'].reason}")
     h_log = max(entry.h for entry in model.log)
-    h = period or (model.plant.h if model.plant else max(DEFAULT_PERIOD, h_log))
+    h = period
+    if h is None:
+        h = model.plant.h if model.plant else max(DEFAULT_PERIOD, h_log)
     m, f = _nominal(model)
     force = _force_loop(model, h)
     a, b = _physical(m, f, h, model, force)
-    inside = "with the actuator and its force loop" if force else "with the force as its input"
-    why = f"mass and viscous friction are identified: sliding body, {inside}, sampled exactly"
+    why = _why_physical(model, force)
     return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, f), force
 
 
-def sampled_plant(machine: Model, found: Design) -> Linear:
-    """The linear plant of another machine under a design's force loop and period."""
+def _why_physical(model: Model, force: ForceLoop | None) -> str:
+    """Why the physical plant, and which of its parameters the logs do not tell."""
+    known = "mass and viscous friction are identified"
+    if names := _unknown_viscous(model):
+        known = f"the mass is identified, {' and '.join(names)} assumed"
+    inside = "with the force as its input"
+    if force:
+        told = all(e.value is not None for e in (model.actuator or {}).values())
+        actuator = "the actuator" if told else "an actuator of assumed k1 and k2"
+        inside = f"with {actuator} and its force loop"
+    return f"{known}: sliding body, {inside}, sampled exactly"
+
+
+def _unknown_viscous(model: Model) -> list[str]:
+    return [name for name in ("F_vp", "F_vn") if model.friction[name].value is None]
+
+
+def linear_plant_of(machine: Model, found: Design) -> Linear:
+    """The machine's own linear plant under a design's force loop and period.
+
+    ARX where the design is and the machine has one at that period, else the physical one.
+    """
+    own = machine.plant
+    fits = own is not None and own.input == "F" and abs(own.h - found.plant.h) < 1e-6 * own.h
+    if found.plant.source == "arx" and own is not None and fits:
+        return Linear("arx", "", own.A, own.B, own.h, None, None)
     m, f = _nominal(machine)
     a, b = _physical(m, f, found.plant.h, machine, found.force)
     return Linear("physical", "", tuple(a.tolist()), tuple(b.tolist()), found.plant.h, m, f)
@@ -205,7 +230,7 @@ def corners(
     if plant.source == "arx":
         return ()
     m, viscous = model.friction["m"], (model.friction["F_vp"], model.friction["F_vn"])
-    masses = (m.low or used(m), m.high or used(m))
+    masses = [used(m) if limit is None else limit for limit in (m.low, m.high)]
     least = min(used(v) if v.low is None else v.low for v in viscous)
     most = max(used(v) if v.high is None else v.high for v in viscous)
     return tuple(
@@ -221,7 +246,7 @@ def _compensator(model: Model) -> CompensatorValues:
 
 def _remarks(model: Model, plant: Linear) -> list[str]:
     out = []
-    names = [name for name in ("F_vp", "F_vn") if model.friction[name].value is None]
+    names = _unknown_viscous(model)
     if plant.source == "physical" and names:
         out.append(f"{' and '.join(names)} not identified: an assumed value stands in the design")
     if model.assumed:

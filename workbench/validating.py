@@ -10,13 +10,14 @@ import numpy as np
 from design.loop import LoopRun
 from design.margins import margins
 from design.rst import closed_loop_poles
+from design.tune import worst_modulus
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from workbench.closed_loop import loop_period, run_loop
 from workbench.design_values import Controller, Design, Linear, MarginValues, margin_values
 from workbench.limit_cycle import LimitCycle, limit_cycle
 from workbench.model import Model, versions
-from workbench.tuning import sampled_plant
+from workbench.tuning import corners, linear_plant_of
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -166,11 +167,11 @@ def _figures(
     machine: Model, found: Design, one: Controller, run: Traces, limits: Limits
 ) -> Figures:
     step = float(np.max(run.step.r))
-    stable = bool(np.all(np.abs(run.step.y) < ESCAPED * step))
+    amplitude = float(np.max(np.abs(run.smooth.r)))
+    stable = _stays(run.step, step) and _stays(run.smooth, amplitude)
     judged = _judged(run.step)
     standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
     smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
-    amplitude = float(np.max(np.abs(run.smooth.r)))
     margin = _linear_margins(machine, found, one)
     result = Figures(
         stable=stable,
@@ -192,6 +193,11 @@ def _figures(
 
 def _shallow(value: Figures) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__dataclass_fields__}
+
+
+def _stays(trace: LoopRun, size: float) -> bool:
+    """Whether a loop stays near a reference of this size [m]; not where it is lost to NaN."""
+    return bool(np.all(np.abs(trace.y) < ESCAPED * size))
 
 
 def _judged(trace: LoopRun) -> Any:
@@ -218,12 +224,21 @@ def _overshoot(trace: LoopRun, step: float) -> float:
 
 def _linear_margins(machine: Model, found: Design, one: Controller) -> MarginValues | None:
     """Margins of the controller on the machine's own linear plant; None where it is unstable."""
-    plant: Linear = found.plant if found.plant.source == "arx" else sampled_plant(machine, found)
     try:
+        plant = linear_plant_of(machine, found)
         margin = margins(plant.A, plant.B, one.rst)
     except BadSpecification:
         return None
-    return margin_values(margin, margin.modulus)
+    return margin_values(margin, _worst(machine, found, one, plant))
+
+
+def _worst(machine: Model, found: Design, one: Controller, plant: Linear) -> float | None:
+    """Least modulus margin over the machine's intervals; None: unstable for some of them."""
+    try:
+        others = corners(machine, plant, found.force)
+    except BadSpecification:
+        return None
+    return worst_modulus([(np.array(plant.A), np.array(plant.B)), *others], one.rst)
 
 
 def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> tuple[str, ...]:
@@ -235,19 +250,19 @@ def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> t
     if result.margins is None:
         missed.append("the linear loop is unstable")
     else:
-        if result.margins.modulus < limits.modulus:
+        if not (result.margins.modulus >= limits.modulus):
             said = f"{result.margins.modulus:.3f}, at least {limits.modulus:g} needed"
             missed.append(f"modulus margin {said}")
         samples = result.margins.delay_samples
-        if samples is not None and samples < limits.delay:
+        if samples is not None and not (samples >= limits.delay):
             missed.append(f"delay margin {samples:.2f} samples, at least {limits.delay:g} needed")
-    if result.standstill_relative > limits.standstill:
+    if not (result.standstill_relative <= limits.standstill):
         missed.append(
             f"error at standstill {result.standstill:.3g} {unit},"
             f" {100 * result.standstill_relative:.1f} % of the step, at most"
             f" {100 * limits.standstill:g} % allowed"
         )
-    if result.smooth_relative > limits.tracking:
+    if not (result.smooth_relative <= limits.tracking):
         missed.append(
             f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
             f" amplitude, at most {100 * limits.tracking:g} % allowed"

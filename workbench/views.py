@@ -85,7 +85,7 @@ def summary(model: Model) -> str:
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, in words."""
     unit = "rad" if model.rotary else "m"
-    by = "the command" if model.fit.drive == "command" else "the applied force"
+    by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
         f"{e.file}: simulated position within {e.position_rms:.3g} {unit} rms over"
         f" {e.duration:.4g} s, driven by {by}"
@@ -108,6 +108,17 @@ def fit_lines(model: Model) -> list[str]:
             f" one step ahead within {p.one_step_rms:.2g} {unit} rms on held-out samples"
         )
     return lines
+
+
+def held(model: Model) -> str:
+    """How a run on the measured force was kept near the measured position."""
+    from workbench.predicting import FORCE_WINDOW
+
+    unit = "N m/rad" if model.rotary else "N/m"
+    return (
+        f"held to the measured position by {model.fit.stiffness:.3g} {unit} and restarted every"
+        f" {FORCE_WINDOW:g} s"
+    )
 
 
 def table(head: Sequence[str], rows: Iterable[Row]) -> "Table":

@@ -52,3 +52,10 @@ def test_a_motor_has_no_force_loop() -> None:
     controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 1e-3)
     with pytest.raises(BadModel, match="motor"):
         simulate_two_rate(Plant(PLANT.friction, Motor(35.0)), controller, PI, R, 1e-3)
+
+
+def test_noise_of_another_length_is_refused() -> None:
+    controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 1e-3)
+    noise = LoopNoise(np.zeros(len(R) - 1), np.zeros(len(R) - 1))
+    with pytest.raises(BadModel, match="noise of y"):
+        simulate_two_rate(PLANT, controller, PI, R, 1e-3, noise=noise)

@@ -6,10 +6,16 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
-from tests.chain import CARD
+from tests.chain import CARD, identified, short_recipe
+from workbench import demonstration
 from workbench.cli import COMMANDS, main
+from workbench.demonstration import Demonstration
+from workbench.recording import truth
+from workbench.tuning import design
+from workbench.validating import Limits, validate
 
 
 @pytest.fixture(scope="module")
@@ -181,6 +187,38 @@ def test_wrong_input_is_one_line_and_writes_nothing(
     assert not any(path.name.endswith(".part") for path in tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("value", ["0", "-1", "inf", "nan", "x"])
+def test_options_that_are_no_finite_positive_number_are_refused(
+    shop: Path, capsys: pytest.CaptureFixture[str], value: str
+) -> None:
+    card, log = str(shop / "card.toml"), str(shop / "log/short.csv")
+    model, design = str(shop / "id/model.json"), str(shop / "design/design.json")
+    cases = {
+        ("identify", log, "--card", card): ("--design-period",),
+        ("predict", model, log, "--card", card): ("--window",),
+        ("design", model): ("--design-period", "--modulus", "--delay"),
+        ("validate", model, design): ("--modulus", "--delay", "--standstill", "--tracking"),
+    }
+    for command, options in cases.items():
+        for option in options:
+            assert option in refusal(capsys, [*command, option, value], 2)
+
+
+def test_a_motor_is_not_fitted_by_force(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    signals = "".join(
+        f'{name} = {{ column = "{name}", unit = "{unit}" }}\n'
+        for name, unit in (("t", "s"), ("y", "m"), ("u", "V"))
+    )
+    text = '[card]\nname = "m"\n[rig]\nkind = "motor"\nforce_per_command = 3.0\n[signals]\n'
+    (tmp_path / "card.toml").write_text(text + signals, encoding="utf-8")
+    command = ["identify", str(shop / "log/short.csv"), "--card", str(tmp_path / "card.toml")]
+    said = refusal(capsys, [*command, "--drive", "force", "--out", str(tmp_path / "out")], 2)
+    assert "--drive force: the rig is a motor" in said
+    assert not (tmp_path / "out").exists()
+
+
 def test_a_model_without_a_plant_is_a_refusal(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -194,6 +232,20 @@ def test_a_model_without_a_plant_is_a_refusal(
     text = refusal(capsys, command, 1)
     assert text.startswith("refused: no ARX plant")
     assert not out.exists()
+
+
+def test_a_demo_that_fails_says_so_by_its_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    card, recipe = short_recipe()
+    model = identified()
+    found = design(model.model)
+    limits = Limits(standstill=1e-9)
+    result, traces = validate(model.model, found, np.random.default_rng(0), limits=limits)
+    known = truth(card.name, recipe)
+    failed = Demonstration(model, found, result, traces, known)
+    monkeypatch.setattr(demonstration, "demonstrate", lambda *_: failed)
+    assert as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)["passed"] is False
 
 
 def test_demo_runs_the_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

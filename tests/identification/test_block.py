@@ -31,13 +31,13 @@ def spread(nine: Karnopp, seed: int, size: float = 0.3) -> Array:
 
 def lanes(p: Array, start: tuple[float, float, float], u: Array) -> Array:
     """Positions and forces (n, 2, WIDTH) of a block driven by a command, in two chunks."""
-    s, modes, flags, tables, c = work_space()
-    prepare(p, H, tables, s, c)
+    s, modes, tables = work_space()
+    prepare(p, H, tables, s)
     for lane in range(WIDTH):
         place(s, modes, tables, p, lane, *start)
     out, half = np.zeros((len(u), 2, WIDTH)), len(u) // 2
-    march(p, tables, s, modes, flags, u[:half], H, c, out[:half])
-    march(p, tables, s, modes, flags, u[half:], H, c, out[half:])
+    march(p, tables, s, modes, u[:half], H, out[:half])
+    march(p, tables, s, modes, u[half:], H, out[half:])
     return out
 
 
@@ -77,12 +77,12 @@ def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
     truth = alone(spread(table(2), 7)[0], (0.0, 0.0, 0.0), u)
     y, force = truth[0], truth[2]
     slope_y, slope = (np.append(np.diff(a) / H, 0.0) for a in (y, force))
-    s, modes, flags, tables, c = work_space()
-    prepare(p, H, tables, s, c)
+    s, modes, tables = work_space()
+    prepare(p, H, tables, s)
     for lane in range(WIDTH):
         place(s, modes, tables, p, lane, y[0], 0.0, force[0])
     out = np.zeros((len(u), 2, WIDTH))
-    march_held(p, tables, s, modes, flags, y, force, slope_y, slope, H, c, out)
+    march_held(p, tables, s, modes, y, force, slope_y, slope, H, out)
     for lane in range(WIDTH):
         one = alone(p[lane], (y[0], 0.0, force[0]), 0.0 * u, (force, slope, y))
         assert np.max(np.abs(out[:, 0, lane] - one[0])) < 1e-12

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.block import WIDTH
-from identification.experiment import Run, prepare_run, restart_windows, total_cost
+from identification.experiment import Run, prepare_run, rest_windows, total_cost
 from identification.log import Log
 from identification.objective import evaluate_block
 from identification.plant import Actuator, Plant
@@ -92,10 +92,15 @@ def test_gram_matrices_add_up_over_stretches() -> None:
     assert one[0, 0, 0] == pytest.approx(costs[0], rel=1e-9)
 
 
-def test_windows_restart_at_rest_where_there_is_rest() -> None:
-    log = made_log(table(2), seconds=6.0)
-    first = first_estimate(log)
-    windows = restart_windows(first, log.h, 1.0)
+def test_windows_restart_at_sure_rests_only() -> None:
+    t = np.arange(6000) * 1e-3
+    clean = 0.01 * np.clip(np.sin(2 * np.pi * 0.5 * t), -0.5, 0.5)
+    y = clean + NOISE_Y * np.random.default_rng(1).standard_normal(len(t))
+    windows = rest_windows(y, NOISE_Y, 1e-3, 0.4)
     assert windows.at[0] == 0
-    assert np.all(np.diff(windows.at) > 0)
-    assert np.all(windows.v[first.rest[windows.at]] == 0.0)
+    assert len(windows.at) > 4
+    assert np.all(np.diff(windows.at) >= 400)
+    assert np.all(windows.v == 0.0)
+    for at, level in zip(windows.at[1:], windows.y[1:], strict=True):
+        assert abs(clean[at]) == 0.005
+        assert abs(level - clean[at]) < 4e-6

@@ -90,6 +90,7 @@ def test_a_known_parameter_has_the_keys_of_the_contract(document: dict[str, Any]
         ({"schema": None}, "no 'schema'"),
         ({"card": 3}, "[card] 3"),
         ({"effects": {"spring": {"k": "stiff"}}}, "effects.spring.k"),
+        ({"effects": {"spring": {"k": 5.0}}}, "[effects] spring cannot be simulated yet"),
     ],
 )
 def test_wrong_keys_and_values(

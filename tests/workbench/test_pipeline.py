@@ -3,25 +3,36 @@
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from design.loop import LoopRun
 from design.tune import Asked, Goals
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable
 from identification.karnopp import NAMES
-from identification.log import Log
+from identification.log import Log, Rig
 from identification.plant import Actuator
 from identification.result import Estimate
 from tests.chain import EMPS, TABLES, identified, model_of, short_recipe
+from workbench import validating
+from workbench.closed_loop import run_loop
 from workbench.design_values import design_document, read_design
-from workbench.identifying import arx_plant, closed_loop_remarks, decimated, decimation
+from workbench.identifying import (
+    arx_plant,
+    closed_loop_remarks,
+    common_period,
+    decimated,
+    decimation,
+)
 from workbench.model import Model
 from workbench.output import dumps
 from workbench.predicting import COLUMNS, predict, prediction_csv
 from workbench.recording import record, truth
-from workbench.tuning import design, effort_limit
+from workbench.tuning import corners, design, effort_limit, linear_of
 from workbench.validating import Limits, validate, validation_document
+from workbench.views import fit_lines
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 
@@ -241,3 +252,111 @@ def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
     known = truth("x", recipe, 2)
     assert known["seed"] == 2
     assert known["friction"]["F_sn"] == {"value": -23.0, "unit": "N"}
+
+
+def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
+    model = replace(model_of(EMPS), rig=Rig("force"))
+    found = design(model)
+    assert found.rst is not None and found.force is None
+    r = np.repeat([0.0, 0.05], 200)
+    free, limited = (
+        run_loop(replace(model, rig=Rig("force", control_limit=v)), found, found.rst, r, rng())
+        for v in (None, 1e-3)
+    )
+    assert np.array_equal(free.F, limited.F)
+    motor = replace(model_of(EMPS, k_a=35.15), rig=Rig("motor", 35.15, control_limit=1e-3))
+    assert np.max(np.abs(run_loop(motor, found, found.rst, r, rng()).u)) <= 1e-3
+
+
+@pytest.mark.parametrize("name", ["standstill", "tracking", "modulus", "delay"])
+def test_a_limit_that_is_no_number_is_never_kept(name: str) -> None:
+    model = model_of(TABLES["paper_table1"], ACTUATOR)
+    result, _ = validate(model, design(model), rng(), limits=Limits(**{name: np.nan}))
+    assert not result.passed
+
+
+def test_both_runs_must_stay(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = model_of(TABLES["paper_table1"], ACTUATOR)
+    found = design(model)
+    count = 0
+
+    def lost(*arguments: Any) -> LoopRun:
+        nonlocal count
+        run = run_loop(*arguments)
+        count += 1
+        return run if count % 2 else replace(run, y=np.full_like(run.y, np.nan))
+
+    monkeypatch.setattr(validating, "run_loop", lost)
+    result, _ = validate(model, found, rng())
+    assert not result.figures["rst"]["model"].stable
+    assert result.figures["rst"]["model"].missed == ("the simulated loop runs away",)
+
+
+def test_margins_of_a_validation_are_those_of_its_plant() -> None:
+    model = identified().model
+    found = design(model, source="arx")
+    assert model.plant is not None
+    stronger = replace(model.plant, B=tuple(1.3 * b for b in model.plant.B))
+    result, _ = validate(model, found, rng(), plant=replace(model, plant=stronger))
+    one, other = (result.figures["rst"][place].margins for place in ("model", "plant"))
+    assert one is not None and other is not None
+    assert other.modulus != one.modulus
+    wide = model_of(TABLES["paper_table1"], ACTUATOR, spread=0.05)
+    physical = design(wide)
+    checked, _ = validate(wide, physical, rng())
+    margin = checked.figures["rst"]["model"].margins
+    assert margin is not None and margin.worst_modulus is not None
+    assert margin.worst_modulus < margin.modulus
+    assert physical.rst is not None
+    assert margin.worst_modulus == pytest.approx(physical.rst.margins.worst_modulus)
+
+
+def test_a_physical_design_needs_a_mass_and_says_what_it_rests_on() -> None:
+    model = identified().model
+    with pytest.raises(NotIdentifiable, match=r"no physical plant.*no acceleration"):
+        design(without_mass(model), source="physical")
+    assert "viscous friction are identified" in design(model).plant.why
+    blank = Estimate(None, "N s/m", reason="too slow", assumed=300.0)
+    vague = replace(model, friction={**model.friction, "F_vp": blank})
+    assert "the mass is identified, F_vp assumed" in design(vague).plant.why
+
+
+def test_an_interval_from_zero_is_not_taken_for_none() -> None:
+    model = model_of(TABLES["paper_table1"], ACTUATOR)
+    plant, force = linear_of(model)
+    from_zero = replace(model.friction["m"], low=0.0)
+    with pytest.raises(BadSpecification, match="m = 0 kg"):
+        corners(replace(model, friction={**model.friction, "m": from_zero}), plant, force)
+
+
+def every(h: float, name: str) -> Log:
+    """A log of waves, sampled every h [s]."""
+    t = h * np.arange(round(20 / h), dtype=np.float64)
+    return Log(name, {"t": t, "y": np.sin(5 * t) + np.sin(13 * t), "F": np.cos(5 * t)})
+
+
+def test_logs_of_different_periods_meet_at_the_design_period() -> None:
+    fast, slow, odd = every(1e-3, "fast"), every(5e-3, "slow"), every(3e-3, "odd")
+    h, steps = common_period([fast, slow], None)
+    assert h == pytest.approx(0.01) and steps == (10, 2)
+    with pytest.raises(BadLog, match=r"odd: sampled every 0.003 s, slow every 0.005 s"):
+        common_period([slow, odd], None)
+    with pytest.raises(BadModel, match=r"no multiple of the log's 0.005 s; ask for 0.01"):
+        decimation(5e-3, 0.012)
+    with pytest.raises(BadModel, match="finite"):
+        decimation(5e-3, float("inf"))
+
+
+def test_force_error_of_a_prediction_is_that_of_sliding() -> None:
+    found = predict(identified().model, identified().sources[0].log)
+    error = (found.force_applied - found.force_predicted)[found.sliding]
+    assert 0 < found.sliding.sum() < len(found.t)
+    assert found.force_predicted_rms == pytest.approx(float(np.sqrt(np.mean(error**2))))
+
+
+def test_a_run_by_force_says_what_held_it() -> None:
+    model = identified().model
+    assert not any("held to" in line for line in fit_lines(model))
+    by_force = replace(model, fit=replace(model.fit, drive="force", stiffness=123.0))
+    said = "held to the measured position by 123 N/m and restarted every 2 s"
+    assert any(said in line for line in fit_lines(by_force))

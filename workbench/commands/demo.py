@@ -12,13 +12,17 @@ RECIPE = "paper_table2"
 
 
 @click.command(epilog="Example: workbench demo --out demo")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True,
+    help="Of the search and the simulated check; the log is of the recipe's own seed.",
+)  # fmt: skip
 @output_options
-def command(seed: int, as_json: bool, out: Path | None) -> None:
+def command(seed: int, as_json: bool, out: Path | None) -> int:
     """Run the whole chain on a shipped recipe and write a report.
 
     Simulates the paper's rig (table 2) in its PID loop, identifies it from that log alone, designs
     PID and RST, checks them in simulation. Tracing a residual to its effect is not part of it yet.
+    Exit status 1: the recommended controller does not keep the limits.
     """
     from workbench.card import load_card
     from workbench.demonstration import demo_view, demonstrate
@@ -49,3 +53,4 @@ def command(seed: int, as_json: bool, out: Path | None) -> None:
         "out": folder.final,
     }
     emit(result, as_json, lambda: demo_view(found, folder.final))
+    return 0 if validation.passed else 1

@@ -6,6 +6,7 @@ from typing import Literal
 
 import click
 
+from workbench.options import POSITIVE
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -23,10 +24,14 @@ from workbench.output import OutputFolder, emit, output_options, progress
     type=click.Choice(["physical", "arx"]),
     help="Plant to design on.  [default: physical where the mass is identified]",
 )
-@click.option("--design-period", type=float, metavar="S", help="Period of the position loop [s].")
-@click.option("--modulus", type=float, default=0.5, show_default=True, help="Least modulus margin.")
 @click.option(
-    "--delay", type=float, default=2.0, show_default=True, help="Least delay margin, in samples."
+    "--design-period", type=POSITIVE, metavar="S", help="Period of the position loop [s]."
+)
+@click.option(
+    "--modulus", type=POSITIVE, default=0.5, show_default=True, help="Least modulus margin."
+)
+@click.option(
+    "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
 )
 @output_options
 def command(

@@ -7,6 +7,7 @@ from typing import Literal
 
 import click
 
+from workbench.options import POSITIVE
 from workbench.output import OutputFolder, emit, output_options, progress
 
 STAGES = {
@@ -29,7 +30,7 @@ REST = (0.65, 0.9)
 @click.option("--orders", metavar="NA,NB,NK", help="Orders of the ARX plant.  [default: chosen]")
 @click.option(
     "--design-period",
-    type=float,
+    type=POSITIVE,
     metavar="S",
     help="Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
 )
@@ -64,6 +65,11 @@ def command(
     with OutputFolder("identify", out, now=datetime.now()) as folder:
         with progress("identifying", 1.0, as_json=as_json) as advance:
             sources = read_sources(logs, card)
+            if drive == "force" and sources.rig.kind == "motor":
+                raise click.UsageError(
+                    "--drive force: the rig is a motor, whose force is its command times a"
+                    " constant; leave --drive out."
+                )
             found = identify_sources(
                 sources, options, seed, posterior=posterior, on_progress=staged(advance)
             )

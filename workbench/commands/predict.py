@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.output import OutputFolder, emit, output_options
+from workbench.options import POSITIVE
+from workbench.output import OutputFolder, emit, output_options, progress
 
 if TYPE_CHECKING:
     from workbench.predicting import Prediction
@@ -17,7 +18,9 @@ if TYPE_CHECKING:
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("log", metavar="LOG")
 @click.option("--card", required=True, help="Path of the card, or the name of a shipped one.")
-@click.option("--window", type=float, metavar="S", help="Restart from the measured state every S.")
+@click.option(
+    "--window", type=POSITIVE, metavar="S", help="Restart from the measured state every S."
+)
 @click.option(
     "--drive",
     type=click.Choice(["force", "command"]),
@@ -45,7 +48,8 @@ def command(
     model = read_model(model_file)
     sources = read_sources([log], card)
     with OutputFolder("predict", out, now=datetime.now()) as folder:
-        found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
+        with progress("predicting", as_json=as_json):
+            found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
         folder.write_text("prediction.csv", prediction_csv(found))
     remarks = (*sources.remarks, *_other_card(model.card, sources.card.name))
     summary = {
@@ -83,10 +87,12 @@ def _errors(found: "list[Prediction]") -> dict[str, float | None]:
 def _lines(summary: Mapping[str, object], rotary: bool, remarks: tuple[str, ...]) -> list[str]:
     length, force = ("rad", "N m") if rotary else ("m", "N")
     by = "the command" if summary["drive"] == "command" else "the applied force"
-    start = f"restarted every {summary['window']} s" if summary["window"] else "free run"
+    window = summary["window"]
+    start = "free run" if window is None else f"restarted every {window} s"
     lines = [f"position ({start}, driven by {by}): {summary['position_rms']:.4g} {length} rms"]
     if summary["force_predicted_rms"] is not None:
-        lines.append(f"force, inverse model: {summary['force_predicted_rms']:.4g} {force} rms")
+        rms = f"{summary['force_predicted_rms']:.4g} {force} rms"
+        lines.append(f"force, inverse model: {rms} while sliding, outside the stick band")
     if summary["force_simulated_rms"] is not None:
         lines.append(f"force, simulated: {summary['force_simulated_rms']:.4g} {force} rms")
     lines.extend(f"note: {line}" for line in remarks)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 
+from workbench.options import POSITIVE
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -18,16 +19,18 @@ from workbench.output import OutputFolder, emit, output_options, progress
     metavar="MODEL",
     help="Another machine on which the design has to work too.",
 )
-@click.option("--modulus", type=float, default=0.5, show_default=True, help="Least modulus margin.")
 @click.option(
-    "--delay", type=float, default=2.0, show_default=True, help="Least delay margin, in samples."
+    "--modulus", type=POSITIVE, default=0.5, show_default=True, help="Least modulus margin."
 )
 @click.option(
-    "--standstill", type=float, default=0.05, show_default=True,
+    "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
+)
+@click.option(
+    "--standstill", type=POSITIVE, default=0.05, show_default=True,
     help="Largest error at standstill, relative to the step.",
 )  # fmt: skip
 @click.option(
-    "--tracking", type=float, default=0.15, show_default=True,
+    "--tracking", type=POSITIVE, default=0.15, show_default=True,
     help="Largest rms error along the smooth reference, relative to its amplitude.",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)

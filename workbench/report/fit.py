@@ -9,6 +9,7 @@ from identification.simulate import FreeRun
 from workbench.model import Model
 from workbench.report.figures import MEASURED, MODEL, figure, inline, label, line, style
 from workbench.report.page import Section, render
+from workbench.views import held
 
 ZOOM = 0.12  # part of the log shown enlarged
 
@@ -51,9 +52,8 @@ def _caption(model: Model) -> str:
             f" sees the measured position.{inverse if model.rig.kind == 'motor' else ''}"
         )
     return (
-        "The model is driven by the measured force and held near the measured position by"
-        f" {model.fit.stiffness:.3g} N/m, with a fresh start every 2 s: a free run on a measured"
-        f" force drifts at every stop.{inverse}"
+        f"The model is driven by the measured force, {held(model)}: a free run on a measured force"
+        f" drifts at every stop.{inverse}"
     )
 
 
