@@ -88,8 +88,8 @@ def trial(name: str, recipe: Recipe, seed: int, signals: tuple[str, ...]) -> Tri
     return Trial(errors, inside, least / np.abs(truth), seconds, fit.chi_square)
 
 
-def report(name: str, trials: list[Trial]) -> None:
-    """One table a card."""
+def report(name: str, trials: list[Trial], with_command: bool) -> None:
+    """One table a card; the bound is that of a log with its command."""
     errors = np.array([t.errors for t in trials])
     least = np.median([t.bound for t in trials], axis=0)
     inside = np.array([t.inside for t in trials])
@@ -105,9 +105,10 @@ def report(name: str, trials: list[Trial]) -> None:
         if not told:
             print(f"{key:6s}{'not identified in any log':>40s}")
             continue
+        share = f"{rms[i] / least[i]:.2f}" if with_command else "-"
         print(
             f"{key:6s}{100 * np.nanmedian(column):10.4f}{100 * np.nanmax(column):10.4f}"
-            f"{100 * rms[i]:10.4f}{100 * least[i]:10.4f}{rms[i] / least[i]:11.2f}"
+            f"{100 * rms[i]:10.4f}{100 * least[i]:10.4f}{share:>11s}"
             f"{np.nanmean(inside[:, i]):9.2f}{told:6d}"
         )
 
@@ -128,7 +129,7 @@ def main() -> None:
             trial(name, plain, seed, signals)
             for seed in range(asked.first, asked.first + asked.seeds)
         ]
-        report(name, trials)
+        report(name, trials, "u" in signals)
 
 
 if __name__ == "__main__":

@@ -110,6 +110,15 @@ def weigh_correlated(
         optimum = refine(runs, optimum.p, problem.free, cap=OUTLIER)
         spent += optimum.evaluations
     covariance = robust_covariance(runs, optimum, OUTLIER, STRETCHES)
+    if chi_square <= problem.adequate:
+        # One stretch with a missed stop would rule the scatter of a fit that follows the rest.
+        residuals = [
+            simulated(problem, optimum, i).y - log["y"] for i, log in enumerate(problem.logs)
+        ]
+        shrunk = sum(map(len, residuals)) / effective_samples(residuals)
+        plain = np.maximum(np.diag(optimum.covariance), 0.0) * max(shrunk, 1.0)
+        ratio = np.sqrt(np.minimum(1.0, plain / np.maximum(np.diag(covariance), 1e-300)))
+        covariance = covariance * np.outer(ratio, ratio)
     if problem.drive == "force":
         # What the force does between samples is not known: it is taken as linear.
         shared = np.arange(len(optimum.free))
