@@ -30,20 +30,22 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
     card = load_card(card_path(card_name))
     runs: list[Source] = []
     remarks: list[str] = []
-    rigs: dict[str, Rig] = {}
+    rigs: dict[Path, Rig] = {}
     for name in names:
         path = find_data(name, card)
-        if path.name in rigs:
+        whole = path.resolve()
+        if whole in rigs:
             raise BadLog(f"{path.name}: given twice; name every log once")
-        rigs[path.name] = card.rig(path.name)
+        rigs[whole] = card.rig(path.name)
         prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
         runs.extend(_source(path, run) for run in prepared.runs)
     first = next(iter(rigs))
-    for name, rig in rigs.items():
+    for path, rig in rigs.items():
         if rig != rigs[first]:
             raise BadLog(
-                f"{name}: the card gives it another rig than {first}; identify machines one by one"
+                f"{path.name}: the card gives it another rig than {first.name}; identify machines"
+                " one by one"
             )
     return Sources(card, rigs[first], tuple(runs), tuple(remarks))
 
