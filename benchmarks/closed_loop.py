@@ -93,7 +93,7 @@ def main(n: int) -> None:
     modes, modes_c = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
     costs, costs_c, y_euler = np.zeros((2, MANY)), np.zeros((2, MANY)), np.zeros(n)
     traces, weights = np.zeros((RECORDS, 0, MANY)), np.ones(n)
-    head = (H, loop.feed, loop.R, loop.S)
+    head = (loop.feed, loop.R, loop.S)
     blocks = (loop.noise.y[np.newaxis], loop.noise.F[np.newaxis])
     size = ctypes.c_size_t(n)
     with tempfile.TemporaryDirectory() as folder:
@@ -106,7 +106,7 @@ def main(n: int) -> None:
 
         def ours_one() -> None:
             x = loop.x.copy()
-            loop_kernel(p_1, *head, x, loop.pi, LIMIT, n_y, n_f, start, out, modes)
+            loop_kernel(p_1, H, 1, *head, x, loop.pi, LIMIT, n_y, n_f, start, out, modes)
 
         def ours_many() -> None:
             parts = (loop.reference, loop.feed, loop.R, loop.S, loop.x, loop.pi, LIMIT)

@@ -124,7 +124,7 @@ def main() -> None:
     for name in asked.cards:
         recipe = load_card(card_path(name)).recipe
         assert recipe is not None
-        plain = replace(recipe, plant=replace(recipe.plant, effects={}))
+        plain = replace(recipe, plant=replace(recipe.plant, effects=()))
         trials = [
             trial(name, plain, seed, signals)
             for seed in range(asked.first, asked.first + asked.seeds)

@@ -88,9 +88,10 @@ class LoopCosts:
 
 @dataclass(frozen=True, eq=False)
 class PreparedLoop:
-    """A loop as the kernels take it."""
+    """A loop as the kernels take it; the position controller runs at every `ratio`-th sample."""
 
     motor: bool
+    ratio: int
     reference: Array
     feed: Array
     R: Array
@@ -124,20 +125,31 @@ def simulate_loop(
     the controller's recursion takes the command as clipped. The plant is stepped exactly: the run
     does not depend on an internal step. Raises BadModel where the parts do not fit together.
     """
-    loop = _prepared(
+    loop, p = prepared_loop(
         [plant], controller, force_controller, reference, h, noise, control_limit, start
     )
-    n = len(loop.feed)
-    out, modes = np.empty((4, n)), np.empty(n, dtype=np.int64)
-    p, x = _parameters([plant]), loop.x.copy()
-    y_noise, f_noise = (np.ascontiguousarray(a[:, 0]) for a in (loop.noise.y, loop.noise.F))
-    common = (p, h, loop.feed, loop.R, loop.S, x)
+    return one_run(loop, p, h)
+
+
+def one_run(loop: PreparedLoop, p: Array, h: float) -> LoopRun:
+    """The run of one plant p (1, 11) in its loop, sampled at h [s]."""
+    n, x = len(loop.reference), loop.x.copy()
+    # One block for all: several would be given back to the system and fetched again every time.
+    block, modes = np.empty((7, n)), np.empty(n, dtype=np.int64)
+    out, (y, v, F, u, y_measured, F_measured, t) = block[:4], block
+    y_noise, f_noise = loop.noise.y[:, 0], loop.noise.F[:, 0]
+    common = (loop.feed, loop.R, loop.S, x)
     if loop.motor:
-        motor_kernel(*common, loop.limit, y_noise, loop.start, out, modes)
+        motor_kernel(p, h, *common, loop.limit, y_noise, loop.start, out, modes)
     else:
-        loop_kernel(*common, loop.pi, loop.limit, y_noise, f_noise, loop.start, out, modes)
-    y, v, F, u = out
-    return _run(loop, h, (y, v, F, u, modes), LoopNoise(y_noise, f_noise))
+        sensors = (y_noise, f_noise)
+        loop_kernel(
+            p, h, loop.ratio, *common, loop.pi, loop.limit, *sensors, loop.start, out, modes
+        )
+    np.add(y, y_noise, out=y_measured)
+    np.add(F, f_noise, out=F_measured)
+    np.multiply(h, np.arange(n), out=t)
+    return LoopRun(t, loop.reference, y, v, F, y_measured, F_measured, u, modes)
 
 
 def simulate_loops(
@@ -155,15 +167,23 @@ def simulate_loops(
 
     noise: (n,) for all plants, or (n, plants). All plants have an Actuator, or all a Motor.
     """
-    loop = _prepared(
+    loop, p = prepared_loop(
         plants, controller, force_controller, reference, h, noise, control_limit, start
     )
-    traces, _ = _many(plants, loop, h, (0, 0), record=True)
+    traces, _ = _many(p, loop, h, (0, 0), record=True)
     keep = traces[:, :, : len(plants)]
-    modes = keep[RECORD_MODE].astype(np.int64)
-    run = keep[RECORD_Y], keep[RECORD_V], keep[RECORD_F], keep[RECORD_U], modes
-    noise_y, noise_F = (a[:, : len(plants)] for a in (loop.noise.y, loop.noise.F))
-    return _run(loop, h, run, LoopNoise(noise_y, noise_F))
+    y, F = keep[RECORD_Y], keep[RECORD_F]
+    return LoopRun(
+        t=h * np.arange(len(loop.reference), dtype=np.float64),
+        r=loop.reference,
+        y=y,
+        v=keep[RECORD_V],
+        F=F,
+        y_measured=y + loop.noise.y,
+        F_measured=F + loop.noise.F,
+        u=keep[RECORD_U],
+        mode=keep[RECORD_MODE].astype(np.int64),
+    )
 
 
 def loop_costs(
@@ -182,18 +202,19 @@ def loop_costs(
 
     window: first sample and the one after the last; all samples where it is None.
     """
-    loop = _prepared(
+    loop, p = prepared_loop(
         plants, controller, force_controller, reference, h, noise, control_limit, start
     )
-    _, costs = _many(plants, loop, h, window or (0, len(loop.feed)), record=False)
+    _, costs = _many(p, loop, h, window or (0, len(loop.feed)), record=False)
     return LoopCosts(costs[0, : len(plants)], costs[1, : len(plants)])
 
 
 def _many(
-    plants: Sequence[Plant], loop: PreparedLoop, h: float, window: tuple[int, int], record: bool
+    p: Array, loop: PreparedLoop, h: float, window: tuple[int, int], record: bool
 ) -> tuple[Array, Array]:
-    padded = -(-len(plants) // WIDTH) * WIDTH
-    p = _parameters([*plants, *[plants[-1]] * (padded - len(plants))])
+    """Traces and costs of the plants p (plants, 11), and of copies of the last to fill a block."""
+    padded = -(-len(p) // WIDTH) * WIDTH
+    p = np.pad(p, ((0, padded - len(p)), (0, 0)), mode="edge")
     n = len(loop.feed)
     traces, costs = np.empty((RECORDS, n if record else 0, padded)), np.empty((2, padded))
     common = (h, loop.motor, loop.reference, loop.feed, loop.R, loop.S, loop.x, loop.pi, loop.limit)
@@ -211,17 +232,6 @@ def _in_blocks(noise: Array, width: int) -> Array:
         return noise[np.newaxis]
     blocks = np.pad(noise, ((0, 0), (0, width - plants))).reshape(n, -1, WIDTH)
     return np.ascontiguousarray(blocks.transpose(1, 0, 2))
-
-
-def _run(
-    loop: PreparedLoop,
-    h: float,
-    traces: tuple[Array, Array, Array, Array, IntArray],
-    noise: LoopNoise,
-) -> LoopRun:
-    y, v, F, u, mode = traces
-    t = h * np.arange(len(loop.feed), dtype=np.float64)
-    return LoopRun(t, loop.reference, y, v, F, y + noise.y, F + noise.F, u, mode)
 
 
 def _parameters(plants: Sequence[Plant]) -> Array:
@@ -247,22 +257,13 @@ def prepared_loop(
     noise: LoopNoise | None = None,
     control_limit: float | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    ratio: int = 1,
 ) -> tuple[PreparedLoop, Array]:
-    """What the kernels take of a loop, and its plants' parameters (plants, 11)."""
-    parts = (controller, force_controller, reference, h, noise, control_limit, start)
-    return _prepared(plants, *parts), _parameters(plants)
+    """What the kernels take of a loop, and its plants' parameters (plants, 11).
 
-
-def _prepared(
-    plants: Sequence[Plant],
-    controller: RST,
-    force_controller: ForcePI | None,
-    reference: ArrayLike,
-    h: float,
-    noise: LoopNoise | None,
-    control_limit: float | None,
-    start: tuple[float, float, float],
-) -> PreparedLoop:
+    ratio: samples h of the force loop in one of the position controller. Raises BadModel where the
+    parts do not fit together.
+    """
     r = frozen(reference)
     motors = {isinstance(plant.actuator, Motor) for plant in plants}
     if len(motors) != 1:
@@ -275,18 +276,21 @@ def _prepared(
         raise BadModel(
             f"the loop of a plant with {'a motor' if motor else 'an actuator'} has {need}"
         )
-    if abs(controller.h - h) > 1e-9 * h:
-        raise BadModel(f"controller sampled at {controller.h:g} s, loop at {h:g} s; must be one")
-    if r.ndim != 1 or not np.all(np.isfinite(r)):
+    if abs(controller.h - ratio * h) > 1e-6 * h:
+        raise BadModel(
+            f"controller sampled at {controller.h:g} s, loop at {ratio * h:g} s; must be one"
+        )
+    if r.ndim != 1 or r.size == 0 or not np.all(np.isfinite(r)):
         raise BadModel(f"reference of shape {r.shape}: need finite values, one per sample")
     if control_limit is not None and not control_limit > 0:
         raise BadModel(f"control limit {control_limit:g} V, must be > 0")
     R, S, x = _observer_form(controller, start[0])
     k_i, T_i = (force_controller.k_i, force_controller.T_i) if force_controller else (0.0, 1.0)
-    return PreparedLoop(
+    loop = PreparedLoop(
         motor=motor,
+        ratio=ratio,
         reference=r,
-        feed=_feed(controller, r, start[0]),
+        feed=_feed(controller, r[::ratio], start[0]),
         R=R,
         S=S,
         x=x,
@@ -295,6 +299,7 @@ def _prepared(
         noise=checked_noise(noise, len(r), len(plants), motor),
         start=(0.0 + start[0], 0.0 + start[1], 0.0 + start[2]),
     )
+    return loop, _parameters(plants)
 
 
 def checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) -> LoopNoise:
@@ -324,6 +329,10 @@ def _observer_form(controller: RST, y_0: float) -> tuple[Array, Array, Array]:
 def _feed(controller: RST, r: Array, y_0: float) -> Array:
     """T B_m/A_m r, (n,), after a past of r = y_0."""
     b = np.convolve(controller.T, controller.B_m) / controller.S[0]
+    if controller.A_m.size == 1:
+        past = np.full(b.size - 1, y_0)
+        moved = np.convolve(np.concatenate([past, r]), b / controller.A_m[0], "valid")
+        return np.asarray(moved, dtype=np.float64)[: r.size]
     steady = y_0 * b.sum() / controller.A_m.sum()
     size = max(b.size, controller.A_m.size)
     b = np.pad(b, (0, size - b.size)) / controller.A_m[0]

@@ -74,6 +74,7 @@ def shift(x: Array, R: Array, S: Array, y: float, u: float) -> None:
 def loop_kernel(
     p: Array,
     h: float,
+    ratio: int,
     feed: Array,
     R: Array,
     S: Array,
@@ -88,8 +89,9 @@ def loop_kernel(
 ) -> None:
     """One plant p (1, 11) with actuator and force loop: out (4, n) takes y, v, F, u; modes (n,).
 
-    feed: T r (n,); x: state of the position controller (deg+1,); pi: gains of the force error and
-    of its sum; limit: of the command [V], or infinite; noise (n,) on y and F.
+    The position controller runs at every `ratio`-th sample and its force reference is held between.
+    feed: T r at those samples; x: state of the position controller (deg+1,); pi: gains of the
+    force error and of its sum; limit: of the command [V], or infinite; noise (n,) on y and F.
     """
     table = np.zeros((MODES, COLUMNS))
     plant = parameters(p, 0)
@@ -100,12 +102,15 @@ def loop_kernel(
     mode = settled_mode(plant, v, force)
     v = 0.0 if mode == STUCK else v
     row = mode_row(table, mode)
-    r_0, integral = R[0], 0.0
-    for k in range(len(feed)):
-        measured = y + noise_y[k]
-        wanted = feed[k] - r_0 * measured + x[0]
+    r_0, integral, wanted = R[0], 0.0, 0.0
+    due, turn = 0, 0
+    for k in range(len(modes)):
+        if k == due:
+            measured = y + noise_y[k]
+            wanted = feed[turn] - r_0 * measured + x[0]
+            shift(x, R, S, measured, wanted)
+            due, turn = due + ratio, turn + 1
         u, integral = force_command(wanted, force + noise_f[k], integral, k_p, k_int, limit)
-        shift(x, R, S, measured, wanted)
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, force, u
         modes[k] = mode
         g = k1 * u
@@ -172,6 +177,23 @@ def shift_lane(s: Array, i: int, leading: Leading, y: float, u: float) -> None:
     s[WANTED * WIDTH + i] = u
 
 
+@compiled_inline
+def shift_rest(s: Array, R: Array, S: Array, lanes: int) -> None:
+    """`shift` of all lanes, the entries from the third on."""
+    for j in range(2, len(R) - 1):
+        r_j, s_j, x = R[j + 1], S[j + 1], (STATE + j) * WIDTH
+        for i in range(lanes):
+            y, u = s[MEASURED * WIDTH + i], s[WANTED * WIDTH + i]
+            s[x + i] = s[x + WIDTH + i] - r_j * y - s_j * u
+
+
+@compiled_inline
+def draw(s: Array, row: int, noise: Array, k: int, lanes: int) -> None:
+    """Noise of sample `k` for every lane, into `row`."""
+    for i in range(lanes):
+        s[row * WIDTH + i] = noise[k, i]
+
+
 @compiled
 def record(s: Array, modes: IntArray, base: int, k: int, traces: Array) -> None:
     """Sample `k` of a block, before its switches, into traces (RECORDS, n, plants)."""
@@ -222,11 +244,9 @@ def march_loop(
         n_y = noise_y[k, 0] if common_y else 0.0
         n_f = noise_f[k, 0] if common_f else 0.0
         if not common_y:
-            for i in range(lanes):
-                s[NOISE_Y * WIDTH + i] = noise_y[k, i]
+            draw(s, NOISE_Y, noise_y, k, lanes)
         if not common_f:
-            for i in range(lanes):
-                s[NOISE_F * WIDTH + i] = noise_f[k, i]
+            draw(s, NOISE_F, noise_f, k, lanes)
         for i in range(WIDTH):
             y, force = s[Y * WIDTH + i], s[F * WIDTH + i]
             measured = y + (n_y + s[NOISE_Y * WIDTH + i])
@@ -239,11 +259,7 @@ def march_loop(
             s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U * WIDTH + i] = y, force, u
             count(s, i, r - y, u, weight)
             flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * u)
-        for j in range(2, len(R) - 1):
-            r_j, s_j, x = R[j + 1], S[j + 1], (STATE + j) * WIDTH
-            for i in range(lanes):
-                y, u = s[MEASURED * WIDTH + i], s[WANTED * WIDTH + i]
-                s[x + i] = s[x + WIDTH + i] - r_j * y - s_j * u
+        shift_rest(s, R, S, lanes)
         if keep:
             record(s, modes, base, k, traces)
         if flagged:
@@ -275,8 +291,7 @@ def march_motor(
         fed, r, weight, flagged = feed[k], reference[k], weights[k], 0
         n_y = noise_y[k, 0] if common_y else 0.0
         if not common_y:
-            for i in range(lanes):
-                s[NOISE_Y * WIDTH + i] = noise_y[k, i]
+            draw(s, NOISE_Y, noise_y, k, lanes)
         for i in range(WIDTH):
             y = s[Y * WIDTH + i]
             measured = y + (n_y + s[NOISE_Y * WIDTH + i])
@@ -296,11 +311,7 @@ def march_motor(
             flagged = 0
         for i in range(WIDTH):
             flagged |= advance(s, i, h, s[F * WIDTH + i], 0.0)
-        for j in range(2, len(R) - 1):
-            r_j, s_j, x = R[j + 1], S[j + 1], (STATE + j) * WIDTH
-            for i in range(lanes):
-                y, u = s[MEASURED * WIDTH + i], s[WANTED * WIDTH + i]
-                s[x + i] = s[x + WIDTH + i] - r_j * y - s_j * u
+        shift_rest(s, R, S, lanes)
         if keep:
             record(s, modes, base, k, traces)
         if flagged:

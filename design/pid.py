@@ -37,13 +37,18 @@ INTEGRATOR = np.array([1.0, -1.0])
 
 @dataclass(frozen=True)
 class PIDGains:
-    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)), sampled by zero-order hold; k_R [N/m] for a
-    position loop with a force command, times T_i, T_d, eps [s]."""
+    """k_R (b r - y + (r - y)/(T_i s) + T_d s/(eps s + 1) (c r - y)), sampled by zero-order hold.
+
+    k_R [N/m] for a position loop with a force command; times T_i, T_d, eps [s]; set-point weights
+    b, c [-], 1 for a PID on the error (Astrom & Hagglund, Advanced PID Control, section 3.4).
+    """
 
     k_R: float
     T_i: float
     T_d: float
     eps: float
+    b: float = 1.0
+    c: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -63,20 +68,33 @@ class PID:
 
 
 def pid_to_rst(
-    k_R: float, T_i: float, T_d: float, eps: float, h: float, method: Sampling = "zoh"
+    k_R: float,
+    T_i: float,
+    T_d: float,
+    eps: float,
+    h: float,
+    method: Sampling = "zoh",
+    *,
+    b: float = 1.0,
+    c: float = 1.0,
 ) -> RST:
-    """The PID k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)) on the error, sampled at h, as RST (T = R).
+    """The PID of `PIDGains`, sampled at h, as RST; on the error (T = R) for b = c = 1.
 
-    k_R [command/output unit], T_i, T_d, eps, h [s]. method: "zoh" (step-invariant, the paper's
-    rig forms: h z^-1/(T_i (1 - z^-1)) and T_d (1 - z^-1)/(eps (1 - e^(-h/eps) z^-1))) or "tustin"
-    (bilinear), for both terms. Raises BadSpecification where a time is not positive (T_d may be 0).
+    k_R [command/output unit], T_i, T_d, eps, h [s]; b, c: set-point weights [-]. method: "zoh"
+    (step-invariant, the paper's rig forms: h z^-1/(T_i (1 - z^-1)) and
+    T_d (1 - z^-1)/(eps (1 - e^(-h/eps) z^-1))) or "tustin" (bilinear), for both terms. Raises
+    BadSpecification where a time is not positive (T_d may be 0).
     Source: paper, simulation section; its rig section for the sampled form.
     """
     integral, i_den = _integral(T_i, h, method)
     derivative, d_den = _derivative(T_d, eps, h, method)
-    R = add(np.convolve(i_den, d_den), np.convolve(integral, d_den))
-    R = add(R, np.convolve(derivative, i_den)) * _gain("k_R", k_R)
-    return RST(R, np.convolve(i_den, d_den), R, h)
+    k_R = _gain("k_R", k_R)
+
+    def weighted(b: float, c: float) -> Array:
+        on_error = add(b * np.convolve(i_den, d_den), np.convolve(integral, d_den))
+        return add(on_error, c * np.convolve(derivative, i_den)) * k_R
+
+    return RST(weighted(1.0, 1.0), np.convolve(i_den, d_den), weighted(b, c), h)
 
 
 def pi_to_rst(k_i: float, T_i: float, h: float, method: Sampling = "zoh") -> RST:
@@ -103,10 +121,10 @@ def pd_to_rst(k_d: float, T_d: float, eps: float, h: float, method: Sampling = "
 
 
 def pid_gains(controller: RST) -> PIDGains:
-    """The gains whose "zoh" form is the controller's R/S; the inverse of `pid_to_rst`.
+    """The gains whose "zoh" form is the controller; the inverse of `pid_to_rst`.
 
     Raises BadSpecification where R and S are not of PID form, the derivative filter is not
-    0 < e^(-h/eps) < 1, or k_R = 0, T_i <= 0 or T_d < 0.
+    0 < e^(-h/eps) < 1, k_R = 0, T_i <= 0 or T_d < 0, or T is more than set-point weighting.
     """
     R, S = controller.R / controller.S[0], controller.S / controller.S[0]
     if S.size > 3 or R.size > 3 or abs(S.sum()) > 1e-9 * np.abs(S).sum():
@@ -129,13 +147,30 @@ def pid_gains(controller: RST) -> PIDGains:
     derivative = r0 / k_R - 1
     if abs(derivative) < 1e-6:  # rounding of a PI
         derivative = 0.0
-    gains = PIDGains(k_R, controller.h * k_R / k_i, eps * derivative, eps)
-    if gains.T_i <= 0 or gains.T_d < 0:
+    T_i, T_d = controller.h * k_R / k_i, eps * derivative
+    if T_i <= 0 or T_d < 0:
         raise BadSpecification(
-            f"T_i = {gains.T_i:.4g} s, T_d = {gains.T_d:.4g} s: a parallel PID needs T_i > 0 and "
-            "T_d >= 0; keep the digital form"
+            f"T_i = {T_i:.4g} s, T_d = {T_d:.4g} s: a parallel PID needs T_i > 0 and T_d >= 0; keep"
+            " the digital form"
         )
-    return gains
+    b, c = _weights(controller.T / controller.S[0], PIDGains(k_R, T_i, T_d, eps), controller.h)
+    return PIDGains(k_R, T_i, T_d, eps, b, c)
+
+
+def _weights(T: Array, gains: PIDGains, h: float) -> tuple[float, float]:
+    """Set-point weights b, c with which the PID of these gains has this T."""
+    plain = pid_to_rst(gains.k_R, gains.T_i, gains.T_d, gains.eps, h, b=0.0, c=0.0)
+    first = pid_to_rst(gains.k_R, gains.T_i, gains.T_d, gains.eps, h, b=1.0, c=0.0)
+    full = pid_to_rst(gains.k_R, gains.T_i, gains.T_d, gains.eps, h)
+    goal = add(T, -plain.T)
+    terms = np.zeros((max(goal.size, 3), 2))
+    terms[:3, 0], terms[:3, 1] = first.T - plain.T, full.T - first.T
+    goal = np.pad(goal, (0, len(terms) - goal.size))
+    found = np.asarray(np.linalg.lstsq(terms, goal, rcond=None)[0], dtype=np.float64)
+    if float(np.abs(terms @ found - goal).max()) > 1e-6 * float(np.abs(T).max()):
+        raise BadSpecification("T is more than set-point weights b and c; keep the digital form")
+    b, c = found.tolist()
+    return b, c if gains.T_d > 0 else 1.0
 
 
 def design_pid(

@@ -2,20 +2,30 @@
 
 Ours. Stable, well damped plant poles are kept as closed-loop poles (moving them costs robustness
 and buys nothing; Landau & Zito, section 3.6), the other poles lie on the real axis, faster than
-the dominant ones. Of the loops that keep the margins, the fastest is taken.
+the dominant ones. Of the loops that keep the margins, the fastest is taken; `design.tracking`
+then chooses T.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from design.margins import Margins, margins
-from design.pid import PID, design_pid
+from design.pid import PID, design_pid, pid_gains
 from design.polynomial import ComplexArray, frequency_and_damping, roots
 from design.rst import RST, design_rst
-from design.specification import normalised_plant
+from design.specification import normalised_plant, pole_pair
+from design.tracking import (
+    Demand,
+    Followed,
+    Plants,
+    followed,
+    integrates,
+    pid_candidates,
+    rst_candidates,
+)
 from identification.arrays import Array
 from identification.errors import BadSpecification
 
@@ -24,6 +34,8 @@ SLOWEST, FASTEST = 0.005, 0.6  # w_n h [rad]
 DAMPINGS = (1.0, 0.8)
 RATIOS = (3.0, 6.0, 1.5)  # auxiliary poles, in units of w_n
 KEPT = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
+LAGGARD = 0.5  # decay of the slowest pole, in units of the dominant ones', below which they are not
+PLAIN = Demand()
 
 
 @dataclass(frozen=True)
@@ -48,7 +60,7 @@ class Asked:
 
 
 @dataclass(frozen=True, eq=False)
-class Tuned:
+class Placed:
     """A controller with its margins, the poles it was asked for, and what it misses, if so.
 
     worst: least modulus margin over all plants, None: unstable on one. missed: goals not kept, in
@@ -61,21 +73,32 @@ class Tuned:
     dominant: tuple[float, float]
     auxiliary: tuple[complex, ...]
     missed: tuple[str, ...]
-    pid: PID | None = None
+    pid: PID | None
 
 
-Plants = Sequence[tuple[Array, Array]]
+@dataclass(frozen=True, eq=False)
+class Tuned(Placed):
+    """A placed controller and how it takes its reference."""
+
+    followed: Followed
+
+
 Design = Callable[[tuple[float, float], tuple[complex, ...]], tuple[RST, PID | None]]
 
 
 def tune_rst(
-    A: Array, B: Array, h: float, asked: Asked, goals: Goals, corners: Plants = ()
+    A: Array,
+    B: Array,
+    h: float,
+    asked: Asked,
+    goals: Goals,
+    corners: Plants = (),
+    demand: Demand = PLAIN,
 ) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
-    T is a number: a step asks for no more force at first than the loop's speed needs.
     corners: other plants (A, B) on which the modulus margin must hold too. R holds 1 + z^-1, so
-    that noise at half the sampling rate does not reach the force.
+    that noise at half the sampling rate does not reach the force. T: see `design.tracking`.
     Raises BadSpecification with the first reason where no poles of the search give a stable loop.
     """
     A, B = normalised_plant(A, B)
@@ -92,15 +115,26 @@ def tune_rst(
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))
-    return _best(((A, B), *corners), h, asked, goals, design, others)
+    plants = ((A, B), *corners)
+    found = _best(plants, h, asked, goals, design, others)
+    poles = np.append(found.auxiliary, pole_pair(*found.dominant, h))
+    candidates = rst_candidates(A, B, found.rst, poles, len(poles))
+    return _following(plants, found, candidates, demand)
 
 
 def tune_pid(
-    A: Array, B: Array, h: float, asked: Asked, goals: Goals, corners: Plants = ()
+    A: Array,
+    B: Array,
+    h: float,
+    asked: Asked,
+    goals: Goals,
+    corners: Plants = (),
+    demand: Demand = PLAIN,
 ) -> Tuned:
     """The fastest digital PID within the goals, or the one asked for; see `tune_rst`.
 
-    Raises BadSpecification with the first reason where none gives a stable loop.
+    T has two degrees, which are set-point weights. Raises BadSpecification with the first reason
+    where none gives a stable loop.
     """
     A, B = normalised_plant(A, B)
 
@@ -111,7 +145,38 @@ def tune_pid(
         return found.rst, found
 
     others = _auxiliary(A, h, min(A.size - 1, 2))
-    return _best(((A, B), *corners), h, asked, goals, design, others)
+    plants = ((A, B), *corners)
+    found = _best(plants, h, asked, goals, design, others)
+    if found.pid is not None and found.pid.gains is not None:
+        candidates = pid_candidates(found.pid.gains, h)
+    else:
+        candidates = rst_candidates(A, B, found.rst, found.margins.poles, 2)
+    return _following(plants, found, candidates, demand)
+
+
+def _following(plants: Plants, found: Placed, candidates: Iterable[Array], demand: Demand) -> Tuned:
+    """The controller with the best T of the candidates, and the overshoot where it has too much."""
+    chosen = followed(plants, found.rst, candidates, demand)
+    rst, pid, missed = replace(found.rst, T=chosen.T), found.pid, found.missed
+    if chosen.overshoot > demand.overshoot:
+        missed = (
+            *missed,
+            f"a step overshoots by {100 * chosen.overshoot:.1f} %, at most"
+            f" {100 * demand.overshoot:g} % allowed",
+        )
+    if pid is not None:
+        gains = None if pid.gains is None else pid_gains(rst)
+        pid = replace(pid, rst=rst, gains=gains)
+    return Tuned(
+        rst=rst,
+        margins=found.margins,
+        worst=found.worst,
+        dominant=found.dominant,
+        auxiliary=found.auxiliary,
+        missed=missed,
+        pid=pid,
+        followed=chosen,
+    )
 
 
 def _auxiliary(A: Array, h: float, count: int) -> Callable[[float], tuple[complex, ...]]:
@@ -143,10 +208,10 @@ def _best(
     goals: Goals,
     design: Design,
     auxiliary: Callable[[float], tuple[complex, ...]],
-) -> Tuned:
+) -> Placed:
     A, B = plants[0]
     refusal: BadSpecification | None = None
-    found: list[Tuned] = []
+    found: list[Placed] = []
     for dominant, candidates in _grid(h, asked, auxiliary):
         for others in candidates:
             try:
@@ -155,12 +220,14 @@ def _best(
             except BadSpecification as error:
                 refusal = refusal or error
                 continue
-            missed = goals_missed(margin, goals, _integrates(A, controller))
+            missed = goals_missed(margin, goals, integrates(A, controller))
+            if asked.auxiliary is None:
+                missed = (*missed, *_laggards(margin, dominant))
             worst = margin.modulus if missed else worst_modulus(plants, controller)
             missed = missed or _worst_missed(worst, goals)
             if not controller.stable:
                 missed = (*missed, "the controller itself has a pole outside the unit circle")
-            found.append(Tuned(controller, margin, worst, dominant, others, missed, pid))
+            found.append(Placed(controller, margin, worst, dominant, others, missed, pid))
         kept = [one for one in found if not one.missed]
         if kept:
             return max(kept, key=lambda one: one.worst or 0.0)
@@ -187,6 +254,15 @@ def _worst_missed(worst: float | None, goals: Goals) -> tuple[str, ...]:
     return ()
 
 
+def _laggards(found: Margins, dominant: tuple[float, float]) -> tuple[str, ...]:
+    """Whether a pole is so slow that the dominant ones do not dominate, in words."""
+    slowest = -math.log(max(abs(complex(found.poles[0])), 1e-12)) / found.h
+    asked = -math.log(float(np.abs(pole_pair(*dominant, found.h)).max())) / found.h
+    if slowest >= LAGGARD * asked:
+        return ()
+    return (f"a pole decays with {slowest:.3g} /s, the dominant ones with {asked:.3g} /s",)
+
+
 def _grid(
     h: float, asked: Asked, auxiliary: Callable[[float], tuple[complex, ...]]
 ) -> Iterator[tuple[tuple[float, float], list[tuple[complex, ...]]]]:
@@ -200,22 +276,16 @@ def _grid(
             yield dominant, [auxiliary(ratio * dominant[0]) for ratio in RATIOS]
 
 
-def _integrates(A: Array, controller: RST) -> bool:
-    """Whether the loop gain is infinite at frequency 0."""
-    size = float(np.abs(A).sum() * np.abs(controller.S).sum())
-    return abs(float(A.sum() * controller.S.sum())) < 1e-9 * size
-
-
 def goals_missed(found: Margins, goals: Goals, integrates: bool) -> tuple[str, ...]:
     """The goals that a loop does not keep, in words; integrates: its gain is infinite at 0."""
     missed = []
     if integrates and found.delay_s is None:
         missed.append("the crossover is lost in rounding; sample more slowly")
     if found.modulus < goals.modulus:
-        missed.append(f"modulus margin {found.modulus:.3f}, at least {goals.modulus:g} asked")
+        missed.append(f"modulus margin {found.modulus:.4g}, at least {goals.modulus:g} asked")
     if found.delay_s is not None and found.delay_s < goals.delay * found.h:
         samples = found.delay_s / found.h
-        missed.append(f"delay margin {samples:.2f} samples, at least {goals.delay:g} asked")
+        missed.append(f"delay margin {samples:.4g} samples, at least {goals.delay:g} asked")
     effort = found.S_up_max_db
     if goals.effort is not None and effort is not None and effort > goals.effort:
         missed.append(

@@ -14,6 +14,8 @@ import numpy as np
 
 from identification.actuator import ActuatorFit
 from identification.arrays import Array
+from identification.climb import ATTEMPTS as CLIMBS
+from identification.climb import Climb, climb
 from identification.experiment import total_cost
 from identification.identifiability import estimates, events_of
 from identification.imposed import fit_imposed, is_imposed
@@ -27,11 +29,19 @@ from identification.result import Drive, KarnoppFit, LogFit
 from identification.search import evolve
 from identification.simulate import FreeRun
 from identification.stepping import DV_N, DV_P, F_SN, F_SP, K1, K2
-from identification.weighing import Progress, Solution, weigh_correlated, weigh_misfit, weigh_noise
+from identification.weighing import (
+    Progress,
+    Solution,
+    weigh_correlated,
+    weigh_misfit,
+    weigh_noise,
+    weigh_stretches,
+)
 
 POPULATION = 64
 GENERATIONS = 150
 ATTEMPTS = 3
+FIRST_CLIMBS = 3  # searches over stretches before one over long windows has its turn
 FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
 MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 RIVAL = 3.0  # cost relative to the best up to which another optimum counts against it
@@ -58,7 +68,7 @@ def fit_karnopp(
     problem = pose(logs, rig, drive)
     if is_imposed(logs, problem.firsts, rig):
         return fit_imposed(problem, rng, rig, LED_WHY)
-    solution = solve(problem, rng, report)
+    problem, solution = solve(problem, rng, report)
     remarks: list[str] = []
     actuator = problem.actuator
     if (
@@ -74,7 +84,7 @@ def fit_karnopp(
             f" {solution.chi_square:.3g}), so the run was driven by the logged force"
         )
         problem = pose(logs, rig, "force")
-        solution = solve(problem, rng, report)
+        problem, solution = solve(problem, rng, report)
     if problem.drive == "force" and not problem.hold and solution.chi_square > LED:
         why = f"no free run follows this log (chi-square {solution.chi_square:.3g})"
         return fit_imposed(problem, rng, rig, why, remarks)
@@ -90,8 +100,50 @@ def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
-def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solution:
-    """Search, refine and weigh until the fit is found or the misfit is the model's own."""
+def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> tuple[Problem, Solution]:
+    """Search, refine and weigh until the fit is found or the misfit is the model's own.
+
+    The problem comes back with restarts where only stretches of the logs are followed.
+    """
+    enough = problem.adequate * problem.count
+    # A stream of its own: the climb does not change what the searches after it draw.
+    aside = rng.spawn(1)[0]
+    climbs: list[Climb] = []
+    if problem.hold:
+        climbs = [climb(_opened(problem), aside, report, CLIMBS[:FIRST_CLIMBS])]
+        if climbs[0].found and climbs[0].sure:
+            return _weighed(climbs[0], rng, report)
+    optima, members = _attempts(problem, rng, report)
+    if problem.drive == "command" and min(one.cost for one in optima) > enough:
+        climbs = [climb(problem, aside, report)]
+        one = climbs[0].optimum if climbs[0].found else _through_force(problem, rng, report)
+        optima.append(one)
+    best = min(optima, key=lambda one: one.cost)
+    spent = sum(one.evaluations for one in optima)
+    if best.cost <= ADEQUATE * problem.count and problem.drive == "command":
+        return problem, weigh_noise(problem, best, rng, spent, report)
+    if problem.hold:
+        opened = _opened(problem)
+        closer = min((_closer(opened, one, rng) for one in optima), key=lambda one: one.cost)
+        if closer.cost > ADEQUATE * problem.count and not climbs[0].hopeless:
+            climbs.append(climb(opened, aside, report, CLIMBS[FIRST_CLIMBS:]))
+        whole = min((one.optimum.cost for one in climbs if one.found), default=np.inf)
+        if closer.cost <= min(ADEQUATE * problem.count, whole):
+            return problem, weigh_noise(opened, closer, rng, spent, report)
+    for climbed in sorted(climbs, key=lambda one: (not one.found, one.optimum.cost)):
+        if climbed.followed:
+            return _weighed(climbed, rng, report)
+    if not problem.hold:
+        rivals = [one.p for one in optima if one.cost < RIVAL * best.cost]
+        return problem, weigh_correlated(problem, best, np.array(rivals), rng, spent)
+    of_best = members[[one.cost for one in optima].index(best.cost)]
+    return problem, weigh_misfit(problem, best, of_best, rng, spent, report)
+
+
+def _attempts(
+    problem: Problem, rng: np.random.Generator, report: Progress
+) -> tuple[list[Optimum], list[Array]]:
+    """Optima and last members of searches over long windows until one is adequate."""
     optima: list[Optimum] = []
     members: list[Array] = []
     enough = problem.adequate * problem.count
@@ -107,28 +159,24 @@ def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> Solut
             break
         if attempt > 0 and found.cost > before * (1 - SAME):
             break
-    best = min(optima, key=lambda one: one.cost)
-    if problem.drive == "command" and best.cost > enough:
-        optima.append(_through_force(problem, rng, report))
-        best = min(optima, key=lambda one: one.cost)
-    spent = sum(one.evaluations for one in optima)
-    if best.cost <= ADEQUATE * problem.count and problem.drive == "command":
-        return weigh_noise(problem, best, rng, spent, report)
-    if problem.hold:
-        opened = _opened(problem)
-        closer = min((_closer(opened, one, rng) for one in optima), key=lambda one: one.cost)
-        if closer.cost <= ADEQUATE * problem.count:
-            return weigh_noise(opened, closer, rng, spent, report)
-    if not problem.hold:
-        rivals = [one.p for one in optima if one.cost < RIVAL * best.cost]
-        return weigh_correlated(problem, best, np.array(rivals), rng, spent)
-    of_best = members[[one.cost for one in optima].index(best.cost)]
-    return weigh_misfit(problem, best, of_best, rng, spent, report)
+    return optima, members
+
+
+def _weighed(
+    climbed: Climb, rng: np.random.Generator, report: Progress
+) -> tuple[Problem, Solution]:
+    """What a climb found, weighed over whole runs, or over the stretches that it follows."""
+    problem, optimum = climbed.problem, climbed.optimum
+    if climbed.found:
+        return problem, weigh_noise(problem, optimum, rng, optimum.evaluations, report)
+    runs = tuple(climbed.cut.restarted())
+    problem = replace(problem, runs=runs, stretched=True)
+    return problem, weigh_stretches(problem, optimum, rng, optimum.evaluations)
 
 
 def _closer(opened: Problem, found: Optimum, rng: np.random.Generator) -> Optimum:
     """The optimum with its starts fitted too: over windows, near by, then over the whole."""
-    cap = _cap(opened, 0)
+    cap = opened.cap
     near = refine(opened.runs, found.p, opened.free, cap=cap)
     whole = refine(near.runs(opened.long_runs), near.p, opened.free, cap=cap)
     whole = refine(whole.runs(opened.long_runs), whole.p, opened.free)
@@ -152,7 +200,7 @@ def _through_force(problem: Problem, rng: np.random.Generator, report: Progress)
     other = pose(problem.logs, Rig("force"), "force")
     found, _ = _search(other, rng, POPULATION, 0, report)
     row = np.concatenate([found.p[:9], problem.row[[K1, K2]]])
-    cap = _cap(problem, 0)
+    cap = problem.cap
     near = refine(problem.runs, row, problem.free, cap=cap)
     optimum = _search_near(problem, near, cap, rng)
     spent = found.evaluations + near.evaluations + optimum.evaluations
@@ -164,7 +212,7 @@ def _search(
 ) -> tuple[Optimum, Array]:
     """One global search over windows, its best member refined over the whole run, and all members
     as kernel parameters (k, 11), best first."""
-    cap = _cap(problem, attempt)
+    cap = problem.cap * 25.0**attempt
     # A search that failed may have looked around a bad first estimate.
     box, runs = problem.box.wider(3.0**attempt), problem.runs
     # k1 and k2 come from the regression: searched over in the refinement only.
@@ -214,14 +262,6 @@ def _search_near(problem: Problem, near: Optimum, cap: float, rng: np.random.Gen
     optimum = refine(whole, box.rows(found.members[:1])[0], problem.free, cap=cap)
     optimum = refine(optimum.runs(whole), optimum.p, problem.free)
     return replace(optimum, evaluations=optimum.evaluations + found.evaluations)
-
-
-def _cap(problem: Problem, attempt: int) -> float:
-    """Bound of a squared residual: wide of the noise, and of a fiftieth of the motion."""
-    noise = max(
-        (0.02 * float(np.std(run.measured.y)) * run.measured.weight_y) ** 2 for run in problem.runs
-    )
-    return float(max(1e4, noise) * 25.0**attempt)
 
 
 def _result(
@@ -296,5 +336,11 @@ def _remarks(problem: Problem, solution: Solution) -> list[str]:
         out.append(
             "driven by the measured force, held to the measured position by"
             f" {solution.optimum.p[K2]:.4g} N/m: no command explains the force"
+        )
+    if problem.stretched:
+        count = sum(len(run.windows.at) for run in problem.runs)
+        out.append(
+            f"the model follows {count} stretches of the logs, each begun anew, but not the whole:"
+            " a stop there turns on less than the noise"
         )
     return out

@@ -1,9 +1,8 @@
 """The plant as one value: mass with Karnopp friction, its actuator, and chosen effects."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from types import MappingProxyType
+from dataclasses import dataclass
 
+from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.karnopp import Karnopp
 
@@ -29,8 +28,8 @@ class Motor:
 
 @dataclass(frozen=True)
 class Plant:
-    """Mass and friction, the actuator where the command is known, and effects by key."""
+    """Mass and friction, the actuator where the command is known, and the effects it has."""
 
     friction: Karnopp
     actuator: Actuator | Motor | None = None
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=lambda: MappingProxyType({}))
+    effects: tuple[Acting, ...] = ()

@@ -26,7 +26,7 @@ LONGEST = 40.0  # s; a run without a stiffness that holds it is compared at most
 @dataclass(frozen=True)
 class Problem:
     """Logs, how they are driven, and where to look; noise of position [m] and force [N]; the
-    motor's k_a [N/V], 0 for other rigs."""
+    motor's k_a [N/V], 0 for other rigs; stretched: the runs restart where their windows say."""
 
     logs: tuple[Log, ...]
     runs: tuple[Run, ...]
@@ -39,6 +39,7 @@ class Problem:
     actuator: ActuatorFit | None
     noise: tuple[float, float]
     k_a: float
+    stretched: bool = False
 
     @property
     def adequate(self) -> float:
@@ -51,8 +52,19 @@ class Problem:
         return sum(run.measured.count for run in self.runs)
 
     @property
+    def cap(self) -> float:
+        """Bound of a squared residual in a search: wide of the noise, and of a fiftieth of the
+        motion."""
+        noise = max(
+            (0.02 * float(np.std(run.measured.y)) * run.measured.weight_y) ** 2 for run in self.runs
+        )
+        return float(max(1e4, noise))
+
+    @property
     def long_runs(self) -> tuple[Run, ...]:
         """Runs as long as the model may be asked to follow without a restart."""
+        if self.stretched:
+            return self.runs
         if self.drive == "command":
             return tuple(run.whole() for run in self.runs)
         if not self.hold:

@@ -6,6 +6,8 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
+from identification.effect_run import effect_run_kernel
+from identification.effect_step import effect_table, pieces, signal_table
 from identification.errors import BadModel
 from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
@@ -30,12 +32,16 @@ from identification.stepping import (
 
 @dataclass(frozen=True)
 class FreeRun:
-    """Simulated position y [m], velocity v [m/s], force F [N] and mode at every sample, (n,)."""
+    """Simulated position y [m], velocity v [m/s], force F [N] and mode at every sample, (n,).
+
+    shown: position that the transducer shows [m]; it is y where no effect acts on the sensor.
+    """
 
     y: Array
     v: Array
     F: Array
     mode: IntArray
+    shown: Array
 
 
 @compiled
@@ -54,7 +60,7 @@ def run_kernel(
     out: Array,
     modes: IntArray,
 ) -> None:
-    """One plant p (1, 11) along one log: out (3, n) takes position, velocity, force; modes (n,).
+    """One plant p (1, 11) along one log: out[:3] takes position, velocity, force; modes (n,).
 
     held: take the force from `force` and `slope` at every sample, corrected by k2 (y_m - y);
     at, at_y, at_v, at_f: samples at which the run restarts, and from where.
@@ -119,11 +125,12 @@ def free_run(
         raise BadModel("the model has no actuator: drive the run by force, not by the command")
     motor = isinstance(plant.actuator, Motor)
     held = drive == "force" or motor
-    k1, k2 = 0.0, stiffness
+    k1, k2, k_a = 0.0, stiffness, 0.0
     if isinstance(plant.actuator, Actuator) and not held:
         k1, k2 = plant.actuator.k1, plant.actuator.k2
     if isinstance(plant.actuator, Motor) and drive == "command":
-        force = plant.actuator.k_a * log["u"]
+        k_a = plant.actuator.k_a
+        force = k_a * log["u"]
     else:
         force = log["F"] if held else np.zeros(len(log))
     at, at_y, at_v = restarts if restarts else (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
@@ -131,12 +138,9 @@ def free_run(
     at = np.concatenate([[0], at[keep]]).astype(np.int64)
     at_f = log["F"][at] if "F" in log else force[at]
     at_f = np.concatenate([[start[2]], at_f[1:]])
-    out = np.zeros((3, len(log)))
+    out = np.zeros((4, len(log)))
     modes = np.zeros(len(log), dtype=np.int64)
-    run_kernel(
-        kernel_parameters(plant.friction.array, k1, k2)[np.newaxis],
-        log.h,
-        held,
+    common = (
         log["u"] if "u" in log else np.zeros(len(log)),
         force,
         np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False),
@@ -148,10 +152,21 @@ def free_run(
         out,
         modes,
     )
+    p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
+    if plant.effects:
+        table = effect_table(plant.effects)
+        by_command = isinstance(plant.actuator, Motor) and drive == "command"
+        effect_run_kernel(
+            p, log.h, pieces(table, log.h), table.codes, table.addresses, table.p,
+            signal_table(plant.effects, log), held, k_a if by_command else 0.0, log["t"], *common,
+        )  # fmt: skip
+    else:
+        run_kernel(p, log.h, held, *common)
+        out[3] = out[0]
     if not np.all(np.isfinite(out[0])):
         lost = float(log["t"][int(np.argmin(np.isfinite(out[0])))])
         raise BadModel(
             f"{log.name}: the simulated run cannot be followed beyond t = {lost:g} s (too many"
             " switches within one sample, or numbers without bound); check mass and band"
         )
-    return FreeRun(out[0], out[1], out[2], modes)
+    return FreeRun(out[0], out[1], out[2], modes, out[3])

@@ -96,6 +96,26 @@ def weigh_noise(
     return Solution(optimum, members, chi_square, adequate, spent, noise)
 
 
+def weigh_stretches(
+    problem: Problem, optimum: Optimum, rng: np.random.Generator, spent: int
+) -> Solution:
+    """A fit that leaves noise over stretches of the logs, each begun anew: its normal spread.
+
+    optimum: over the stretches, whose starts are among its unknowns; of these the first of every
+    run are kept, the others being the windows of `problem`.
+    """
+    chi_square = optimum.cost / problem.count
+    shared = len(optimum.free)
+    covariance = max(chi_square, 1.0) * ROUGH[1] ** 2 * optimum.covariance[:shared, :shared]
+    center = optimum.p[optimum.free]
+    members = rng.multivariate_normal(center, covariance, 1024, check_valid="ignore")
+    keep_near(members, optimum.free, optimum.p)
+    starts = np.array([run.start for run in problem.runs])
+    optimum = replace(optimum, starts=starts)
+    adequate = chi_square <= problem.adequate
+    return Solution(optimum, members, chi_square, adequate, spent, problem.noise)
+
+
 def weigh_correlated(
     problem: Problem, optimum: Optimum, rivals: Array, rng: np.random.Generator, spent: int
 ) -> Solution:

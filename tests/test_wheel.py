@@ -1,5 +1,6 @@
 """The wheel holds our three packages and the cards, and nothing else."""
 
+import re
 import zipfile
 from pathlib import Path, PurePosixPath
 
@@ -9,8 +10,12 @@ from tools.check_wheel import ROOT, build_wheel
 
 
 @pytest.fixture(scope="module")
-def names(tmp_path_factory: pytest.TempPathFactory) -> list[PurePosixPath]:
-    wheel = build_wheel(tmp_path_factory.mktemp("wheel"))
+def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return build_wheel(tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def names(wheel: Path) -> list[PurePosixPath]:
     with zipfile.ZipFile(wheel) as archive:
         return [PurePosixPath(name) for name in archive.namelist()]
 
@@ -34,6 +39,22 @@ def test_cards_are_there_and_no_python_among_them(names: list[PurePosixPath]) ->
     cards = {PurePosixPath(p.relative_to(ROOT / "datasets")) for p in _cards()}
     assert cards <= held
     assert not [path for path in held if path.suffix == ".py"]
+
+
+def test_the_description_needs_no_file_of_the_checkout(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        text = archive.read(name).decode("utf-8")
+    assert "Description-Content-Type: text/markdown" in text
+    assert "workbench identify" in text
+    assert not re.findall(r"\]\((?!https?:)", text)
+
+
+def test_numba_whose_privates_are_used_is_bounded(wheel: Path) -> None:
+    with zipfile.ZipFile(wheel) as archive:
+        (name,) = (n for n in archive.namelist() if n.endswith(".dist-info/METADATA"))
+        (line,) = re.findall(r"^Requires-Dist: numba(.*)$", archive.read(name).decode(), re.M)
+    assert ">=" in line and "<" in line
 
 
 def test_licence_is_there(names: list[PurePosixPath]) -> None:

@@ -1,5 +1,10 @@
-"""Build the wheel, install it in an empty environment outside the tree, and run it there."""
+"""Build the wheel, install it in an empty environment outside the tree, and run it there.
 
+There a shipped recipe is simulated and its log identified, as a new user would: that loads every
+dependency, compiles the kernels and needs the cards and the report's templates.
+"""
+
+import json
 import os
 import subprocess
 import sys
@@ -9,6 +14,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("workbench", "identification", "design")
+RECIPE = "paper_table1"
 PROBE = f"""
 import importlib, pathlib, sys
 for name in {PACKAGES!r}:
@@ -47,7 +53,29 @@ def check_install(wheel: Path, into: Path) -> list[str]:
     shown = run(python.parent / "workbench", "--help", cwd=into)
     if "identify" not in shown:
         sys.exit(f"wheel check: workbench --help names no command 'identify':\n{shown}")
+    check_chain(python.parent / "workbench", into)
     return run(python, "-c", PROBE, cwd=into).split()
+
+
+def check_chain(workbench: Path, into: Path) -> None:
+    """Simulate a shipped recipe and identify its log; ends the check where a file is missing."""
+    run(workbench, "simulate", RECIPE, "--out", into / "log", cwd=into)
+    log, model = into / "log" / f"{RECIPE}.csv", into / "model"
+    need(log, into / "log" / "truth.json")
+    run(workbench, "identify", log, "--card", RECIPE, "--out", model, cwd=into)
+    need(model / "model.json", model / "report.html")
+    found = json.loads((model / "model.json").read_text(encoding="utf-8"))
+    if found["friction"]["m"]["value"] is None:
+        sys.exit(f"wheel check: identify {RECIPE} finds no mass: {found['friction']['m']}")
+    if "<svg" not in (model / "report.html").read_text(encoding="utf-8"):
+        sys.exit("wheel check: report.html holds no figure")
+
+
+def need(*files: Path) -> None:
+    """End the check where one of the files is missing or empty."""
+    for file in files:
+        if not file.is_file() or not file.stat().st_size:
+            sys.exit(f"wheel check: {file.name} was not written to {file.parent.name}/")
 
 
 def main() -> None:

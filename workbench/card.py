@@ -8,9 +8,10 @@ Beyond the contract's example a card may say (all optional, all additive):
              skip_rows = 15      # rows dropped before the header, or before the data without one
              delimiter, decimal, comment = "#", encoding = "utf-8"  # default: found by looking
              rows = "data"       # json key, HDF5 group or MAT struct ("a.b") that holds the signals
-    [signals] a column number counts from 0; unit is that of the signal once offset and gain are
-             out of it: column = gain * signal + offset; bits = 16, signed = true reads a column
-             logged as unsigned as two's complement; a scalar beside the rows is a constant signal
+    [signals] a column number counts from 0; column = gain * signal + offset, the offset in the
+             column's unit; gain = "80 V/m" beside the column's unit = "V", or a number: see
+             workbench/sensors.py; bits = 16, signed = true reads a column logged as unsigned as
+             two's complement; a scalar beside the rows is a constant signal
     [rig]    kind = "force": areas and pressures given as well make F_e = F + S_p p_p - S_n p_n
     [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
     [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
@@ -23,13 +24,16 @@ from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, Strict, ValidationError, model_validator
 
 from identification.errors import BadCard, BadModel
+from identification.library import Library
 from identification.log import Rig, RigKind
 from workbench.recipe import Positive, Recipe, RecipeSection, Section
+from workbench.sensors import column_scale, parse_gain
+from workbench.units import Motion, Scale, si_unit
 
 Format = Literal["csv", "parquet", "mat", "hdf5", "json"]
 
@@ -38,6 +42,9 @@ _NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
     "force": ("t", "y", "F"),
     "motor": ("t", "y", "u"),
 }
+
+
+_CANONICAL = ("t", "y", "F", "p_p", "p_n", "u")
 
 
 class About(Section):
@@ -66,22 +73,26 @@ class FileSpec(Section):
 
 
 class SignalSpec(Section):
-    """One signal: column = gain * signal + offset, the signal being in `unit`."""
+    """One signal: column = gain * signal + offset (see workbench/sensors.py)."""
 
     column: str | int
     unit: str
-    gain: float = 1.0
+    gain: Annotated[float, Strict()] | str = 1.0
     offset: float = 0.0
     bits: int | None = Field(default=None, ge=2, le=52)
     signed: bool = False
 
     @model_validator(mode="after")
     def _invertible(self) -> "SignalSpec":
-        if self.gain == 0.0:
-            raise ValueError("gain must not be 0")
+        parse_gain(self.gain)
         if self.signed and self.bits is None:
             raise ValueError("signed = true needs bits")
         return self
+
+    def scale(self, signal: str, motion: Motion) -> Scale:
+        """Signal in SI = factor * (column - offset) + shift; raises BadCard where it cannot be."""
+        given = "gain" in self.model_fields_set
+        return column_scale(self.unit, self.gain if given else None, signal, motion)
 
 
 class RigSection(Section):
@@ -162,11 +173,12 @@ class Card:
         return self.rigs.get(file, self.rigs[""])
 
 
-def load_card(path: Path) -> Card:
+def load_card(path: Path, library: Library | None = None, *, with_recipe: bool = True) -> Card:
     """The card in the file `path`.
 
-    Raises BadCard, one line: what was found, in which key, what is needed; an unknown key comes
-    with the nearest right one.
+    library: the effects that a recipe may name, by default all but a user's own files;
+    with_recipe False leaves its recipe out, as for a log that is there. Raises BadCard, one line:
+    what was found, in which key, what is needed; an unknown key comes with the nearest right one.
     """
     raw = _read_toml(path)
     try:
@@ -177,12 +189,13 @@ def load_card(path: Path) -> Card:
                 merged = _CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
                 rigs[entry.name] = merged.value()
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
-        recipe = parsed.recipe.value() if parsed.recipe else None
+        wanted = parsed.recipe if with_recipe else None
+        recipe = wanted.value(library, parsed.rig.motion) if wanted else None
     except ValidationError as error:
         raise BadCard(f"{path}: {explain(error)}") from None
     except BadModel as error:
         raise BadCard(f"{path}: [recipe] {error}") from None
-    signals = parsed.signals or (_recipe_signals(parsed.rig) if recipe else {})
+    signals = parsed.signals or (_recipe_signals(parsed.rig) if parsed.recipe else {})
     _need_signals(path, parsed.rig, signals, "[rig]")
     _check_split(path, parsed)
     return Card(
@@ -205,17 +218,37 @@ def _read_toml(path: Path) -> dict[str, Any]:
     except IsADirectoryError:
         raise BadCard(f"{path}: is a directory; give the card.toml in it") from None
     except UnicodeDecodeError:
-        raise BadCard(f"{path}: is not UTF-8 text, so no card; give a TOML file") from None
+        raise BadCard(f"{path}: is not UTF-8 text; give a TOML file, saved as UTF-8") from None
     except OSError as error:
         raise BadCard(f"{path}: cannot be read ({error.strerror}); check its rights") from None
     except tomllib.TOMLDecodeError as error:
         raise BadCard(f"{path}: is not TOML: {error}; correct that line") from None
 
 
+_KINDS = {  # what pydantic finds missing, in the words of a card
+    "string_type": "a text in quotes needed",
+    "float_type": "a number needed",
+    "float_parsing": "a number needed",
+    "int_type": "a whole number needed",
+    "int_parsing": "a whole number needed",
+    "int_from_float": "a whole number needed",
+    "bool_type": "true or false needed",
+    "bool_parsing": "true or false needed",
+    "tuple_type": "a list [...] needed",
+    "dict_type": "a table { key = value, ... } needed",
+}
+_UNIONS = {  # fields that may be of two types: pydantic names the one that it tried
+    "column": "the column's name in quotes, or its number, needed",
+    "gain": 'a number, or a text with its unit as "80 V/m", needed',
+}
+
+
 def explain(error: ValidationError) -> str:
     """The first of pydantic's errors in one line, by the names that the card uses."""
     first = error.errors(include_url=False)[0]
-    where = ".".join(str(part) for part in first["loc"] if part != "function-before")
+    union = next((part for part in first["loc"][:-1] if part in _UNIONS), None)
+    loc = first["loc"][:-1] if union else first["loc"]
+    where = ".".join(str(part) for part in loc if part != "function-before")
     table = f"[{where}] " if where else ""
     kind, found = first["type"], first.get("input")
     if kind == "unknown_key":
@@ -223,10 +256,22 @@ def explain(error: ValidationError) -> str:
         return f"{table}unknown key {key!r}{nearest(key, _keys_at(first['loc']))}"
     if kind == "missing":
         parent = ".".join(str(part) for part in first["loc"][:-1])
-        return f"{f'[{parent}] ' if parent else ''}has no {first['loc'][-1]!r}; add it"
-    message = " ".join(str(first["msg"]).removeprefix("Value error, ").split())
-    shown = "" if isinstance(found, Mapping) else f"{' '.join(repr(found).split())[:60]}: "
+        if not parent:
+            return f"has no table [{first['loc'][-1]}]; add it"
+        if isinstance(first["loc"][-1], int):
+            return f"[{parent}] has too few values; add those that are missing"
+        return f"[{parent}] has no {first['loc'][-1]!r}; add it"
+    if kind == "model_type":
+        keys = ", ".join(f"{key} = ..." for key in _keys_at(loc)[:2])
+        return f"{table}{_shown(found)}: a table {{ {keys} }} needed"
+    said = _UNIONS.get(str(union)) or _KINDS.get(kind) or str(first["msg"])
+    message = " ".join(said.removeprefix("Value error, ").split())
+    shown = "" if isinstance(found, Mapping) else f"{_shown(found)}: "
     return f"{table}{shown}{message[:1].lower()}{message[1:]}"
+
+
+def _shown(found: object) -> str:
+    return " ".join(repr(found).split())[:60]
 
 
 def nearest(key: str, known: Iterable[str]) -> str:
@@ -268,6 +313,8 @@ def _recipe_signals(rig: RigSection) -> dict[str, SignalSpec]:
     linear = rig.motion == "linear"
     position, force = ("m", "N") if linear else ("rad", "N m")
     units = {"t": "s", "r": position, "y": position, "F": force, "u": "V"}
+    if rig.kind == "electro-pneumatic":
+        units = {"t": "s", "r": position, "y": position, "p_p": "Pa", "p_n": "Pa", "u": "V"}
     return {name: SignalSpec(column=name, unit=unit) for name, unit in units.items()}
 
 
@@ -277,9 +324,25 @@ def _need_signals(
     for name in _NEEDED_SIGNALS[rig.kind]:
         if name not in signals:
             others = [key for key in signals if key not in _NEEDED_SIGNALS[rig.kind]]
+            unit = si_unit(name, rig.motion)
             raise BadCard(
-                f"{path}: {where} kind = {rig.kind!r} needs signals.{name}{nearest(name, others)}"
+                f"{path}: {where} kind = {rig.kind!r} needs signals.{name}{nearest(name, others)};"
+                f' add {name} = {{ column = "<its name in the log>", unit = "{unit}" }}'
             )
+    _refuse_twice(path, signals)
+
+
+def _refuse_twice(path: Path, signals: Mapping[str, SignalSpec]) -> None:
+    """Raises BadCard where time or position is read from the column of another signal."""
+    for name in ("t", "y"):
+        for other in _CANONICAL:
+            if other != name and other in signals and name in signals:
+                column = signals[name].column
+                if signals[other].column == column:
+                    raise BadCard(
+                        f"{path}: signals.{name} and signals.{other} are both read from the column"
+                        f" {column!r}; correct one of them"
+                    )
 
 
 def _check_split(path: Path, parsed: _CardFile) -> None:

@@ -2,10 +2,12 @@
 
 import errno
 import importlib
+import json
 import os
 import sys
 import traceback
 from collections.abc import Sequence
+from contextlib import suppress
 
 import click
 
@@ -14,6 +16,7 @@ from identification.errors import NotIdentifiable, UserError
 COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
     "identify": "Find friction, plant and actuator of a machine from its logs.",
+    "trace": "Find the physical effect that the model of a machine lacks.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",
@@ -99,6 +102,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         status, message = verdict(error)
         if status == 3 and _debug(arguments):
             traceback.print_exception(error)
+        if status == 1 and _as_json(arguments):
+            _echo_refusal(str(error))
     _flush_or_drop()
     if message:
         click.echo(one_line(message), err=True)
@@ -114,6 +119,18 @@ def _run(arguments: Sequence[str]) -> int:
         status = stop.exit_code
     sys.stdout.flush()
     return int(status or 0)
+
+
+def _as_json(arguments: Sequence[str]) -> bool:
+    """Whether the command line asks for JSON; what follows "--" is no option."""
+    options = arguments[: arguments.index("--")] if "--" in arguments else arguments
+    return "--json" in options
+
+
+def _echo_refusal(reason: str) -> None:
+    """Print a refusal as JSON; where nobody takes it, the exit status says it alone."""
+    with suppress(OSError):
+        click.echo(json.dumps({"verdict": "refused", "reason": one_line(reason)}, indent=2))
 
 
 def _debug(arguments: Sequence[str]) -> bool:

@@ -15,6 +15,7 @@ from workbench.design_views import design_lines
 from workbench.identifying import Progress
 from workbench.output import dumps
 from workbench.pipeline import Identified, identify_sources
+from workbench.recipe import Recipe
 from workbench.recording import as_columns, record, truth
 from workbench.sources import read_sources
 from workbench.tuning import design
@@ -24,6 +25,9 @@ from workbench.views import Row, in_digits, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group
+
+
+HELD_OUT = 100  # added to a recipe's seed for the run that no fit sees
 
 
 @dataclass(frozen=True)
@@ -50,14 +54,8 @@ class Demonstration:
 
 def demonstrate(card: Card, folder: Path, seed: int, on_progress: Progress) -> Demonstration:
     """Simulate the card's recipe into `folder`, read the log back, identify, design, validate."""
-    import pandas as pd
-
-    if card.recipe is None:
-        raise BadCard(f"{card.path}: has no [recipe]; name a card with one")
-    log = record(card.name, card.recipe)
-    path = folder / f"{card.name}.parquet"
-    pd.DataFrame(as_columns(log, card)).to_parquet(path, index=False)
-    known = truth(card.name, card.recipe)
+    path = simulated_log(card, folder)
+    known = truth(card.name, recipe_of(card), motion=card.rig().motion)
     (folder / "truth.json").write_text(dumps(known) + "\n", encoding="utf-8")
     sources = read_sources([str(path.absolute())], str(card.path))
     identified = identify_sources(sources, seed=seed, on_progress=on_progress)
@@ -67,19 +65,43 @@ def demonstrate(card: Card, folder: Path, seed: int, on_progress: Progress) -> D
     return Demonstration(identified, found, validation, traces, known)
 
 
+def recipe_of(card: Card) -> Recipe:
+    """The card's recipe; raises BadCard where it has none."""
+    if card.recipe is None:
+        raise BadCard(f"{card.path}: has no [recipe]; name a card with one")
+    return card.recipe
+
+
+def simulated_log(card: Card, folder: Path, *, held_out: bool = False) -> Path:
+    """The log of the card's recipe as <card>.parquet, written into `folder`.
+
+    held_out: another run of the machine, of its own seed (other random steps, other noise), as
+    <card>_held_out.parquet.
+    """
+    import pandas as pd
+
+    recipe = recipe_of(card)
+    seed = recipe.seed + HELD_OUT if held_out else recipe.seed
+    log = record(card.name, recipe, seed, card.rig())
+    path = folder / f"{card.name}{'_held_out' if held_out else ''}.parquet"
+    pd.DataFrame(as_columns(log, card)).to_parquet(path, index=False)
+    return path
+
+
 def demo_view(found: Demonstration, folder: Path) -> "Group":
     """The demo for a terminal: truth beside estimate, then design and verdict."""
     from rich.console import Group
 
+    rotary = found.identified.model.rotary
     return Group(
         "A log of the paper's rig (table 2) was simulated; only the log was used below.",
         table(("parameter", "estimate", "unit", "95 % interval", "truth"), _rows(found)),
         f"worst error of an identified parameter: {100 * found.worst_error:.3g} %",
-        *design_lines(found.design),
+        *design_lines(found.design, rotary),
         "",
         verdict(found.validation),
-        table(HEAD, validation_rows(found.validation)),
-        *validation_lines(found.validation),
+        table(HEAD, validation_rows(found.validation, rotary)),
+        *validation_lines(found.validation, rotary),
         "note: tracing what a model leaves to the missing effect is not part of this demo yet",
         written(folder, "identification.html", "design.html", "report.html"),
     )

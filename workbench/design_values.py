@@ -1,7 +1,10 @@
-"""The design of one machine: controllers, margins, compensator; and design.json, which holds it."""
+"""The design of one machine: controllers, margins, compensator; and design.json, which holds it.
+
+Here values are plain SI numbers; in the file every parameter has its unit.
+"""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -12,10 +15,14 @@ from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
+from identification.karnopp import NAMES, Karnopp
+from identification.result import Estimate
+from workbench.model import as_number, used
+from workbench.parameter_units import friction_units, in_unit, shown
 from workbench.reading import read_result
+from workbench.units import Motion
 
-SCHEMA = "design/1"
+SCHEMA = "design/2"
 From = Literal["physical", "arx"]
 
 
@@ -31,8 +38,8 @@ class Linear:
     A: tuple[float, ...]
     B: tuple[float, ...]
     h: float
-    m: float | None
-    F_v: float | None
+    m: Estimate | None
+    F_v: Estimate | None
 
 
 @dataclass(frozen=True)
@@ -66,8 +73,9 @@ class MarginValues:
 class Controller:
     """S F_ref = T r - R y, polynomials in z^-1, run every h [s].
 
-    dominant: (w_n [rad/s], zeta); auxiliary: poles z as (re, im). missed: goals not kept. gains:
-    of a PID in parallel form, k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)).
+    dominant: (w_n [rad/s], zeta); auxiliary: poles z as (re, im). rate: the reference is moved at
+    most at this speed [m/s], None for any; lag [s] and overshoot [-] as `design.tracking` has
+    them. missed: goals not kept. gains: of a PID in parallel form.
     """
 
     R: tuple[float, ...]
@@ -77,6 +85,9 @@ class Controller:
     dominant: tuple[float, float]
     auxiliary: tuple[tuple[float, float], ...]
     margins: MarginValues
+    rate: float | None
+    lag: float
+    overshoot: float
     missed: tuple[str, ...]
     gains: PIDGains | None = None
     note: str | None = None
@@ -89,41 +100,48 @@ class Controller:
 
 @dataclass(frozen=True)
 class CompensatorValues:
-    """Parameters of the compensator (4); assumed: names of the nine that no log told."""
+    """Parameters of the compensator (4): N_c [-], e_T [m], the nine as the model has them."""
 
     N_c: float
     e_T: float
-    friction: Mapping[str, float]
-    assumed: tuple[str, ...]
+    friction: Mapping[str, Estimate]
 
     def __post_init__(self) -> None:
+        for name in NAMES:
+            if name not in self.friction:
+                raise BadModel(f"[compensator.friction] has no {name!r}; all nine are needed")
         _ = self.value
+
+    @property
+    def assumed(self) -> tuple[str, ...]:
+        """Names of the nine that no log told."""
+        return tuple(name for name in NAMES if self.friction[name].value is None)
 
     @property
     def value(self) -> Compensator:
         """The compensator for the loop."""
-        try:
-            friction = Karnopp(**self.friction)
-        except TypeError as error:
-            raise BadModel(f"[compensator.friction] {error}; all nine are needed") from None
+        friction = Karnopp(**{name: used(self.friction[name]) for name in NAMES})
         return Compensator(friction, self.N_c, self.e_T)
 
 
 @dataclass(frozen=True)
 class Design:
-    """Controllers of one machine; one may be None with its reason in `refused`."""
+    """Controllers of one machine; one may be None with its reason in `refused`.
+
+    recommended: the controller that keeps every goal, "none" where none does.
+    """
 
     card: str
+    motion: Motion
     plant: Linear
     force: ForceLoop | None
     rst: Controller | None
     pid: Controller | None
     refused: Mapping[str, str]
-    recommended: Literal["rst", "pid"]
+    recommended: Literal["rst", "pid", "none"]
     compensator: CompensatorValues
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
-    schema: Literal["design/1"] = "design/1"
 
     @property
     def controllers(self) -> dict[str, Controller]:
@@ -146,15 +164,273 @@ def margin_values(found: Margins, worst: float | None) -> MarginValues:
     )
 
 
+@dataclass(frozen=True)
+class _LinearFile:
+    source: From
+    why: str
+    A: tuple[float, ...]
+    B: tuple[float, ...]
+    h: Estimate
+    m: Estimate | None
+    F_v: Estimate | None
+
+
+@dataclass(frozen=True)
+class _ForceLoopFile:
+    k_i: Estimate
+    T_i: Estimate
+    h: Estimate
+
+
+@dataclass(frozen=True)
+class _GainsFile:
+    k_R: Estimate
+    T_i: Estimate
+    T_d: Estimate
+    eps: Estimate
+    b: Estimate
+    c: Estimate
+
+
+@dataclass(frozen=True)
+class _DominantFile:
+    w_n: Estimate
+    zeta: Estimate
+
+
+@dataclass(frozen=True)
+class _ControllerFile:
+    R: tuple[float, ...]
+    S: tuple[float, ...]
+    T: tuple[float, ...]
+    h: Estimate
+    dominant: _DominantFile
+    auxiliary: tuple[tuple[float, float], ...]
+    reference_rate: Estimate
+    reference_lag: Estimate
+    margins: MarginValues
+    overshoot: float
+    missed: tuple[str, ...]
+    gains: _GainsFile | None = None
+    note: str | None = None
+
+
+@dataclass(frozen=True)
+class _CompensatorFile:
+    N_c: Estimate
+    e_T: Estimate
+    friction: Mapping[str, Estimate]
+
+
+@dataclass(frozen=True)
+class _DesignFile:
+    """`Design` as design.json has it: every parameter with its unit and, if known, its spread."""
+
+    card: str
+    motion: Motion
+    plant: _LinearFile
+    force: _ForceLoopFile | None
+    rst: _ControllerFile | None
+    pid: _ControllerFile | None
+    refused: Mapping[str, str]
+    recommended: Literal["rst", "pid", "none"]
+    compensator: _CompensatorFile
+    remarks: tuple[str, ...]
+    versions: Mapping[str, str]
+    schema: Literal["design/2"] = "design/2"
+
+
+@dataclass(frozen=True)
+class _Units:
+    """Units of design.json's parameters on a linear or rotary machine."""
+
+    length: str
+    speed: str
+    stiffness: str
+    force_gain: str
+    friction: Mapping[str, str]
+
+    @classmethod
+    def of(cls, motion: Motion) -> "_Units":
+        units = shown(motion == "rotary")
+        friction = friction_units(motion)
+        return cls(units.position, units.velocity, units.stiffness, units.force_gain, friction)
+
+
 def design_document(found: Design) -> dict[str, Any]:
-    """The design as design.json writes it, the schema first."""
-    document = asdict(found)
+    """The design as design.json writes it, the schema first, every parameter with its unit."""
+    document: dict[str, Any] = _plain(_as_file(found, _Units.of(found.motion)))
     return {"schema": document.pop("schema"), **document}
 
 
 def read_design(path: Path) -> Design:
-    """The design in the file `path`; raises BadModel in one line where it is none."""
-    found = read_result(path, Design, SCHEMA)
+    """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
+    written = read_result(path, _DesignFile, SCHEMA)
+    try:
+        found = _from_file(written, _Units.of(written.motion))
+    except BadModel as error:
+        raise BadModel(f"{path}: {error}") from None
     if not found.controllers:
         raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
     return found
+
+
+def _plain(value: object) -> Any:
+    """Dataclasses as dictionaries, parameters as results carry them."""
+    if isinstance(value, Estimate):
+        return as_number(value)
+    if is_dataclass(value):
+        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: _plain(entry) for key, entry in value.items()}
+    return value
+
+
+def _as_file(found: Design, units: _Units) -> _DesignFile:
+    p, force, c = found.plant, found.force, found.compensator
+    return _DesignFile(
+        card=found.card,
+        motion=found.motion,
+        plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v),
+        force=None if force is None else _force_loop_file(force, units),
+        rst=None if found.rst is None else _controller_file(found.rst, units),
+        pid=None if found.pid is None else _controller_file(found.pid, units),
+        refused=found.refused,
+        recommended=found.recommended,
+        compensator=_CompensatorFile(
+            Estimate(c.N_c, "1"), Estimate(c.e_T, units.length), c.friction
+        ),
+        remarks=found.remarks,
+        versions=found.versions,
+    )
+
+
+def _force_loop_file(force: ForceLoop, units: _Units) -> _ForceLoopFile:
+    k_i = Estimate(force.k_i, units.force_gain)
+    return _ForceLoopFile(k_i, Estimate(force.T_i, "s"), Estimate(force.h, "s"))
+
+
+def _gains_file(gains: PIDGains, units: _Units) -> _GainsFile:
+    return _GainsFile(
+        **{name: Estimate(getattr(gains, name), unit) for name, unit in _gain_units(units)}
+    )
+
+
+def _controller_file(one: Controller, units: _Units) -> _ControllerFile:
+    w_n, zeta = one.dominant
+    reason = None if one.rate is not None else "no limit of force or command to keep"
+    return _ControllerFile(
+        R=one.R,
+        S=one.S,
+        T=one.T,
+        h=Estimate(one.h, "s"),
+        dominant=_DominantFile(Estimate(w_n, "rad/s"), Estimate(zeta, "1")),
+        auxiliary=one.auxiliary,
+        reference_rate=Estimate(one.rate, units.speed, reason=reason),
+        reference_lag=Estimate(one.lag, "s"),
+        margins=one.margins,
+        overshoot=one.overshoot,
+        missed=one.missed,
+        gains=None if one.gains is None else _gains_file(one.gains, units),
+        note=one.note,
+    )
+
+
+def _gain_units(units: _Units) -> list[tuple[str, str]]:
+    times = [(name, "s") for name in ("T_i", "T_d", "eps")]
+    return [("k_R", units.stiffness), *times, ("b", "1"), ("c", "1")]
+
+
+def _from_file(found: _DesignFile, units: _Units) -> Design:
+    p, force, c = found.plant, found.force, found.compensator
+    mass, viscous = units.friction["m"], units.friction["F_vp"]
+    return Design(
+        card=found.card,
+        motion=found.motion,
+        plant=Linear(
+            p.source,
+            p.why,
+            p.A,
+            p.B,
+            _positive(p.h, "s", "plant.h"),
+            None if p.m is None else in_unit(p.m, mass, "[plant.m]"),
+            None if p.F_v is None else in_unit(p.F_v, viscous, "[plant.F_v]"),
+        ),
+        force=None if force is None else _force_loop(force, units),
+        rst=None if found.rst is None else _controller(found.rst, units, "rst"),
+        pid=None if found.pid is None else _controller(found.pid, units, "pid"),
+        refused=found.refused,
+        recommended=found.recommended,
+        compensator=CompensatorValues(
+            _number(c.N_c, "1", "compensator.N_c"),
+            _number(c.e_T, units.length, "compensator.e_T"),
+            {name: _nine(e, name, units) for name, e in c.friction.items()},
+        ),
+        remarks=found.remarks,
+        versions=found.versions,
+    )
+
+
+def _controller(one: _ControllerFile, units: _Units, where: str) -> Controller:
+    dominant, rate = one.dominant, one.reference_rate
+    if rate.value is None and not rate.reason:
+        raise BadModel(f"[{where}.reference_rate] is null; it needs a 'reason'")
+    at = f"{where}.reference_rate"
+    return Controller(
+        R=one.R,
+        S=one.S,
+        T=one.T,
+        h=_positive(one.h, "s", f"{where}.h"),
+        dominant=(
+            _positive(dominant.w_n, "rad/s", f"{where}.dominant.w_n"),
+            _positive(dominant.zeta, "1", f"{where}.dominant.zeta"),
+        ),
+        auxiliary=one.auxiliary,
+        margins=one.margins,
+        rate=None if rate.value is None else _positive(rate, units.speed, at),
+        lag=_number(one.reference_lag, "s", f"{where}.reference_lag"),
+        overshoot=one.overshoot,
+        missed=one.missed,
+        gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
+        note=one.note,
+    )
+
+
+def _force_loop(found: _ForceLoopFile, units: _Units) -> ForceLoop:
+    return ForceLoop(
+        _number(found.k_i, units.force_gain, "force.k_i"),
+        _positive(found.T_i, "s", "force.T_i"),
+        _positive(found.h, "s", "force.h"),
+    )
+
+
+def _gains(found: _GainsFile, units: _Units, where: str) -> PIDGains:
+    values = {
+        name: _number(getattr(found, name), unit, f"{where}.{name}")
+        for name, unit in _gain_units(units)
+    }
+    return PIDGains(**values)
+
+
+def _nine(found: Estimate, name: str, units: _Units) -> Estimate:
+    where = f"[compensator.friction.{name}]"
+    if name not in units.friction:
+        raise BadModel(f"{where} is none of the nine: {', '.join(units.friction)}")
+    if found.value is None and (not found.reason or found.assumed is None):
+        raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
+    return in_unit(found, units.friction[name], where)
+
+
+def _number(found: Estimate, unit: str, where: str) -> float:
+    """A chosen value in `unit`; raises BadModel where there is none, or in another kind of unit."""
+    value = in_unit(found, unit, f"[{where}]").value
+    if value is None:
+        raise BadModel(f"[{where}] is null; a number in {unit!r} needed")
+    return value
+
+
+def _positive(found: Estimate, unit: str, where: str) -> float:
+    value = _number(found, unit, where)
+    if not value > 0:
+        raise BadModel(f"[{where}] {value:g} {unit}: must be > 0")
+    return value

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.design_values import Controller, Design
+from workbench.parameter_units import shown
 from workbench.views import Row, table, written
 
 if TYPE_CHECKING:
@@ -32,28 +33,36 @@ def _margins(one: Controller) -> Row:
     )
 
 
-def design_lines(found: Design) -> list[str]:
+def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    p, c = found.plant, found.compensator
-    lines = [f"recommended: {found.recommended.upper()}", f"plant: {p.source}, {p.why}"]
+    p, c, units = found.plant, found.compensator, shown(rotary)
+    lines = [f"recommended: {_recommended(found)}", f"plant: {p.source}, {p.why}"]
     lines.append(f"position loop every {1e3 * p.h:.4g} ms")
     if found.force:
         f = found.force
         lines.append(
-            f"force loop: k_i = {f.k_i:.4g} V/N, T_i = {f.T_i:.4g} s, every {1e3 * f.h:.4g} ms"
+            f"force loop: k_i = {f.k_i:.4g} {units.force_gain}, T_i = {f.T_i:.4g} s,"
+            f" every {1e3 * f.h:.4g} ms"
         )
     if found.pid and found.pid.gains:
         g = found.pid.gains
         lines.append(
-            f"PID: k_R = {g.k_R:.5g}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s, eps = {g.eps:.4g} s"
+            f"PID: k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s,"
+            f" eps = {g.eps:.4g} s"
         )
-    lines.append(f"compensator: N_c = {c.N_c:g}, e_T = {c.e_T:.3g}")
+    lines.append(f"compensator: N_c = {c.N_c:g}, e_T = {c.e_T:.3g} {units.position}")
     lines.extend(f"no {name.upper()}: {why}" for name, why in found.refused.items())
     for name, one in found.controllers.items():
         lines.extend(f"{name.upper()} misses: {missed}" for missed in one.missed)
         if one.note:
             lines.append(f"{name.upper()}: {one.note}")
     return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def _recommended(found: Design) -> str:
+    if found.recommended == "none":
+        return "none, no controller keeps every goal"
+    return found.recommended.upper()
 
 
 def polynomial_lines(found: Design) -> list[str]:
@@ -65,11 +74,11 @@ def polynomial_lines(found: Design) -> list[str]:
     ]
 
 
-def design_view(found: Design, folder: Path) -> "Group":
+def design_view(found: Design, folder: Path, rotary: bool = False) -> "Group":
     """The design for a terminal."""
     from rich.console import Group
 
-    lines = (*design_lines(found), *polynomial_lines(found))
+    lines = (*design_lines(found, rotary), *polynomial_lines(found))
     return Group(
         table(HEAD, margin_rows(found)), *lines, written(folder, "design.json", "report.html")
     )

@@ -56,12 +56,21 @@ def find_data(name: str | Path, card: Card) -> Path:
         if (folder / path).is_file():
             return _verified(folder / path, entry)
     if entry is None:
-        known = [entry.name for entry in card.files]
-        where = f"{name}: no such file, and none of card {card.name!r}"
-        raise BadLog(f"{where}{nearest(str(name), known)}")
+        raise BadLog(f"{name}: no such file{_nearest(path, card)}")
     if entry.url is None:
         raise BadLog(f"{name}: not found and without a url in the card; set {VARIABLE}")
     return _download(entry, card)
+
+
+def _nearest(path: Path, card: Card) -> str:
+    """The end of a message on a missing log: the nearest file of the card's set, or beside it."""
+    if card.files:
+        named = nearest(str(path), [entry.name for entry in card.files])
+        return f", and none of card {card.name!r}{named}"
+    folder = path.parent
+    if not folder.is_dir():
+        return f"; there is no folder {str(folder)!r} either, check the path"
+    return nearest(path.name, sorted(p.name for p in folder.iterdir() if p.is_file()))
 
 
 def _verified(path: Path, entry: FileEntry | None) -> Path:

@@ -17,13 +17,14 @@ from identification.arx import ArxModel, fit_arx, one_step_errors, simulation_er
 from identification.arx_select import select_arx
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.inverse_model import ForceError, Smoothing, force_error
-from identification.karnopp import NAMES, ROTARY_UNITS, UNITS
+from identification.karnopp import NAMES
 from identification.log import Log, Rig
 from identification.output_error import fit_karnopp
 from identification.plant import Actuator, Motor
 from identification.residual_tests import residual_tests
 from identification.result import Drive, Estimate, KarnoppFit
 from workbench.model import ArxPlant, ArxTests, FitSummary, LogEntry, Model, versions
+from workbench.parameter_units import actuator_units, friction_units
 
 Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
@@ -105,7 +106,7 @@ def identify(
 
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit held have their assumed value."""
-    units = ROTARY_UNITS if rig.motion == "rotary" else UNITS
+    units = friction_units(rig.motion)
     held = "held at a value that does not matter for these logs"
     return {
         name: fit.estimates.get(name)
@@ -116,18 +117,17 @@ def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
 
 def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
     """k1 and k2, or k_a; None where no command is logged."""
-    rotary = rig.motion == "rotary"
+    units = actuator_units(rig.motion)
     match fit.actuator:
         case Motor(k_a):
-            return {"k_a": Estimate(k_a, "N m/V" if rotary else "N/V", reason="given by the card")}
+            return {"k_a": Estimate(k_a, units["k_a"], reason="given by the card")}
         case Actuator(k1, k2):
             if "k1" in fit.estimates:
                 return {name: fit.estimates[name] for name in ("k1", "k2")}
             why = "a linear actuator explains only a part of the force; the value is a regression's"
-            first, second = ("N m/(V s)", "N m/rad") if rotary else ("N/(V s)", "N/m")
             return {
-                "k1": Estimate(None, first, reason=why, assumed=k1),
-                "k2": Estimate(None, second, reason=why, assumed=k2),
+                "k1": Estimate(None, units["k1"], reason=why, assumed=k1),
+                "k2": Estimate(None, units["k2"], reason=why, assumed=k2),
             }
         case _:
             return None

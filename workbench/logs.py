@@ -1,6 +1,7 @@
 """Log files read by their card: canonical signals in SI, the applied force F_e among them."""
 
 import hashlib
+import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,10 +16,10 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log
 from workbench.card import Card, SignalSpec
 from workbench.tables import damaged, read_table
-from workbench.units import scale
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
-_ABSURD = 1e30  # in SI; products of such values overflow
+ABSURD = 1e30  # in SI; products of such values overflow
+_CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
 
 
 @dataclass(frozen=True)
@@ -103,23 +104,51 @@ def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:
         raise BadLog(f"{where} is {what}, numbers needed; log numbers (time in seconds)")
     out = np.empty(len(raw))
     for k, value in enumerate(raw):
-        out[k] = _number(value, f"{where}, row {first_row + k}")
+        try:
+            out[k] = _number(value)
+        except ValueError:
+            shown = " ".join(repr(_text(value)).split())[:40]
+            row = f"{where}, row {first_row + k}"
+            advice = _advice(raw, k)
+            raise BadLog(f"{row}: {shown} is not a number; {advice}") from None
     return out
 
 
-def _number(value: object, where: str) -> float:
-    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+def _text(value: object) -> object:
+    """The value, a text as Python's own."""
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return str(value) if isinstance(value, str) else value
+
+
+def _advice(raw: NDArray[Any], k: int) -> str:
+    """What to do about the text in row `k` of a column."""
+    text = str(_text(raw[k]))
+    if _CLOCK.search(text):
+        return "log times in seconds, not as dates or clock times"
+    if k == 0 and len(raw) > 1:
+        try:
+            _number(raw[1])
+        except ValueError:
+            pass
+        else:
+            return (
+                "if it is a row of units, take it out, or set skip_rows = 1 in the card's [file]"
+                " and give the columns by number"
+            )
+    return "correct it or leave the field empty"
+
+
+def _number(value: object) -> float:
+    """The number that a field holds, NaN for an empty one; raises ValueError on others."""
+    text = _text(value)
     if text is None or text == "":
         return float("nan")
     if isinstance(text, str) and text.strip().lower() in ("true", "false"):
         return float(text.strip().lower() == "true")
     if isinstance(text, str | int | float | np.generic):
-        try:
-            return float(text)
-        except ValueError:
-            pass
-    shown = " ".join(repr(text).split())[:40]
-    raise BadLog(f"{where}: {shown} is not a number; correct it or leave the field empty")
+        return float(text)
+    raise ValueError("no number")
 
 
 def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -> Array:
@@ -128,10 +157,8 @@ def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -
         values = np.where(values >= 2.0 ** (spec.bits - 1), values - 2.0**spec.bits, values)
     if spec.offset != 0.0:
         values = values - spec.offset
-    if spec.gain != 1.0:
-        values = values / spec.gain
     try:
-        factor, shift = scale(spec.unit, name, rig.motion)
+        factor, shift = spec.scale(name, rig.motion)
     except BadCard as error:
         raise BadCard(f"{card.path}: {error}") from None
     if factor != 1.0:
@@ -140,7 +167,7 @@ def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -
 
 
 def _refuse_absurd(values: Array, name: str, path: Path, first_row: int) -> None:
-    absurd = np.flatnonzero(np.isfinite(values) & (np.abs(values) > _ABSURD))
+    absurd = np.flatnonzero(np.isfinite(values) & (np.abs(values) > ABSURD))
     if name in _CANONICAL and absurd.size:
         raise BadLog(
             f"{path}: signal {name!r} is {values[absurd[0]]:g} in row {first_row + absurd[0]}, "

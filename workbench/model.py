@@ -1,16 +1,20 @@
 """The model of one machine: what identification found, and model.json, which holds all of it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
+from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.karnopp import NAMES, Karnopp
+from identification.library import Library, built_in
 from identification.log import Rig
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive, Estimate
+from workbench.effect_values import estimates_in_si, known_effect
+from workbench.parameter_units import actuator_units, friction_units, in_unit
 from workbench.reading import read_result
 
 SCHEMA = "model/1"
@@ -78,6 +82,11 @@ class LogEntry:
     force_rms: float | None
     chi_square: float
 
+    def __post_init__(self) -> None:
+        for name in ("h", "duration"):
+            if not getattr(self, name) > 0:
+                raise BadModel(f"[log] {name} = {getattr(self, name):g} s, must be > 0")
+
 
 @dataclass(frozen=True)
 class FitSummary:
@@ -98,14 +107,15 @@ class FitSummary:
     force_rms: float | None
     remarks: tuple[str, ...]
 
+    def __post_init__(self) -> None:
+        for name in ("noise_y", "noise_F", "stiffness"):
+            if not getattr(self, name) >= 0:
+                raise BadModel(f"[fit] {name} = {getattr(self, name):g}, must be 0 or more")
+
 
 @dataclass(frozen=True)
-class Model:
-    """Everything that is needed to simulate a machine and to say how well it is known.
-
-    friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command.
-    plant is None with the reason in `plant_reason`. posterior: what `--posterior` found.
-    """
+class ModelFile:
+    """A model as model.json has it, in the units that are written there; see `Model`."""
 
     card: str
     rig: Rig
@@ -116,11 +126,13 @@ class Model:
     fit: FitSummary
     log: tuple[LogEntry, ...]
     versions: Mapping[str, str]
-    effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     posterior: Mapping[str, Any] | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
+        if not self.log:
+            raise BadModel("[log] is empty; at least one run needed")
         for name in self.friction:
             if name not in NAMES:
                 from workbench.card import nearest
@@ -129,9 +141,27 @@ class Model:
         for name in NAMES:
             if name not in self.friction:
                 raise BadModel(f"[friction] has no {name!r}; add it with a value, or null")
-        for table, found in (("friction", self.friction), ("actuator", self.actuator or {})):
+        effects = {f"effects.{key}": found for key, found in self.effects.items()}
+        tables = {"friction": self.friction, "actuator": self.actuator or {}, **effects}
+        for table, found in tables.items():
             for name, estimate in found.items():
                 _check_estimate(f"[{table}.{name}]", estimate)
+        _ = _drive_of(self.actuator)
+
+
+@dataclass(frozen=True)
+class Model(ModelFile):
+    """Everything that is needed to simulate a machine and to say how well it is known; in SI.
+
+    friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
+    effects: parameters by key and name. plant is None with the reason in `plant_reason`.
+    posterior: what `--posterior` found. library: where the effects' equations are.
+    """
+
+    library: Library = field(default_factory=built_in, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
         _ = self.simulated
 
     @property
@@ -142,7 +172,15 @@ class Model:
     @property
     def simulated(self) -> Plant:
         """The plant as simulations use it."""
-        return Plant(self.karnopp, _drive_of(self.actuator), self.effects)
+        return Plant(self.karnopp, _drive_of(self.actuator), self.acting)
+
+    @property
+    def acting(self) -> tuple[Acting, ...]:
+        """The effects with the parameters that simulations use."""
+        return tuple(
+            known_effect(key, self.library).acting({name: used(e) for name, e in found.items()})
+            for key, found in self.effects.items()
+        )
 
     @property
     def assumed(self) -> tuple[str, ...]:
@@ -199,11 +237,20 @@ def _drive_of(actuator: Mapping[str, Estimate] | None) -> Actuator | Motor | Non
 
 def model_document(model: Model) -> dict[str, Any]:
     """The model as model.json writes it: the schema first, one entry an estimate."""
-    document = asdict(model)
+    document = asdict(ModelFile(**_fields_of(model)))
     document["friction"] = {name: as_number(model.friction[name]) for name in NAMES}
     if model.actuator is not None:
         document["actuator"] = {key: as_number(value) for key, value in model.actuator.items()}
+    document["effects"] = {
+        key: {name: as_number(value) for name, value in found.items()}
+        for key, found in model.effects.items()
+    }
     return {"schema": document.pop("schema"), **document}
+
+
+def _fields_of(model: ModelFile) -> dict[str, Any]:
+    """What the file holds of a model, by name."""
+    return {each.name: getattr(model, each.name) for each in fields(ModelFile)}
 
 
 def as_number(estimate: Estimate) -> dict[str, Any]:
@@ -216,15 +263,48 @@ def as_number(estimate: Estimate) -> dict[str, Any]:
     }
 
 
-def read_model(path: Path) -> Model:
-    """The model in the file `path`; raises BadModel in one line where it is none."""
-    found = read_result(path, Model, SCHEMA)
-    if found.effects:
-        raise BadModel(
-            f"{path}: [effects] {', '.join(found.effects)} cannot be simulated yet; give a model"
-            " without effects"
-        )
-    return found
+def read_model(path: Path, library: Library | None = None) -> Model:
+    """The model in the file `path`; raises BadModel in one line where it is none.
+
+    library: the effects that it may name, by default all but a user's own files.
+    """
+    found = read_result(path, ModelFile, SCHEMA)
+    if library is None:
+        library = _installed() if found.effects else built_in()
+    try:
+        return in_si(found, library)
+    except BadModel as error:
+        raise BadModel(f"{path}: {error}") from None
+
+
+def _installed() -> Library:
+    from workbench.own_effects import library
+
+    return library()
+
+
+def in_si(found: ModelFile, library: Library) -> Model:
+    """The model with every parameter in its SI unit; raises BadModel where a unit is of no such
+    kind, or an effect is not in the library."""
+    motion = found.rig.motion
+    friction, actuator = friction_units(motion), actuator_units(motion)
+    drive = found.actuator
+    try:
+        effects = {
+            key: estimates_in_si(key, values, library, motion)
+            for key, values in found.effects.items()
+        }
+    except BadModel as error:
+        said = str(error)
+        raise BadModel(said if said.startswith("[") else f"[effects] {said}") from None
+    in_units = replace(
+        found,
+        friction={n: in_unit(e, friction[n], f"[friction.{n}]") for n, e in found.friction.items()},
+        actuator=drive
+        and {n: in_unit(e, actuator[n], f"[actuator.{n}]") for n, e in drive.items()},
+        effects=effects,
+    )
+    return Model(**_fields_of(in_units), library=library)
 
 
 def versions() -> dict[str, str]:

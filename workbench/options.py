@@ -2,9 +2,13 @@
 
 import cmath
 import math
-from typing import Any
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
 
 import click
+
+Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 class Positive(click.FloatRange):
@@ -24,6 +28,39 @@ class Positive(click.FloatRange):
 
 
 POSITIVE = Positive()
+
+
+def card_option(command: Command) -> Command:
+    """The option `--card`, the card of all logs; given twice it is a usage error."""
+    return click.option(
+        "--card",
+        multiple=True,
+        required=True,
+        callback=_the_only,
+        help="Path of the card, or the name of a shipped one.",
+    )(command)
+
+
+def effects_option(command: Command) -> Command:
+    """The option `--effects`, folders of effects of the user's own, as `effects`: see
+    `workbench.own_effects`."""
+    return click.option(
+        "--effects",
+        multiple=True,
+        metavar="FOLDER",
+        type=click.Path(path_type=Path),
+        help="Folder of your own effects, one a file; may be given several times.",
+    )(command)
+
+
+def _the_only(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
+    if len(values) > 1:
+        raise click.UsageError(
+            f"--card is given {len(values)} times ({', '.join(values)}); one card for all logs"
+            " needed, identify machines one by one.",
+            ctx,
+        )
+    return values[0]
 
 
 def parse_orders(text: str | None) -> tuple[int, int, int] | None:

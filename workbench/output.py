@@ -52,6 +52,11 @@ class OutputFolder:
         self._made = [p for p in (home, *home.parents) if not p.exists()]
         try:
             self.path.mkdir(parents=True)
+        except (FileNotFoundError, NotADirectoryError) as error:
+            self._clear()
+            raise BadOutput(
+                f"--out {self.final}: cannot be made there ({error.strerror}); name another folder"
+            ) from None
         except BaseException:
             self._clear()
             raise

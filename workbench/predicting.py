@@ -10,12 +10,13 @@ from identification.arrays import Array, IntArray
 from identification.clean import applied_force
 from identification.differentiate import differentiate
 from identification.errors import BadLog, BadModel
-from identification.inverse_model import SURE, Smoothing, force_predicted
+from identification.inverse_model import SURE, Smoothing
 from identification.log import Log
 from identification.result import Drive
 from identification.simulate import FreeRun, free_run
 from identification.start import measured_start
 from workbench.model import Model
+from workbench.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
 COLUMNS = (
@@ -65,7 +66,7 @@ class Prediction:
 def predict(
     model: Model, log: Log, *, drive: Drive | None = None, window: float | None = None
 ) -> Prediction:
-    """What the model says of a log on an even clock; nothing is fitted on it.
+    """What the model says of a log on an even clock, effects included; nothing is fitted on it.
 
     drive: by default the command where the model has an identified actuator and the log a command.
     window [s]: the run starts anew from the measured state after each. Raises BadModel, BadLog.
@@ -75,20 +76,23 @@ def predict(
     chosen = drive or default_drive(model, log)
     if chosen == "command" and "u" not in log:
         raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
-    log = _with_force(log, model)
-    restarts = None if window is None else _restarts(log, window)
+    plant = model.simulated
+    refuse_missing(log, plant.effects)
+    log = with_motor_force(_with_force(log, model), plant)
+    body = of_body(log, plant)
+    restarts = None if window is None else _restarts(body, window)
     how = Smoothing(held=model.rig.kind == "motor")
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
-    run = free_run(model.simulated, log, measured_start(log), chosen, restarts=restarts)
+    run = free_run(plant, log, measured_start(body), chosen, restarts=restarts)
     return Prediction(
         t=log["t"],
         force_applied=applied,
-        force_predicted=force_predicted(log, model.karnopp, how),
-        force_simulated=run.F if chosen == "command" else _commanded(model, log, restarts, blank),
+        force_predicted=force_needed(body, plant, how),
+        force_simulated=run.F if chosen == "command" else _commanded(model, body, restarts, blank),
         position_measured=log["y"],
-        position_simulated=run.y,
-        sliding=_sliding(log, model, how),
+        position_simulated=run.shown,
+        sliding=_sliding(body, model, how),
         drive=chosen,
     )
 

@@ -55,7 +55,9 @@ def _read_json(path: Path) -> object:
     try:
         return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
     except json.JSONDecodeError as error:
-        raise BadModel(f"{path}: is not JSON ({error}); run the command again") from None
+        raise BadModel(
+            f"{path}: is not JSON ({error}); give the file that a command wrote"
+        ) from None
     except RecursionError:
         raise BadModel(
             f"{path}: is nested too deeply for a result; run the command again"

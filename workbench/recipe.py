@@ -1,7 +1,8 @@
 """A recipe: plant, loop, reference, noise and seed from which `workbench simulate` makes a log.
 
 Values only. In a card it stands under `[recipe]`; levels and amplitudes are in m (rad) where the
-loop is closed and in V where `drive = "command"`; noise is a standard deviation in SI.
+loop is closed and in V where `drive = "command"`; noise is a standard deviation in SI. A parameter
+of an effect is a number in SI or a text with its unit; one that has a default may be left out.
 
     [recipe]
     duration_s = 40.0
@@ -13,7 +14,8 @@ loop is closed and in V where `drive = "command"`; noise is a standard deviation
     friction = { m = 1.0, F_cp = 12.0, ... }            # the nine
     actuator = { k1 = 19530.0, k2 = 10405.0 }           # or motor = { k_a = 35.15 }
     reference = { kind = "steps", levels = [0.0, 0.1], dwell_s = 5.0 }
-    effects.stribeck = { F_s = 5.0, v_s = 0.02 }        # effect key -> its parameters
+    effects.stribeck = { F_s = 5.0, v_s = "20 mm/s" }   # effect key -> its parameters
+    mean_pressure_pa = 3e5                  # of the two chambers; default: half the supply's
     [recipe.loop]
     position = { kind = "PID", k_R = 1754.0, T_d = 0.018, T_i = 0.072, eps = 0.2 }
     force = { k_i = 0.02, T_i = 0.05 }                  # none with a motor: the force is exact
@@ -22,16 +24,24 @@ loop is closed and in V where `drive = "command"`; noise is a standard deviation
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from identification.arrays import Array
+from identification.check import SHORTEST
+from identification.effects._base import Acting
+from identification.errors import BadModel
 from identification.excitation import Multisine, Ramps, RandomSteps, ReferenceSpec, Steps, Sum
 from identification.karnopp import Karnopp
+from identification.library import Library, built_in
 from identification.plant import Actuator, Motor, Plant
+from workbench.effect_values import written_effect
+from workbench.units import Motion
+
+LONGEST = 1e8  # samples of a recipe: a gigabyte a signal
 
 
 @dataclass(frozen=True)
@@ -84,7 +94,8 @@ class Recipe:
     """Everything that makes a log but the code; `loop` is `None` where `drive` is "command".
 
     `reference` is r [m] in the loop, and the command u [V] without it. Noise: standard deviations
-    of force [N], position [m], pressures [Pa]. duration, h in s.
+    of force [N], position [m], pressures [Pa]. duration, h in s. mean_pressure [Pa]: of the two
+    chambers, None for half the supply pressure.
     """
 
     plant: Plant
@@ -97,6 +108,7 @@ class Recipe:
     noise_p: float = 0.0
     seed: int = 0
     drive: Literal["loop", "command"] = "loop"
+    mean_pressure: float | None = None
 
     @property
     def t(self) -> Array:
@@ -116,7 +128,14 @@ class Section(BaseModel):
             for key in values:
                 if key not in cls.model_fields:
                     raise PydanticCustomError("unknown_key", "{key}", {"key": str(key)})
+                if isinstance(values[key], bool) and not _takes_bool(cls, str(key)):
+                    raise ValueError(f"{key} needs a value, not true or false")
         return values
+
+
+def _takes_bool(section: type[Section], key: str) -> bool:
+    annotation = section.model_fields[key].annotation
+    return annotation is bool or bool in getattr(annotation, "__args__", ())
 
 
 Positive = Annotated[float, Field(gt=0)]
@@ -194,6 +213,13 @@ ReferenceSection = Annotated[
     StepsSection | RandomStepsSection | RampsSection | MultisineSection | SumSection,
     Field(discriminator="kind"),
 ]
+
+
+def _multisines(reference: ReferenceSection) -> list[MultisineSection]:
+    """The multisines among a reference and its parts."""
+    if isinstance(reference, SumSection):
+        return [found for part in reference.parts for found in _multisines(part)]
+    return [reference] if isinstance(reference, MultisineSection) else []
 
 
 class PDSection(Section):
@@ -292,12 +318,13 @@ class RecipeSection(Section):
     reference: ReferenceSection
     actuator: ActuatorSection | None = None
     motor: MotorSection | None = None
-    effects: dict[str, dict[str, float]] = Field(default_factory=dict)
+    effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     loop: LoopSection | None = None
     drive: Literal["loop", "command"] = "loop"
     noise_F: NotNegative = 0.0
     noise_y: NotNegative = 0.0
     noise_p: NotNegative = 0.0
+    mean_pressure_pa: Positive | None = None
     seed: int = Field(default=0, ge=0)
 
     @model_validator(mode="after")
@@ -308,16 +335,33 @@ class RecipeSection(Section):
             raise ValueError("needs a 'loop' where drive is \"loop\", and none otherwise")
         if self.loop and (self.loop.force is None) != (self.actuator is None):
             raise ValueError("needs loop.force with an actuator, and none with a motor")
+        samples = self.duration_s / self.h_s
+        if not SHORTEST <= samples <= LONGEST:
+            raise ValueError(
+                f"duration_s = {self.duration_s:g} at h_s = {self.h_s:g} makes {samples:.4g}"
+                f" samples, {SHORTEST} to {LONGEST:.0e} needed"
+            )
+        for part in _multisines(self.reference):
+            if part.high_hz >= 0.5 / self.h_s:
+                raise ValueError(
+                    f"reference.high_hz = {part.high_hz:g} is not below half the sampling rate"
+                    f" ({0.5 / self.h_s:g} Hz at h_s = {self.h_s:g})"
+                )
         return self
 
-    def value(self) -> Recipe:
-        """The recipe; raises BadModel where a parameter has the wrong sign."""
+    def value(self, library: Library | None = None, motion: Motion = "linear") -> Recipe:
+        """The recipe; raises BadModel where a parameter has the wrong sign or an effect is unknown.
+
+        library: the effects that it may name, by default all but a user's own files.
+        """
         drive = (
             Actuator(self.actuator.k1, self.actuator.k2)
             if self.actuator
             else Motor(self.motor.k_a if self.motor else 0.0)
         )
-        plant = Plant(Karnopp(**self.friction.model_dump()), drive, self.effects)
+        known = library or (_installed() if self.effects else built_in())
+        effects = tuple(self._effect(key, known, motion) for key in self.effects)
+        plant = Plant(Karnopp(**self.friction.model_dump()), drive, effects)
         return Recipe(
             plant=plant,
             duration=self.duration_s,
@@ -329,4 +373,17 @@ class RecipeSection(Section):
             noise_p=self.noise_p,
             seed=self.seed,
             drive=self.drive,
+            mean_pressure=self.mean_pressure_pa,
         )
+
+    def _effect(self, key: str, library: Library, motion: Motion) -> Acting:
+        try:
+            return written_effect(key, self.effects[key], library, motion)
+        except BadModel as error:
+            raise BadModel(f"effects: {error}") from None
+
+
+def _installed() -> Library:
+    from workbench.own_effects import library
+
+    return library()

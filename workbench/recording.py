@@ -1,53 +1,169 @@
 """Recipe -> log and truth: what a machine would have logged, and what only its maker knows."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from design.loop import ForcePI, LoopNoise, simulate_loop
+from design.effect_loop import OfForce, pressures, simulate_effect_loop
+from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
-from identification.errors import BadCard
+from identification.errors import BadCard, BadModel
 from identification.excitation import reference_signal
-from identification.karnopp import NAMES, UNITS
-from identification.log import Log
+from identification.karnopp import NAMES
+from identification.log import Log, Rig
 from identification.plant import Actuator, Motor
-from identification.simulate import free_run
+from identification.result import Estimate
+from identification.simulate import FreeRun, free_run
 from workbench import recipe as recipes
 from workbench.card import Card
+from workbench.effect_values import exact
+from workbench.logs import ABSURD
+from workbench.model import as_number
+from workbench.parameter_units import actuator_units, friction_units
 from workbench.recipe import Recipe
-from workbench.units import scale
+from workbench.units import Motion
 
-COLUMNS = ("t", "r", "y", "F", "u")
+PASSES = 30  # of an open loop in which friction follows pressures, and they the force
+SETTLED = 1e-9  # relative change of the force from which it has settled
+Chambers = dict[str, OfForce]
 
 
-def record(name: str, recipe: Recipe, seed: int | None = None) -> Log:
+@dataclass(frozen=True, eq=False)
+class _Run:
+    """What a run logs, (n,) each, and the force without the sensor's noise."""
+
+    r: Array
+    y: Array
+    F: Array
+    u: Array
+    F_true: Array
+
+
+def record(name: str, recipe: Recipe, seed: int | None = None, rig: Rig | None = None) -> Log:
     """The log of a recipe, sensors' noise included; `seed` instead of the recipe's where given.
 
-    Raises BadCard where the recipe asks for an effect that no simulation knows yet.
+    rig: where it is electro-pneumatic, the chambers' pressures are logged too. Raises BadCard
+    where an effect needs a signal that is not simulated, or where the machine runs away.
     """
-    if recipe.plant.effects:
-        raise BadCard(
-            f"{name}: effects {', '.join(recipe.plant.effects)} cannot be simulated yet; take"
-            " [recipe.effects] out of the card, or choose a recipe without"
-        )
     rng = np.random.default_rng(recipe.seed if seed is None else seed)
     reference = reference_signal(recipe.reference, recipe.t, rng)
-    if recipe.loop is None:
-        return _open_loop(name, recipe, reference, rng)
-    run = simulate_loop(
-        recipe.plant,
-        _position(recipe),
-        ForcePI(recipe.loop.force.k_i, recipe.loop.force.T_i) if recipe.loop.force else None,
-        reference,
-        recipe.h,
-        noise=LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng),
-        control_limit=recipe.loop.control_limit,
+    chambers = _chambers(name, recipe, rig)
+    _refuse_unsimulated(name, recipe, chambers)
+    try:
+        run = (_open_loop if recipe.loop is None else _in_loop)(recipe, reference, rng, chambers)
+    except BadModel as error:
+        raise BadCard(f"{name}: {error}") from None
+    signals = {"t": recipe.t, "r": run.r, "y": run.y, "F": run.F, "u": run.u}
+    log = Log(name, signals | _logged_pressures(name, recipe, chambers, run.F_true, rng))
+    lost = np.flatnonzero(~(np.abs(log["y"]) < ABSURD))
+    if lost.size:
+        raise BadCard(
+            f"{name}: the simulated machine runs away after {log['t'][lost[0]]:.3g} s; weaken the"
+            " controller in [recipe.loop], or the command"
+        )
+    return log
+
+
+def _in_loop(
+    recipe: Recipe, reference: Array, rng: np.random.Generator, chambers: Chambers
+) -> _Run:
+    """The reference as that of the recipe's position loop."""
+    loop = recipe.loop
+    assert loop is not None
+    force = ForcePI(loop.force.k_i, loop.force.T_i) if loop.force else None
+    noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
+    parts = (recipe.plant, _position(recipe), force, reference, recipe.h)
+    run: LoopRun
+    if recipe.plant.effects:
+        run = simulate_effect_loop(
+            *parts, noise=noise, control_limit=loop.control_limit, signals=chambers
+        )
+    else:
+        run = simulate_loop(*parts, noise=noise, control_limit=loop.control_limit)
+    return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
+
+
+def _open_loop(recipe: Recipe, u: Array, rng: np.random.Generator, chambers: Chambers) -> _Run:
+    """The reference as the command, no loop around the plant."""
+    run = _open_run(recipe, u, chambers)
+    noise = rng.standard_normal((2, len(u)))
+    return _Run(
+        r=np.zeros(len(u)),
+        y=run.shown + recipe.noise_y * noise[0],
+        F=run.F + recipe.noise_F * noise[1],
+        u=u,
+        F_true=run.F,
     )
-    signals = {"r": run.r, "y": run.y_measured, "F": run.F_measured, "u": run.u}
-    return Log(name, {"t": recipe.t, **signals})
+
+
+def _open_run(recipe: Recipe, u: Array, chambers: Chambers) -> FreeRun:
+    """The run by command; where friction follows the pressures, repeated until both agree.
+
+    Raises BadModel where they do not.
+    """
+    actuator = recipe.plant.actuator
+    assert isinstance(actuator, Motor | Actuator)
+    force = actuator.k_a * u if isinstance(actuator, Motor) else np.zeros(len(u))
+    blank = Log("recipe", {"t": recipe.t, "y": np.zeros(len(u)), "u": u, "F": force})
+    start = (0.0, 0.0, float(force[0]))
+    circular = any(name in chambers for one in recipe.plant.effects for name in one.effect.signals)
+    for _ in range(PASSES):
+        known = blank.with_signals(**{name: of(force) for name, of in chambers.items()})
+        run = free_run(recipe.plant, known, start, "command")
+        change = float(np.max(np.abs(run.F - force)))
+        if not circular or change <= SETTLED * float(np.max(np.abs(run.F))):
+            return run
+        force = run.F
+    raise BadModel(
+        f"pressures and friction do not agree after {PASSES} passes (the force still changes by"
+        f" {change:.3g} N); close the loop, or weaken the effect of the pressures"
+    )
+
+
+def _chambers(name: str, recipe: Recipe, rig: Rig | None) -> Chambers:
+    """Pressures that an electro-pneumatic rig has under a force; none for any other."""
+    if rig is None or rig.kind != "electro-pneumatic" or not (rig.area_p and rig.area_n):
+        return {}
+    supply = rig.supply_pressure or 0.0
+    mean = recipe.mean_pressure or 0.5 * supply
+    if not mean > 0:
+        raise BadCard(
+            f"{name}: the chambers' mean pressure is not known (supply_pressure_pa = {supply:g});"
+            " add mean_pressure_pa to [recipe]"
+        )
+    return pressures(rig.area_p, rig.area_n, mean, supply)
+
+
+def _refuse_unsimulated(name: str, recipe: Recipe, chambers: Chambers) -> None:
+    """Raises BadCard where an effect would act by signals of which none is simulated."""
+    for one in recipe.plant.effects:
+        wanted = one.effect.signals
+        missing = [key for key in wanted if key not in chambers]
+        if missing and (set(missing) & set(one.effect.needs) or len(missing) == len(wanted)):
+            raise BadCard(
+                f"{name}: effect {one.key!r} acts by {', '.join(missing)}, which this recipe does"
+                ' not simulate; pressures need a rig of kind = "electro-pneumatic", other signals'
+                " a log of a machine"
+            )
+
+
+def _logged_pressures(
+    name: str, recipe: Recipe, chambers: Chambers, F: Array, rng: np.random.Generator
+) -> dict[str, Array]:
+    """The pressures along the force F [N], with noise; raises BadCard where one is below 0."""
+    out: dict[str, Array] = {}
+    for key, of in chambers.items():
+        true = np.asarray(of(F))
+        if np.min(true) < 0:
+            raise BadCard(
+                f"{name}: {key} falls to {np.min(true):.4g} Pa, at least 0 needed; raise"
+                " mean_pressure_pa in [recipe], or ask for less force"
+            )
+        out[key] = true + recipe.noise_p * rng.standard_normal(len(F))
+    return out
 
 
 def as_columns(log: Log, card: Card) -> dict[str, Array]:
@@ -59,31 +175,45 @@ def as_columns(log: Log, card: Card) -> dict[str, Array]:
     for name, spec in card.signals.items():
         if name not in log:
             raise BadCard(
-                f"{card.path}: signals.{name} is not simulated (there is: {', '.join(COLUMNS)});"
-                " take it out of the recipe's card"
+                f"{card.path}: signals.{name} is not simulated (there is:"
+                f" {', '.join(log.signals)}); take it out of the recipe's card"
             )
-        factor, shift = scale(spec.unit, name, card.rig().motion)
-        values = (log[name] - shift) / factor
-        out[str(spec.column)] = spec.gain * values + spec.offset
+        try:
+            factor, shift = spec.scale(name, card.rig().motion)
+        except BadCard as error:
+            raise BadCard(f"{card.path}: {error}") from None
+        out[str(spec.column)] = (log[name] - shift) / factor + spec.offset
     return out
 
 
-def truth(name: str, recipe: Recipe, seed: int | None = None) -> dict[str, Any]:
-    """What the log does not hold: parameters, effects, loop, noise and seed."""
-    friction = recipe.plant.friction
-    actuator = recipe.plant.actuator
+def truth(
+    name: str, recipe: Recipe, seed: int | None = None, *, motion: Motion = "linear"
+) -> dict[str, Any]:
+    """What the log does not hold: parameters, effects, loop, noise and seed.
+
+    A parameter is as in every result, without an interval: what a recipe sets is known exactly.
+    """
+    friction, actuator = friction_units(motion), actuator_units(motion)
+    drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else None
     return {
         "schema": "truth/1",
         "card": name,
-        "friction": {n: {"value": getattr(friction, n), "unit": UNITS[n]} for n in NAMES},
-        "actuator": asdict(actuator) if actuator else None,
-        "effects": recipe.plant.effects,
-        "noise": {"y": recipe.noise_y, "F": recipe.noise_F},
+        "friction": {n: _exact(getattr(recipe.plant.friction, n), friction[n]) for n in NAMES},
+        "actuator": {n: _exact(v, actuator[n]) for n, v in drive.items()} if drive else None,
+        "effects": {
+            one.key: {n: as_number(e) for n, e in exact(one, motion).items()}
+            for one in recipe.plant.effects
+        },
+        "noise": {"y": recipe.noise_y, "F": recipe.noise_F, "p": recipe.noise_p},
         "seed": recipe.seed if seed is None else seed,
         "duration_s": recipe.duration,
         "h_s": recipe.h,
         "loop": asdict(recipe.loop) if recipe.loop else None,
     }
+
+
+def _exact(value: float, unit: str) -> dict[str, Any]:
+    return as_number(Estimate(value, unit))
 
 
 def _position(recipe: Recipe) -> RST:
@@ -100,26 +230,3 @@ def _position(recipe: Recipe) -> RST:
     if isinstance(actuator, Motor):
         return RST(found.R / actuator.k_a, found.S, found.T / actuator.k_a, recipe.h)
     return found
-
-
-def _open_loop(name: str, recipe: Recipe, u: Array, rng: np.random.Generator) -> Log:
-    """The reference as the command, no loop around the plant."""
-    match recipe.plant.actuator:
-        case Motor(k_a):
-            force = k_a * u
-        case _:
-            force = np.zeros(len(u))
-    assert isinstance(recipe.plant.actuator, Motor | Actuator)
-    blank = Log(name, {"t": recipe.t, "y": np.zeros(len(u)), "u": u, "F": force})
-    run = free_run(recipe.plant, blank, (0.0, 0.0, float(force[0])), "command")
-    noise = rng.standard_normal((2, len(u)))
-    return Log(
-        name,
-        {
-            "t": recipe.t,
-            "r": np.zeros(len(u)),
-            "y": run.y + recipe.noise_y * noise[0],
-            "F": run.F + recipe.noise_F * noise[1],
-            "u": u,
-        },
-    )

@@ -27,7 +27,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
 
     Raises BadCard, BadLog; also where the files are of different machines or one is named twice.
     """
-    card = load_card(card_path(card_name))
+    card = load_card(card_path(card_name), with_recipe=False)
     runs: list[Source] = []
     remarks: list[str] = []
     rigs: dict[Path, Rig] = {}

@@ -19,6 +19,13 @@ from workbench.mat import tags_are_sound
 from workbench.text import read_text_table
 
 RawColumn = NDArray[Any]
+_PACKED = {
+    b"\x1f\x8b": "compressed by gzip; unpack it (gunzip) and give the file in it",
+    b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
+    b"\xfd7zXZ": "compressed by xz; unpack it (unxz) and give the file in it",
+    b"PK\x03\x04": "a zip archive or an Excel workbook; unpack it, or save its sheet as CSV",
+    b"\xd0\xcf\x11\xe0": "an old Excel workbook; save its sheet as CSV",
+}
 
 
 @dataclass(frozen=True)
@@ -50,6 +57,12 @@ class Table:
             )
         if key not in self.names:
             raise BadLog(f"{where}: no column {key!r}{nearest(key, self.names)}")
+        if self.names.count(key) > 1:
+            which = " and ".join(str(k) for k, name in enumerate(self.names) if name == key)
+            raise BadLog(
+                f"{where}: columns {which} (counted from 0) are all named {key!r}; name the right"
+                " one by its number in the card"
+            )
         return self.fetch(self.names.index(key))
 
 
@@ -62,7 +75,7 @@ def read_table(path: Path, spec: FileSpec) -> Table:
             f"{path}: is a binary {form} file named .csv; rename it, or give its format in the "
             "card's [file]"
         )
-    _check_magic(path, form, head)
+    _check_magic(path, form, head, spec)
     readers: Mapping[str, Callable[[Path, FileSpec], Table]] = {
         "csv": _read_csv,
         "parquet": _read_parquet,
@@ -121,14 +134,26 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _check_magic(path: Path, form: Format, head: bytes) -> None:
+def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
+    """Raises BadLog where the first bytes are those of no such file."""
+    for magic, what in _PACKED.items():
+        if form == "csv" and head.startswith(magic):
+            raise BadLog(f"{path}: is {what}")
     wrong = {
+        "mat": not head.startswith(b"MATLAB") and b"\x89HDF" not in head and _is_text(head),
         "parquet": not head.startswith(b"PAR1"),
         "hdf5": b"\x89HDF" not in head,
         "json": head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["),
     }
     if wrong.get(form, False):
-        raise BadLog(f"{path}: is not a {form} file by its first bytes; copy it again or rename it")
+        advice = "; copy it again or rename it"
+        if spec.format is not None:
+            advice = ", which the card's [file] format says; take it out, or copy it again"
+        raise BadLog(f"{path}: is not a {form} file by its first bytes{advice}")
+
+
+def _is_text(head: bytes) -> bool:
+    return all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
 
 
 def _read_csv(path: Path, spec: FileSpec) -> Table:

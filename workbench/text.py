@@ -15,7 +15,8 @@ from workbench.card import FileSpec
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
-_DELIMITERS = (";", "\t", ",", " ")
+_DELIMITERS = (";", "\t", ",", " ", "|")
+MANY = 10  # rows of a wrong length that make the header suspect instead
 _LOOK = 65536  # characters looked at to find the layout
 
 
@@ -49,12 +50,17 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
     if not lines:
         raise BadLog(f"{path}: no rows after line {start}; check skip_rows in the card")
     layout = _layout([line for line in lines[1:40] if not _skipped(line, spec.comment)], spec)
+    if spec.header is None:
+        _check_first_line(path, lines, layout, spec)
     first = _split(lines[0], layout)
     headed = spec.header if spec.header is not None else not all(map(_is_number, first))
     names = tuple(first) if headed else tuple(str(k) for k in range(len(first)))
     body = _body(text, start + int(headed), spec, layout)
     if not body.strip():
-        raise BadLog(f"{path}: has a header but no rows; log some data")
+        raise BadLog(
+            f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
+            " that it is the right file"
+        )
     first_row = start + int(headed) + 1
     columns = _parse(path, body, layout, len(names), first_row)
     return TextTable(names, columns, first_row, headed)
@@ -77,7 +83,24 @@ def _decode(path: Path, encoding: str) -> str:
         ) from None
     if "\0" in text:
         raise BadLog(f"{path}: is a binary file, not text; give its format in the card's [file]")
+    if "\n" not in text:
+        text = text.replace("\r", "\n")
     return text.removeprefix("\ufeff")
+
+
+def _check_first_line(path: Path, lines: list[str], layout: _Layout, spec: FileSpec) -> None:
+    """Raises BadLog where the first line cannot be a header, since the rows have more fields."""
+    looked = [line for line in lines[:40] if not _skipped(line, spec.comment)]
+    widths = [len(_split(line, layout)) for line in looked[1:]]
+    width = max(set(widths), key=widths.count) if widths else 0
+    if len(_split(lines[0], layout)) > 1 or width < 2 or 2 * widths.count(width) < len(widths):
+        return
+    header = next(line for line in looked[1:] if len(_split(line, layout)) == width)
+    raise BadLog(
+        f"{path}: line {spec.skip_rows + 1} ({lines[0].strip()[:40]!r}) is no header of the"
+        f" {width} columns below; set skip_rows = {spec.skip_rows + lines.index(header)} in the"
+        " card's [file], or comment to the sign with which such lines begin"
+    )
 
 
 def _skipped(line: str, comment: str) -> bool:
@@ -99,7 +122,10 @@ def _layout(lines: list[str], spec: FileSpec) -> _Layout:
             best, most = delimiter, share
     best = spec.delimiter or best
     fields = [field for line in lines for field in _split(line, _Layout(best, "."))]
-    comma = best != "," and any(map(_DECIMAL_COMMA.fullmatch, fields))
+    # Between commas only a quoted field can hold one; "1,000.5" is no decimal comma.
+    comma = any(map(_DECIMAL_COMMA.fullmatch, fields)) and not (
+        best == "," and any("." in field for field in fields)
+    )
     return _Layout(best, spec.decimal or ("," if comma else "."))
 
 
@@ -156,9 +182,15 @@ def _parse(
         found = arrow.read_csv(pa.BufferReader(content), read, parse, convert)
         if wrong:
             row, fields = wrong[0]
+            more = f" ({len(wrong)} such rows)" if len(wrong) > 1 else ""
+            advice = "correct or remove it"
+            if len(wrong) > MANY and fields == width + 1:
+                advice = "the header has one name too few for the rows; add it"
+            elif len(wrong) > MANY and fields > width and layout.delimiter == ",":
+                advice = "if the numbers have decimal commas, export with ';' between the columns"
             raise BadLog(
-                f"{path}: row {first_row + row - 1} has {fields} fields, {width} needed "
-                f"({len(wrong)} such rows); correct or remove it"
+                f"{path}: row {first_row + row - 1} has {fields} fields, {width} needed{more};"
+                f" {advice}"
             )
         return found
 

@@ -1,15 +1,18 @@
 """Model -> Design: PID and RST by pole placement, compensator, margins."""
 
-from dataclasses import asdict
+import math
+from collections.abc import Iterator, Mapping
 from typing import Literal
 
 import numpy as np
 
 from design.linear import ForceGains, force_gains, linear_plant
+from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
-from identification.plant import Actuator
+from identification.plant import Actuator, Motor
+from identification.result import Estimate
 from workbench.design_values import (
     CompensatorValues,
     Controller,
@@ -20,11 +23,15 @@ from workbench.design_values import (
     margin_values,
 )
 from workbench.model import Model, used, versions
+from workbench.parameter_units import Shown, shown
 
+NORMAL_95 = 1.96  # standard deviations to either side that hold 95 %
 DEFAULT_PERIOD = 10e-3  # s, the paper's rig
 N_C = 2.0  # the paper's, in simulation and on the rig
 E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
-NOISE_SHARE = 0.2  # of the Coulomb force that the position's noise may ask for
+LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
+OVERSHOOT = 0.05  # of a step, in the linear loop
+NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
 FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design
 
 
@@ -48,7 +55,7 @@ def design(
     found: dict[str, Controller] = {}
     refused: dict[str, str] = {}
     a, b = np.array(plant.A), np.array(plant.B)
-    others = corners(model, plant, force)
+    others, demand = corners(model, plant, force), reference_demand(model, force)
     for name, tune in (("rst", tune_rst), ("pid", tune_pid)):
         if name == "pid" and not asked.integrator:
             refused[name] = "a PID has an integrator; asked for none"
@@ -57,19 +64,18 @@ def design(
         if name == "pid" and asked.auxiliary is not None:
             wanted = Asked(asked.dominant, None, asked.integrator)
         try:
-            tuned = tune(a, b, plant.h, wanted, goals, others)
+            tuned = tune(a, b, plant.h, wanted, goals, others, demand)
         except BadSpecification as error:
             refused[name] = str(error)
             continue
-        found[name] = _controller(tuned)
+        found[name] = _controller(tuned, shown(model.rotary))
     by_hand = asked.dominant is not None or asked.auxiliary is not None
     if not found or ("rst" in refused and by_hand):
         raise BadSpecification(refused["rst"])
-    recommended: Literal["rst", "pid"] = "rst" if "rst" in found else "pid"
-    if "pid" in found and found[recommended].missed and not found["pid"].missed:
-        recommended = "pid"
+    recommended = _recommended(found)
     return Design(
         card=model.card,
+        motion=model.rig.motion,
         plant=plant,
         force=force,
         rst=found.get("rst"),
@@ -77,8 +83,40 @@ def design(
         refused=refused,
         recommended=recommended,
         compensator=_compensator(model),
-        remarks=tuple(_remarks(model, plant)),
+        remarks=tuple(_remarks(model, plant, found)),
         versions=versions(),
+    )
+
+
+def _recommended(found: Mapping[str, Controller]) -> Literal["rst", "pid", "none"]:
+    """The RST where it keeps every goal, else the PID where that does; else none."""
+    if "rst" in found and not found["rst"].missed:
+        return "rst"
+    return "pid" if "pid" in found and not found["pid"].missed else "none"
+
+
+def reference_demand(model: Model, force: ForceLoop | None) -> Demand:
+    """What a step of the reference may ask of this machine.
+
+    Of force what the logs show at most, less the stick limit; of the command the rig's limit.
+    """
+    p, actuator, limit = model.karnopp, model.simulated.actuator, model.rig.control_limit
+    low, high = model.travel
+    most, command = model.force_peak, None
+    per_jump, per_speed = 0.0, 0.0
+    if isinstance(actuator, Motor) and limit is not None:
+        most = min(most, abs(actuator.k_a) * limit)
+    if isinstance(actuator, Actuator) and force is not None:
+        command, per_jump = limit, force.k_i
+        per_speed = abs(actuator.k2 / actuator.k1)
+    left = most - max(p.F_sp, -p.F_sn, p.F_cp, p.F_cn)
+    return Demand(
+        step=LARGEST_STEP * (high - low),
+        overshoot=OVERSHOOT,
+        force=left if left > 0 else None,
+        command=command,
+        per_jump=per_jump,
+        per_speed=per_speed,
     )
 
 
@@ -100,11 +138,11 @@ def linear_of(
     h = period
     if h is None:
         h = model.plant.h if model.plant else max(DEFAULT_PERIOD, h_log)
-    m, f = _nominal(model)
     force = _force_loop(model, h)
-    a, b = _physical(m, f, h, model, force)
+    a, b = _physical(*_nominal(model), h, model, force)
     why = _why_physical(model, force)
-    return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, f), force
+    m, viscous = model.friction["m"], _viscous(model)
+    return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, viscous), force
 
 
 def _why_physical(model: Model, force: ForceLoop | None) -> str:
@@ -133,9 +171,9 @@ def linear_plant_of(machine: Model, found: Design) -> Linear:
     fits = own is not None and own.input == "F" and abs(own.h - found.plant.h) < 1e-6 * own.h
     if found.plant.source == "arx" and own is not None and fits:
         return Linear("arx", "", own.A, own.B, own.h, None, None)
-    m, f = _nominal(machine)
-    a, b = _physical(m, f, found.plant.h, machine, found.force)
-    return Linear("physical", "", tuple(a.tolist()), tuple(b.tolist()), found.plant.h, m, f)
+    a, b = _physical(*_nominal(machine), found.plant.h, machine, found.force)
+    m, viscous = machine.friction["m"], _viscous(machine)
+    return Linear("physical", "", tuple(a.tolist()), tuple(b.tolist()), found.plant.h, m, viscous)
 
 
 def _physical(
@@ -162,6 +200,19 @@ def _nominal(model: Model) -> tuple[float, float]:
     """Mass and the mean of both viscous coefficients."""
     p = model.karnopp
     return p.m, 0.5 * (p.F_vp + p.F_vn)
+
+
+def _viscous(model: Model) -> Estimate:
+    """The viscous coefficient of the linear plant: the mean over both directions."""
+    one, other = model.friction["F_vp"], model.friction["F_vn"]
+    mean = _nominal(model)[1]
+    if unknown := _unknown_viscous(model):
+        reason = f"{' and '.join(unknown)} not identified"
+        return Estimate(None, one.unit, reason=reason, assumed=mean)
+    sd = None if one.sd is None or other.sd is None else 0.5 * math.hypot(one.sd, other.sd)
+    spread = None if sd is None else NORMAL_95 * sd
+    low, high = (None, None) if spread is None else (mean - spread, mean + spread)
+    return Estimate(mean, one.unit, sd, low, high)
 
 
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
@@ -202,10 +253,8 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned) -> Controller:
-    rst, gains, note = tuned.rst, None, None
-    if tuned.pid is not None:
-        gains, note = tuned.pid.gains, tuned.pid.note or tuned.pid.reason
+def _controller(tuned: Tuned, units: Shown) -> Controller:
+    rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
     return Controller(
         R=tuple(rst.R.tolist()),
         S=tuple(rst.S.tolist()),
@@ -214,10 +263,29 @@ def _controller(tuned: Tuned) -> Controller:
         dominant=tuned.dominant,
         auxiliary=tuple((z.real, z.imag) for z in tuned.auxiliary),
         margins=margin_values(tuned.margins, tuned.worst),
+        rate=taken.rate,
+        lag=taken.lag,
+        overshoot=taken.overshoot,
         missed=tuned.missed,
-        gains=gains,
-        note=note,
+        gains=None if pid is None else pid.gains,
+        note="; ".join(_notes(tuned, units)),
     )
+
+
+def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
+    """What to know of a controller's reference and form, in words."""
+    pid, rate = tuned.pid, tuned.followed.rate
+    if pid is not None and pid.gains is not None:
+        yield f"set-point weights b = {pid.gains.b:.3g}, c = {pid.gains.c:.3g}"
+    yield f"follows a ramp {1e3 * tuned.followed.lag:.3g} ms behind"
+    if rate is not None:
+        step = rate * tuned.rst.h
+        yield (
+            f"move the reference by at most {step:.4g} {units.position} in a sample"
+            f" ({rate:.3g} {units.velocity})"
+        )
+    if pid is not None and (said := pid.note or pid.reason):
+        yield said
 
 
 def corners(
@@ -240,12 +308,14 @@ def corners(
 
 def _compensator(model: Model) -> CompensatorValues:
     low, high = model.travel
-    friction = asdict(model.karnopp)
-    return CompensatorValues(N_C, E_T_PER_TRAVEL * (high - low), friction, model.assumed)
+    return CompensatorValues(N_C, E_T_PER_TRAVEL * (high - low), model.friction)
 
 
-def _remarks(model: Model, plant: Linear) -> list[str]:
+def _remarks(model: Model, plant: Linear, found: Mapping[str, Controller]) -> list[str]:
     out = []
+    if _recommended(found) == "none":
+        said = "; ".join(f"{name.upper()}: {', '.join(c.missed)}" for name, c in found.items())
+        out.append(f"no controller is recommended, none keeps every goal ({said})")
     names = _unknown_viscous(model)
     if plant.source == "physical" and names:
         out.append(f"{' and '.join(names)} not identified: an assumed value stands in the design")

@@ -1,5 +1,6 @@
 """Units of a card's signals: from what is written to SI, and what dimension a signal must have."""
 
+import re
 from functools import cache
 from typing import TYPE_CHECKING, Literal, NamedTuple
 
@@ -19,12 +20,13 @@ _NAMES = {
     "m": "a length such as m, mm or inch",
     "rad": "an angle such as rad, deg or turn",
     "Pa": "a pressure such as Pa, bar or psi",
-    "N": "a force such as N, kN, lbf or kip",
+    "N": "a force such as N, kN, kgf or lbf",
     "N m": "a torque such as N m or lbf ft",
     "V": "a command such as V, mA or 1 (duty)",
 }
 # Logs of forces are often in pounds: as a force they are read as pounds-force.
 _POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
+_POUND = re.compile(r"\b(lbs?|klb)\b")
 
 
 class Scale(NamedTuple):
@@ -40,6 +42,11 @@ def si_unit(signal: str, motion: Motion) -> str | None:
     return {**table, "F": _FORCE[motion], "u": "V"}.get(signal)
 
 
+def kind(signal: str, motion: Motion) -> str:
+    """What a canonical signal is, with units as examples."""
+    return _NAMES[si_unit(signal, motion) or ""]
+
+
 def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
     """Factor and shift from `unit` to SI for a signal of this name.
 
@@ -47,35 +54,62 @@ def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
     kelvin. Raises BadCard where the unit is unknown or of the wrong dimension; the caller says
     in which file.
     """
+    found = scale_or_none(unit, signal, motion)
+    if found is None:
+        raise BadCard(f"signals.{signal}: unit {unit!r} is not {kind(signal, motion)}")
+    return found
+
+
+def scale_or_none(
+    unit: str, signal: str, motion: Motion = "linear", per: str | None = None
+) -> Scale | None:
+    """As `scale`, of `unit` over the unit `per`; None where the dimension is wrong."""
     need = si_unit(signal, motion)
-    if unit == need:
+    if unit == need and per is None:
         return Scale(1.0, 0.0)
     if need in ("N", "N m"):
-        unit = " ".join(_POUNDS.get(word, word) for word in unit.split())
+        unit, per = _as_forces(unit), None if per is None else _as_forces(per)
     for target in ("V", "A", "1") if signal == "u" else (need,):
-        found = _convert(unit, target)
+        found = conversion(unit, target, per)
         if found is not None:
             return found
-    raise BadCard(f"signals.{signal}: unit {unit!r} is not {_NAMES[need or '']}")
+    return None
 
 
-def _convert(unit: str, target: str | None) -> Scale | None:
-    """The affine map from `unit` to `target` (to its own SI base where None); None if unlike."""
+def _as_forces(unit: str) -> str:
+    return _POUND.sub(lambda word: _POUNDS[word[0]], unit)
+
+
+def conversion(unit: str, target: str | None, per: str | None = None) -> Scale | None:
+    """The affine map from `unit`, or `unit` over `per`, to `target`; None if unlike.
+
+    target None: the unit's own SI base. Raises BadCard where a unit is unknown or not linear.
+    """
     import pint  # its registry takes longer than all the rest of a short command
 
-    registry = _registry()
+    wanted = None if target is None else _parsed(target)
+    parsed = _parsed(unit) if per is None else _parsed(unit) / _parsed(per)
     try:
-        parsed = registry.Unit("dimensionless" if unit.strip() in ("", "1") else unit)
-        base = registry.Unit("dimensionless" if target == "1" else target) if target else None
-        points = [_to_si(value, parsed, base) for value in (0.0, 1.0, 2.0)]
+        points = [_to_si(value, parsed, wanted) for value in (0.0, 1.0, 2.0)]
     except pint.DimensionalityError:
         return None
-    except Exception as error:  # pint raises tokenizer and attribute errors on odd text
-        raise BadCard(f"unit {unit!r} is unknown; write it as in 'mm', 'bar', 'N m'") from error
+    except Exception as error:  # pint raises all kinds of errors on odd combinations
+        raise _unknown(unit) from error
     shift, factor = points[0], points[1] - points[0]
     if not np.isclose(points[2], 2.0 * factor + shift) or factor == 0.0:
         raise BadCard(f"unit {unit!r} is not linear; log in a linear unit")
     return Scale(factor, shift)
+
+
+def _parsed(unit: str) -> "pint.Unit":
+    try:
+        return _registry().Unit("dimensionless" if unit.strip() in ("", "1") else unit)
+    except Exception as error:  # pint raises tokenizer and attribute errors on odd text
+        raise _unknown(unit) from error
+
+
+def _unknown(unit: str) -> BadCard:
+    return BadCard(f"unit {unit!r} is unknown; write it as in 'mm', 'bar', 'N m'")
 
 
 def _to_si(value: float, unit: "pint.Unit", base: "pint.Unit | None") -> float:

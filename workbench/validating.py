@@ -1,6 +1,6 @@
 """Model + Design -> Validation: the loop in simulation, on the identified plant and another."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import pairwise
 from typing import Any, Literal
@@ -13,10 +13,11 @@ from design.rst import closed_loop_poles
 from design.tune import worst_modulus
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from workbench.closed_loop import loop_period, run_loop
+from workbench.closed_loop import left_out, loop_period, run_loop
 from workbench.design_values import Controller, Design, Linear, MarginValues, margin_values
 from workbench.limit_cycle import LimitCycle, limit_cycle
 from workbench.model import Model, versions
+from workbench.parameter_units import shown
 from workbench.tuning import corners, linear_plant_of
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
@@ -27,19 +28,25 @@ SHORTEST_DWELL = 1.0  # s
 LAST_DWELL = 10.0  # s
 LAST = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
-BEYOND = 1.2  # times the largest force in the logs that the loop may ask for unremarked
+BAND = 0.05  # of a step, in which a settled position stays
+REST = 2.0  # s at rest over which the noise in the command is taken
 ESCAPED = 10.0  # times the step
 
 
 @dataclass(frozen=True)
 class Limits:
-    """What a loop must keep to pass: margins, standstill error relative to the step, and the
-    error along the smooth reference relative to its amplitude."""
+    """What a loop must keep to pass.
+
+    Margins; error at standstill and overshoot relative to the step; error along the smooth
+    reference relative to its amplitude; largest force relative to that in the machine's logs.
+    """
 
     modulus: float = 0.5
     delay: float = 2.0
     standstill: float = 0.05
     tracking: float = 0.15
+    overshoot: float = 0.1
+    force: float = 1.2
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,9 @@ class Figures:
     """A controller on a plant: errors in m, relative ones to step and amplitude; force in N.
 
     standstill: largest error in the last half of a dwell. overshoot: relative to the step.
-    margins is None where the linear loop is unstable.
+    settling: longest time [s] until a step stays within 5 %. force_seen: the largest in the
+    machine's logs. command_peak, command_noise: largest command and its standard deviation at rest
+    [V], None where the machine takes a force. margins is None where the linear loop is unstable.
     """
 
     stable: bool
@@ -56,11 +65,16 @@ class Figures:
     standstill: float
     standstill_relative: float
     overshoot: float
+    settling: float
     step_rms: float
     smooth_rms: float
     smooth_relative: float
     force_rms: float
     force_peak: float
+    force_seen: float
+    command_peak: float | None
+    command_limit: float | None
+    command_noise: float | None
     limit_cycle: LimitCycle | None
     missed: tuple[str, ...]
 
@@ -86,10 +100,11 @@ class Validation:
 
 @dataclass(frozen=True)
 class Traces:
-    """The simulated loops behind one entry of a validation."""
+    """The simulated loops behind one entry of a validation; rest: a reference that stands still."""
 
     step: LoopRun
     smooth: LoopRun
+    rest: LoopRun
 
 
 def validate(
@@ -113,8 +128,7 @@ def validate(
     for name, controller in found.controllers.items():
         figures[name] = {}
         for place, machine in plants.items():
-            step, smooth = (run_loop(machine, found, controller, r, rng) for r in reference)
-            run = Traces(step, smooth)
+            run = Traces(*(run_loop(machine, found, controller, r, rng) for r in reference))
             traces[name, place] = run
             figures[name][place] = _figures(machine, found, controller, run, limits)
     judged = judged_of(found)
@@ -124,13 +138,13 @@ def validate(
         passed=all(one.passed for one in figures[judged].values()),
         limits=limits,
         figures=figures,
-        remarks=tuple(_remarks(figures[judged], found, plants)),
+        remarks=tuple(_remarks(figures[judged], found, (model, plant))),
         versions=versions(),
     ), traces
 
 
-def references(machine: Model, found: Design) -> tuple[Array, Array]:
-    """Steps and the smooth reference [m], the same for every controller and plant.
+def references(machine: Model, found: Design) -> tuple[Array, Array, Array]:
+    """Steps, the smooth reference and rest [m], the same for every controller and plant.
 
     Levels from the travel that the logs have shown; the last one is held for long, since a limit
     cycle of an integrator against stiction may take seconds.
@@ -138,13 +152,19 @@ def references(machine: Model, found: Design) -> tuple[Array, Array]:
     low, high = machine.travel
     step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
     h = loop_period(found)
-    n = round(max(DWELLS * slowest(found), SHORTEST_DWELL) / h)
+    n = round((max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / LAST) / h)
     counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
     w = SMOOTH_SPEED * found.controllers[judged_of(found)].dominant[0]
     t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
-    return levels, amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
+    smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
+    return levels, smooth, np.zeros(max(round(REST / h), 2))
+
+
+def travel(found: Design, step: float) -> float:
+    """Longest time [s] for which a step [m] is on its way, moved at the controllers' rates."""
+    return max(step / one.rate if one.rate else 0.0 for one in found.controllers.values())
 
 
 def slowest(found: Design) -> float:
@@ -158,8 +178,8 @@ def slowest(found: Design) -> float:
 
 def judged_of(found: Design) -> Literal["rst", "pid"]:
     """The controller that decides: the recommended one, or the one there is."""
-    if found.recommended in found.controllers:
-        return found.recommended
+    if found.recommended == "pid" and found.pid:
+        return "pid"
     return "rst" if found.rst else "pid"
 
 
@@ -173,18 +193,25 @@ def _figures(
     standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
     smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
     margin = _linear_margins(machine, found, one)
+    runs = (run.step, run.smooth)
+    volts = machine.simulated.actuator is not None
     result = Figures(
         stable=stable,
         margins=margin,
         step=step,
         standstill=standstill,
         standstill_relative=standstill / step,
-        overshoot=_overshoot(run.step, step),
+        overshoot=_overshoot(run.step),
+        settling=_settling(run.step),
         step_rms=float(np.sqrt(np.mean((run.step.r - run.step.y) ** 2))),
         smooth_rms=smooth,
         smooth_relative=smooth / amplitude,
         force_rms=float(np.sqrt(np.mean(run.step.F**2))),
-        force_peak=float(max(np.max(np.abs(run.step.F)), np.max(np.abs(run.smooth.F)))),
+        force_peak=max(float(np.max(np.abs(each.F))) for each in runs),
+        force_seen=machine.force_peak,
+        command_peak=max(float(np.max(np.abs(each.u))) for each in runs) if volts else None,
+        command_limit=machine.rig.control_limit if volts else None,
+        command_noise=float(np.std(run.rest.u[len(run.rest.u) // 2 :])) if volts else None,
         limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
         missed=(),
     )
@@ -202,24 +229,36 @@ def _stays(trace: LoopRun, size: float) -> bool:
 
 def _judged(trace: LoopRun) -> Any:
     """The last half of every dwell, True at its samples."""
-    change = np.flatnonzero(np.diff(trace.r)) + 1
-    starts = np.concatenate([[0], change, [len(trace.r)]])
     keep = np.zeros(len(trace.r), dtype=bool)
-    for low, high in pairwise(starts.tolist()):
+    for low, high in _dwells(trace):
         keep[high - round(LAST * (high - low)) : high] = True
     return keep
 
 
-def _overshoot(trace: LoopRun, step: float) -> float:
-    """Largest overshoot of a step, relative to its height."""
+def _dwells(trace: LoopRun) -> list[tuple[int, int]]:
+    """First sample of every level of the reference, and the one after its last."""
     change = np.flatnonzero(np.diff(trace.r)) + 1
-    ends = np.append(change[1:], len(trace.r))
-    worst = 0.0
-    for low, high in zip(change, ends, strict=True):
-        height = float(trace.r[low] - trace.r[low - 1])
-        beyond = float(np.max(np.sign(height) * (trace.y[low:high] - trace.r[low])))
-        worst = max(worst, beyond / abs(height))
-    return worst
+    return list(pairwise([0, *change.tolist(), len(trace.r)]))
+
+
+def _after_steps(trace: LoopRun) -> list[tuple[float, Array]]:
+    """Height of every step [m] and the error y - r after it [m]."""
+    return [
+        (float(trace.r[low] - trace.r[low - 1]), trace.y[low:high] - trace.r[low:high])
+        for low, high in _dwells(trace)[1:]
+    ]
+
+
+def _overshoot(trace: LoopRun) -> float:
+    """Largest overshoot of a step, relative to its height."""
+    return max(float(np.max(error / height)) for height, error in _after_steps(trace))
+
+
+def _settling(trace: LoopRun) -> float:
+    """Longest time [s] from a step until the position stays within `BAND` of it."""
+    h = float(trace.t[1] - trace.t[0])
+    outside = [np.flatnonzero(np.abs(e) > BAND * abs(height)) for height, e in _after_steps(trace)]
+    return h * max(float(late[-1] + 1) if late.size else 0.0 for late in outside)
 
 
 def _linear_margins(machine: Model, found: Design, one: Controller) -> MarginValues | None:
@@ -243,7 +282,7 @@ def _worst(machine: Model, found: Design, one: Controller, plant: Linear) -> flo
 
 def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> tuple[str, ...]:
     """What a controller does not keep, in words."""
-    unit = "rad" if machine.rotary else "m"
+    unit = shown(machine.rotary).position
     if not result.stable:
         return ("the simulated loop runs away",)
     missed: list[str] = []
@@ -255,7 +294,7 @@ def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> t
             missed.append(f"modulus margin {said}")
         samples = result.margins.delay_samples
         if samples is not None and not (samples >= limits.delay):
-            missed.append(f"delay margin {samples:.2f} samples, at least {limits.delay:g} needed")
+            missed.append(f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed")
     if not (result.standstill_relative <= limits.standstill):
         missed.append(
             f"error at standstill {result.standstill:.3g} {unit},"
@@ -267,13 +306,32 @@ def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> t
             f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
             f" amplitude, at most {100 * limits.tracking:g} % allowed"
         )
-    return tuple(missed)
+    if not (result.overshoot <= limits.overshoot):
+        missed.append(
+            f"overshoot {100 * result.overshoot:.1f} % of the step, at most"
+            f" {100 * limits.overshoot:g} % allowed"
+        )
+    return (*missed, *_too_much(result, limits, machine.rotary))
+
+
+def _too_much(result: Figures, limits: Limits, rotary: bool) -> Iterator[str]:
+    """Force beyond what the logs have shown, command at its limit, in words."""
+    units, seen = shown(rotary), result.force_seen
+    if seen > 0 and not (result.force_peak <= limits.force * seen):
+        yield (
+            f"peak force {result.force_peak:.4g} {units.force}, the logs show {seen:.4g} at most,"
+            f" {limits.force:g} times that allowed"
+        )
+    limit, peak = result.command_limit, result.command_peak
+    if limit is not None and peak is not None and not (peak < limit):
+        yield f"the command reaches its limit of {limit:g} V"
 
 
 def _remarks(
-    figures: Mapping[str, Figures], found: Design, plants: Mapping[str, Model]
+    figures: Mapping[str, Figures], found: Design, machines: Sequence[Model | None]
 ) -> list[str]:
     out = ["the compensator is not part of this loop yet: friction is met by feedback alone"]
+    out += dict.fromkeys(said for machine in machines if machine and (said := left_out(machine)))
     for place, one in figures.items():
         if one.limit_cycle:
             weak = one.margins is None or one.margins.modulus < WEAK
@@ -281,12 +339,6 @@ def _remarks(
             out.append(
                 f"limit cycle on the {place}: {one.limit_cycle.amplitude:.3g} peak to peak every"
                 f" {one.limit_cycle.period:.3g} s, {cause}"
-            )
-        seen = plants[place].force_peak
-        if one.force_peak > BEYOND * seen:
-            out.append(
-                f"the loop on the {place} asks for {one.force_peak:.3g} of force, the logs show"
-                f" {seen:.3g} at most; see that the machine has it"
             )
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")

@@ -3,6 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from workbench.parameter_units import Shown, shown
 from workbench.validating import Figures, Validation
 from workbench.views import Row, table, written
 
@@ -17,50 +18,67 @@ HEAD = (
     "delay margin",
     "standstill error",
     "overshoot",
+    "settling",
     "smooth error",
+    "peak force",
     "limit cycle",
 )
 
 
-def validation_rows(found: Validation) -> list[Row]:
+def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
     """One row a controller and plant, by `HEAD`."""
     return [
-        (name.upper(), place, *_row(one))
+        (name.upper(), place, *_row(one, shown(rotary)))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
 
 
-def _row(one: Figures) -> Row:
+def _row(one: Figures, units: Shown) -> Row:
     m = one.margins
     delay = "-"
     if m:
         delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g} h"
     cycle = "none"
     if one.limit_cycle:
-        cycle = f"{one.limit_cycle.amplitude:.2g} every {one.limit_cycle.period:.2g} s"
+        cycle = (
+            f"{one.limit_cycle.amplitude:.2g} {units.position} every {one.limit_cycle.period:.2g} s"
+        )
     return (
         "yes" if one.passed else "no",
         f"{m.modulus:.3f}" if m else "unstable",
         delay,
         f"{100 * one.standstill_relative:.3g} %" if one.stable else "-",
         f"{100 * one.overshoot:.3g} %" if one.stable else "-",
+        f"{one.settling:.3g} s" if one.stable else "-",
         f"{100 * one.smooth_relative:.3g} %" if one.stable else "-",
+        f"{one.force_peak:.4g} {units.force}" if one.stable else "-",
         cycle if one.stable else "-",
     )
 
 
-def validation_lines(found: Validation) -> list[str]:
+def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     """What fails and what to know, in words."""
-    lines = [
-        f"{name.upper()} on the {place}: {missed}"
-        for name, places in found.figures.items()
-        for place, one in places.items()
-        for missed in one.missed
-    ]
+    lines = [line for name in found.figures for line in _missed(found, name)]
     first = next(iter(found.figures[found.judged].values()))
-    lines.append(f"steps of {first.step:.3g}; standstill and overshoot are relative to the step")
+    unit = shown(rotary).position
+    lines.append(
+        f"steps of {first.step:.3g} {unit}; standstill and overshoot are relative to the step"
+    )
     return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def missed(found: Validation) -> str | None:
+    """Why the judged controller does not pass, in one line; None where it does."""
+    return None if found.passed else "; ".join(_missed(found, found.judged))
+
+
+def _missed(found: Validation, name: str) -> list[str]:
+    return [
+        f"{name.upper()} on the {place}: {limit}"
+        for place, one in found.figures[name].items()
+        for limit in one.missed
+    ]
 
 
 def verdict(found: Validation) -> str:
@@ -69,13 +87,13 @@ def verdict(found: Validation) -> str:
     return f"{found.judged.upper()} {word} in simulation"
 
 
-def validation_view(found: Validation, folder: Path) -> "Group":
+def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "Group":
     """The validation for a terminal."""
     from rich.console import Group
 
     return Group(
         verdict(found),
-        table(HEAD, validation_rows(found)),
-        *validation_lines(found),
+        table(HEAD, validation_rows(found, rotary)),
+        *validation_lines(found, rotary),
         written(folder, "validation.json", "report.html"),
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 from identification.result import Estimate
 from workbench.model import Model
+from workbench.parameter_units import shown
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -26,12 +27,19 @@ MEANING = {
     "k2": "actuator back-effect of velocity",
     "k_a": "motor constant",
 }
+ROTARY_MEANING = {
+    **MEANING,
+    "m": "moment of inertia",
+    "F_sp": "breakaway torque, positive direction",
+    "F_sn": "breakaway torque, negative direction",
+}
 
 
 def parameter_rows(model: Model) -> list[Row]:
     """Parameter, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
     found = {**model.friction, **(model.actuator or {})}
-    return [(name, *_cells(value), MEANING.get(name, "")) for name, value in found.items()]
+    meaning = ROTARY_MEANING if model.rotary else MEANING
+    return [(name, *_cells(value), meaning.get(name, "")) for name, value in found.items()]
 
 
 def _cells(estimate: Estimate) -> tuple[str, str, str]:
@@ -84,7 +92,7 @@ def summary(model: Model) -> str:
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, in words."""
-    unit = "rad" if model.rotary else "m"
+    unit = shown(model.rotary).position
     by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
         f"{e.file}: simulated position within {e.position_rms:.3g} {unit} rms over"
@@ -114,7 +122,7 @@ def held(model: Model) -> str:
     """How a run on the measured force was kept near the measured position."""
     from workbench.predicting import FORCE_WINDOW
 
-    unit = "N m/rad" if model.rotary else "N/m"
+    unit = shown(model.rotary).stiffness
     return (
         f"held to the measured position by {model.fit.stiffness:.3g} {unit} and restarted every"
         f" {FORCE_WINDOW:g} s"

@@ -5,9 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.differentiate import differentiate
 from workbench.card import Card, load_card
 from workbench.fetch import VARIABLE, card_path, find_data, shipped_cards
 from workbench.logs import read_runs
+from workbench.recording import record
 
 CARDS = {name: load_card(path) for name, path in shipped_cards().items()}
 DATA = [name for name, card in CARDS.items() if card.files]
@@ -48,7 +50,7 @@ def test_recipe_card_reads_its_own_log(name: str) -> None:
     assert card.recipe is not None
     assert {"t", "r", "y", "F", "u"} <= set(card.signals)
     assert all(spec.gain == 1.0 for spec in card.signals.values())
-    assert len(card.recipe.t) == 40001
+    assert len(card.recipe.t) == (30001 if name == "demo" else 40001)
 
 
 @pytest.mark.parametrize(("name", "file"), FILES)
@@ -71,6 +73,19 @@ def test_file_reads_to_plausible_values(
         if "temperature" in run:
             assert 299.0 < run["temperature"].min() < run["temperature"].max() + 1 < 315.0
             assert np.max(np.abs(run["u"])) <= 1.0
+
+
+def test_demo_has_an_effect_and_speeds_that_show_it() -> None:
+    recipe = CARDS["demo"].recipe
+    assert recipe is not None
+    (stribeck,) = recipe.plant.effects
+    assert stribeck.values == {"F_s": 3.5, "v_s": 0.05, "asymmetry": 0.0}
+    p = recipe.plant.friction
+    assert stribeck.values["v_s"] > 4 * max(p.dv_p, -p.dv_n)
+    v = np.abs(differentiate(record("demo", recipe)["y"], recipe.h).v)
+    assert 0.25 < np.quantile(v, 0.99) < 0.4
+    assert np.mean((v > p.dv_p) & (v < 0.1)) > 0.25
+    assert 0.1 < np.mean(v < p.dv_p) < 0.4
 
 
 def test_cards_are_found_without_any_data() -> None:

@@ -231,6 +231,7 @@ def test_arrays_given_are_not_changed() -> None:
         ({"pi": None}, "a force controller"),
         ({"h": 2e-3}, "sampled at 0.001 s"),
         ({"reference": np.zeros((4, 2))}, "shape"),
+        ({"reference": np.zeros(0)}, "shape"),
         ({"reference": np.array([0.0, np.nan])}, "finite"),
         ({"limit": 0.0}, "control limit 0 V"),
         ({"noise": noise(3)}, "noise of y"),

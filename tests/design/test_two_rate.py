@@ -5,6 +5,7 @@ import pytest
 
 from design.loop import ForcePI, LoopNoise, simulate_loop
 from design.pid import pid_to_rst
+from design.rst import RST
 from design.two_rate import simulate_two_rate
 from identification.errors import BadModel
 from identification.karnopp import Karnopp
@@ -59,3 +60,18 @@ def test_noise_of_another_length_is_refused() -> None:
     noise = LoopNoise(np.zeros(len(R) - 1), np.zeros(len(R) - 1))
     with pytest.raises(BadModel, match="noise of y"):
         simulate_two_rate(PLANT, controller, PI, R, 1e-3, noise=noise)
+
+
+@pytest.mark.parametrize("ratio", [3, 7])
+def test_between_its_samples_the_force_reference_is_held(ratio: int) -> None:
+    # A pure gain: the command must follow from the last position that it has looked at.
+    h, gain = 1e-3, 900.0
+    controller = RST(np.array([gain]), np.ones(1), np.array([gain]), ratio * h)
+    noise = LoopNoise.draw(len(R), 1e-5, 1e-2, np.random.default_rng(4))
+    run = simulate_two_rate(PLANT, controller, PI, R, h, noise=noise, y_0=0.02)
+    integral = 0.0
+    for k in range(300):
+        last = k - k % ratio
+        error = gain * (R[last] - run.y_measured[last]) - run.F_measured[k]
+        assert run.u[k] == pytest.approx(PI.k_i * error + integral, abs=1e-9)
+        integral += PI.k_i * h / PI.T_i * error

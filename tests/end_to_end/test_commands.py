@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from identification.effects import spring as spring_module
 from tests.chain import CARD, identified, short_recipe
 from workbench import demonstration
 from workbench.cli import COMMANDS, main
@@ -112,20 +113,78 @@ def test_predict_writes_the_columns_of_the_contract(
     assert as_json(capsys, [*by_force, "--out", out])["drive"] == "force"
 
 
+def test_effects_go_from_the_recipe_to_the_log_and_from_the_model_to_the_prediction(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "own").mkdir()
+    spring = Path(spring_module.__file__ or "").read_text(encoding="utf-8")
+    text = spring.replace('key="spring"', 'key="coil"')
+    (tmp_path / "own/coil.py").write_text(text, encoding="utf-8")
+    card = tmp_path / "card.toml"
+    card.write_text(f'{CARD}[recipe.effects.coil]\nk = "1.5 N/mm"\n', encoding="utf-8")
+    out, own = str(tmp_path / "log"), ["--effects", str(tmp_path / "own")]
+    said = refusal(capsys, ["simulate", str(card), "--out", out], 2)
+    assert "[recipe] effects: unknown effect 'coil'" in said
+    as_json(capsys, ["simulate", str(card), *own, "--out", out])
+    known = json.loads((tmp_path / "log/truth.json").read_text(encoding="utf-8"))
+    coil = known["effects"]["coil"]
+    bare = {"sd": None, "low": None, "high": None}
+    assert coil == {"k": {"value": 1500.0, "unit": "N/m", **bare}}
+    model = json.loads((shop / "id/model.json").read_text(encoding="utf-8"))
+    model["effects"]["coil"] = coil
+    (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
+    log = [str(tmp_path / "log/short.csv"), "--card", str(card), "--out", str(tmp_path / "p")]
+    said = refusal(capsys, ["predict", str(tmp_path / "model.json"), *log], 2)
+    assert "model.json: [effects] unknown effect 'coil'" in said and "--effects FOLDER" in said
+    plain = as_json(capsys, ["predict", str(shop / "id/model.json"), *log])
+    whole = as_json(capsys, ["predict", str(tmp_path / "model.json"), *log, *own])
+    assert whole["position_rms"] < 0.05 * plain["position_rms"]
+    assert whole["force_predicted_rms"] < 0.5 * plain["force_predicted_rms"]
+
+
+def test_a_shipped_recipe_with_an_effect_is_simulated(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = as_json(capsys, ["simulate", "demo", "--out", str(tmp_path / "d")])
+    assert (found["samples"], found["seed"]) == (30001, 4)
+    known = json.loads((tmp_path / "d/truth.json").read_text(encoding="utf-8"))
+    assert known["effects"]["stribeck"]["F_s"]["value"] == 3.5
+    assert "stribeck" not in (tmp_path / "d/demo.csv").read_text(encoding="utf-8")
+
+
 def test_design_writes_controllers(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert files(shop / "design") == {"design.json", "report.html"}
     model, out = str(shop / "id/model.json"), str(tmp_path / "d")
     asked = ["--poles", "15,0.9", "--auxiliary", "0.5,0.3+0.1j,0.3-0.1j"]
-    found = as_json(capsys, ["design", model, *asked, "--out", out])
-    assert found["rst"]["dominant"] == [15.0, 0.9]
+    found = as_json(capsys, ["design", model, *asked, "--out", out], status=1)
+    assert found["rst"]["missed"]
+    assert {name: one["value"] for name, one in found["rst"]["dominant"].items()} == {
+        "w_n": 15.0,
+        "zeta": 0.9,
+    }
     assert found["rst"]["auxiliary"] == [[0.5, 0.0], [0.3, 0.1], [0.3, -0.1]]
     assert (
         as_json(capsys, ["design", model, "--from", "arx", "--out", out])["plant"]["source"]
         == "arx"
     )
     assert as_json(capsys, ["design", model, "--no-integrator", "--out", out])["pid"] is None
+
+
+def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = ["design", str(shop / "id/model.json"), "--out", str(tmp_path / "d")]
+    asked = [*command, "--poles", "300,0.7"]
+    found = as_json(capsys, asked, status=1)
+    assert found["recommended"] == "none"
+    assert files(tmp_path / "d") == {"design.json", "report.html"}
+    assert any("modulus margin" in line for line in found["rst"]["missed"])
+    assert main(asked) == 1
+    shown = capsys.readouterr().out
+    assert "recommended: none" in shown and "RST misses: modulus margin" in shown
+    assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
 
 
 def test_validate_passes_and_fails_with_its_status(
@@ -135,7 +194,8 @@ def test_validate_passes_and_fails_with_its_status(
     command = ["validate", model, design, "--out", str(tmp_path / "v")]
     assert as_json(capsys, command)["passed"] is True
     assert files(tmp_path / "v") == {"validation.json", "report.html"}
-    assert as_json(capsys, [*command, "--standstill", "1e-7"], status=1)["passed"] is False
+    for limit in (["--standstill", "1e-7"], ["--overshoot", "1e-7"], ["--force", "0.1"]):
+        assert as_json(capsys, [*command, *limit], status=1)["passed"] is False
     both = as_json(capsys, [*command, "--plant", model])
     assert set(both["figures"]["rst"]) == {"model", "plant"}
 
@@ -158,6 +218,8 @@ def test_wrong_input_is_one_line_and_writes_nothing(
     (tmp_path / "flat.csv").write_text(
         "t,r,y,F,u\n" + "\n".join(f"{k * 0.001},0,0.5,1,0" for k in range(300)), encoding="utf-8"
     )
+    turns = CARD.replace('kind = "force"', 'kind = "force"\nmotion = "rotary"', 1)
+    (tmp_path / "turns.toml").write_text(turns, encoding="utf-8")
     (tmp_path / "bad.json").write_text('{"schema": "model/1"}', encoding="utf-8")
     cases = (
         (["identify", "no.csv", "--card", card], "no such file"),
@@ -167,19 +229,22 @@ def test_wrong_input_is_one_line_and_writes_nothing(
         (["identify", log, "--card", card, "--orders", "3,2"], "na,nb,nk needed"),
         (["identify", log, "--card", card, "--design-period", "1e-4"], "sampled every"),
         (["identify", "--card", card], "Missing argument"),
+        (["identify", log, "--card", card, "--card", "emps"], "--card is given 2 times"),
+        (["predict", model, log, "--card", str(tmp_path / "turns.toml")], "of a linear machine"),
         (["predict", model, "no.csv", "--card", card], "no such file"),
         (["predict", log, log, "--card", card], "is not JSON"),
         (["predict", model, log, "--card", card, "--window", "1e-9"], "window"),
-        (["design", design], "schema 'design/1', 'model/1' needed"),
+        (["design", design], "schema 'design/2', 'model/1' needed"),
         (["design", str(tmp_path / "bad.json")], "has no 'card'"),
         (["design", model, "--poles", "15"], "w_n,zeta needed"),
         (["design", model, "--poles", "15,-1"], "damping"),
         (["design", model, "--auxiliary", "1.5"], "not stable"),
         (["design", model, "--auxiliary", "0.5,x"], "values of z needed"),
-        (["validate", model, model], "schema 'model/1', 'design/1' needed"),
+        (["validate", model, model], "schema 'model/1', 'design/2' needed"),
         (["validate", str(tmp_path / "none.json"), design], "no such file"),
         (["simulate", "emps"], "has no [recipe]"),
-        (["simulate", "demo"], "effects stribeck cannot be simulated yet"),
+        (["simulate", card, "--effects", str(tmp_path / "none")], "none: no such folder"),
+        (["predict", model, log, "--card", card, "--effects", log], "short.csv: is a file"),
     )
     for arguments, needed in cases:
         assert needed in refusal(capsys, [*arguments, "--out", str(out)], 2), arguments
@@ -197,7 +262,10 @@ def test_options_that_are_no_finite_positive_number_are_refused(
         ("identify", log, "--card", card): ("--design-period",),
         ("predict", model, log, "--card", card): ("--window",),
         ("design", model): ("--design-period", "--modulus", "--delay"),
-        ("validate", model, design): ("--modulus", "--delay", "--standstill", "--tracking"),
+        ("validate", model, design): (
+            *("--modulus", "--delay", "--standstill", "--tracking"),
+            *("--overshoot", "--force"),
+        ),
     }
     for command, options in cases.items():
         for option in options:
@@ -232,6 +300,10 @@ def test_a_model_without_a_plant_is_a_refusal(
     text = refusal(capsys, command, 1)
     assert text.startswith("refused: no ARX plant")
     assert not out.exists()
+    assert main([*command, "--json"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == "refused"
+    assert found["reason"].startswith("no ARX plant")
 
 
 def test_a_demo_that_fails_says_so_by_its_status(
@@ -245,7 +317,9 @@ def test_a_demo_that_fails_says_so_by_its_status(
     known = truth(card.name, recipe)
     failed = Demonstration(model, found, result, traces, known)
     monkeypatch.setattr(demonstration, "demonstrate", lambda *_: failed)
-    assert as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)["passed"] is False
+    shown = as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)
+    assert shown["passed"] is False
+    assert shown["reason"].startswith("RST on the model: error at standstill")
 
 
 def test_demo_runs_the_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -61,7 +61,8 @@ def test_jittered_clock_becomes_even_and_keeps_lines_and_range(
     (run,) = even_clock(log)
     assert np.ptp(np.diff(run["t"])) < 1e-9 * h * 300
     assert run["t"][0] == t[0]
-    assert t[-1] - h < run["t"][-1] + 1e-5 * h
+    # The period is the median one, by jitter and rounding a little more or less than h.
+    assert t[-1] - h < run["t"][-1] + 1e-2 * h
     np.testing.assert_allclose(run["y"], 3.0 * run["t"] - 1.0, atol=1e-9 * h * 300)
     assert values.min() <= run["F"].min()
     assert run["F"].max() <= values.max()

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy.io
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 
@@ -252,3 +253,101 @@ def test_header_that_is_not_utf8(tmp_path: Path) -> None:
     assert "byte 0xf6 in line 1" in message
     assert 'encoding = "latin-1"' in message
     assert "unknown" in refusal(path, CARD + '[file]\nencoding = "latin-99"\n')
+
+
+def test_lines_before_the_header_say_what_to_skip(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    rows = path.read_text("utf-8")
+    path.write_text("Logger 3.1\nDate: 2024-01-01\n\n" + rows, "utf-8")
+    message = refusal(path)
+    assert "line 1 ('Logger 3.1') is no header of the 3 columns below; set skip_rows = 3" in message
+    assert len(read_log(path, card(tmp_path, CARD + "[file]\nskip_rows = 3\n"))) == 400
+    path.write_text("% made by x\n" + rows, "utf-8")
+    assert "set skip_rows = 1 in the card's [file], or comment" in refusal(path)
+    assert len(read_log(path, card(tmp_path, CARD + '[file]\ncomment = "%"\n'))) == 400
+
+
+def test_a_row_of_units_below_the_header(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("\n", "\ns,m,N\n", 1), "utf-8")
+    assert "'s' is not a number; if it is a row of units" in refusal(path)
+    by_number = CARD
+    for number, name in enumerate("tyF"):
+        by_number = by_number.replace(f'column = "{name}"', f"column = {number}")
+    assert len(read_log(path, card(tmp_path, by_number + "[file]\nskip_rows = 1\n"))) == 400
+
+
+@pytest.mark.parametrize("text", ["00:00:01.002", "2024-01-01 00:00", "2024/01/01"])
+def test_times_as_dates_or_clocks(tmp_path: Path, text: str) -> None:
+    message = refusal(edited(tmp_path, 57, lambda f: [text, *f[1:]]))
+    assert "log times in seconds, not as dates or clock times" in message
+
+
+def test_a_column_name_that_is_there_twice(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    path.write_text(path.read_text("utf-8").replace("t,y,F", "t,y,y", 1), "utf-8")
+    text = CARD.replace('column = "F"', "column = 2")
+    assert "columns 1 and 2 (counted from 0) are all named 'y'" in refusal(path, text)
+    assert len(read_log(path, card(tmp_path, text.replace('column = "y"', "column = 1")))) == 400
+
+
+@pytest.mark.parametrize(
+    ("magic", "needed"),
+    [
+        (b"\x1f\x8b", "gzip"),
+        (b"BZh9", "bzip2"),
+        (b"\xfd7zXZ\0", "xz"),
+        (b"PK\x03\x04", "save its sheet as CSV"),
+        (b"\xd0\xcf\x11\xe0", "old Excel workbook"),
+    ],
+)
+@pytest.mark.parametrize("name", ["a.csv", "a.csv.gz", "a.xlsx", "a.zip"])
+def test_packed_files_say_how_to_unpack(
+    tmp_path: Path, magic: bytes, needed: str, name: str
+) -> None:
+    (tmp_path / name).write_bytes(magic + bytes(range(256)))
+    assert needed in refusal(tmp_path / name)
+
+
+def test_another_format_than_the_card_says(tmp_path: Path) -> None:
+    for form in ("parquet", "mat", "hdf5", "json"):
+        message = refusal(with_columns(tmp_path), CARD + f'[file]\nformat = "{form}"\n')
+        assert f"is not a {form} file by its first bytes, which the card's [file]" in message
+
+
+def test_decimal_commas_between_commas(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    lines = [line.split(",") for line in path.read_text("utf-8").splitlines()]
+    bare = [lines[0], *([field.replace(".", ",") for field in line] for line in lines[1:])]
+    path.write_text("\n".join(",".join(line) for line in bare), "utf-8")
+    assert "if the numbers have decimal commas, export with ';'" in refusal(path)
+    quoted = "\n".join(",".join(f'"{field}"' for field in line) for line in bare)
+    path.write_text(quoted, "utf-8")
+    np.testing.assert_array_equal(read_log(path, card(tmp_path))["y"], signals()["y"])
+
+
+def test_rows_that_end_in_a_delimiter(tmp_path: Path) -> None:
+    path = with_columns(tmp_path)
+    header, *rows = path.read_text("utf-8").splitlines()
+    path.write_text("\n".join([header, *(f"{row}," for row in rows)]), "utf-8")
+    assert "4 fields, 3 needed (400 such rows); the header has one name too few" in refusal(path)
+    path.write_text("\n".join(f"{row}," for row in [header, *rows]), "utf-8")
+    assert len(read_log(path, card(tmp_path))) == 400
+
+
+@pytest.mark.parametrize(("old", "new"), [(",", "|"), ("\n", "\r"), ("\n", "\r\n")])
+def test_other_delimiters_and_line_ends_are_read(tmp_path: Path, old: str, new: str) -> None:
+    path = with_columns(tmp_path)
+    path.write_bytes(path.read_bytes().replace(old.encode(), new.encode()))
+    np.testing.assert_array_equal(read_log(path, card(tmp_path))["y"], signals()["y"])
+
+
+def test_a_text_in_a_mat_file_is_shown_plainly(tmp_path: Path) -> None:
+    columns: dict[str, object] = {**signals(), "y": "hello"}
+    scipy.io.savemat(str(tmp_path / "a.mat"), columns)
+    assert "row 1: 'hello' is not a number" in refusal(tmp_path / "a.mat")
+
+
+def test_a_page_of_html_is_no_log(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("<html><body>404 not found</body></html>", "utf-8")
+    assert "no rows below the header '<html><body>404" in refusal(tmp_path / "a.csv")

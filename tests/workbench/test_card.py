@@ -78,6 +78,7 @@ def test_a_file_overrides_the_rig(tmp_path: Path) -> None:
         ("[signals]", "[signal]", "unknown key 'signal'", "did you mean 'signals'?"),
         ('source = "here"', 'licens = "x"', "[card] unknown key 'licens'", "'licence'?"),
         ("p_p = {", "P_p = {", "needs signals.p_p", "did you mean 'P_p'?"),
+        ("p_n = {", "x = {", "needs signals.p_n", 'add p_n = { column = "<its name in the log>"'),
     ],
 )
 def test_unknown_key_names_the_nearest(
@@ -101,6 +102,18 @@ def test_unknown_key_names_the_nearest(
         ('unit = "V"', 'unit = "V", gain = 0', "gain must not be 0"),
         ('unit = "V"', 'unit = "V", signed = true', "needs bits"),
         ('name = "bench-a"', 'name = "a/../b"', "[card.name]"),
+        ('unit = "V"', 'unit = "V", gain = true', "[signals.u] gain needs a value, not true"),
+        ('unit = "V"', 'unit = "V", gain = [2]', "[signals.u.gain] [2]: a number, or a text with"),
+        ('unit = "V"', 'unit = "V", gain = "0 V/V"', "gain must not be 0"),
+        ('unit = "V"', 'unit = "V", gain = ""', "gain is empty"),
+        ('unit = "V"', "unit = 3", "[signals.u.unit] 3: a text in quotes needed"),
+        ('column = "control_v"', 'column = ["a"]', "[signals.u.column] ['a']: the column's name"),
+        ('{ column = "control_v", unit = "V" }', '"v"', "a table { column = ..., unit = ... }"),
+        ("[-0.15, 0.15]", "[-0.15]", "[rig.stroke_m] has too few values"),
+        ("[-0.15, 0.15]", "0.15", "[rig.stroke_m] 0.15: a list [...] needed"),
+        ("12.6e-4", '"large"', "[rig.area_p_m2] 'large': a number needed"),
+        ('[card]\nname = "bench-a"\nsource = "here"\n', "", "has no table [card]"),
+        ('"position_m", unit', '"time_s", unit', "signals.t and signals.y are both read from"),
         ("[card]", "[card", "is not TOML"),
     ],
 )

@@ -1,6 +1,7 @@
 """The command line: lazy, and every error one line with its exit status."""
 
 import errno
+import json
 import os
 import subprocess
 import sys
@@ -37,7 +38,9 @@ def outcome(monkeypatch: pytest.MonkeyPatch) -> Iterator[Fail]:
 
     @click.command()
     @click.option("--size", type=int)
-    def command(size: int | None) -> int | None:
+    @click.option("--json", is_flag=True, expose_value=False)
+    @click.argument("name", required=False)
+    def command(size: int | None, name: str | None) -> int | None:
         if isinstance(ends[0], BaseException):
             raise ends[0]
         return ends[0]
@@ -132,6 +135,30 @@ def test_error_is_one_line(
     assert capsys.readouterr() == ("", line + "\n")
 
 
+def test_a_refusal_asked_as_json_is_an_object(
+    outcome: Fail, capsys: pytest.CaptureFixture[str]
+) -> None:
+    outcome(NotIdentifiable("run 3: no breakaway\nin the negative direction"))
+    assert cli.main(["probe", "--json"]) == 1
+    shown = capsys.readouterr()
+    reason = "run 3: no breakaway in the negative direction"
+    assert json.loads(shown.out) == {"verdict": "refused", "reason": reason}
+    assert shown.err == f"refused: {reason}\n"
+    assert cli.main(["probe", "--", "--json"]) == 1
+    assert capsys.readouterr().out == ""
+
+
+@pytest.mark.parametrize("error", [BadLog("a: empty"), ZeroDivisionError(), KeyboardInterrupt()])
+def test_an_error_asked_as_json_leaves_standard_output_empty(
+    outcome: Fail, capsys: pytest.CaptureFixture[str], error: BaseException
+) -> None:
+    outcome(error)
+    assert cli.main(["probe", "--json"]) > 1
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
+
+
 @pytest.mark.parametrize("number", [errno.ENOSPC, errno.EACCES, errno.EROFS])
 def test_disk_error_says_what_to_do(
     outcome: Fail, capsys: pytest.CaptureFixture[str], number: int
@@ -172,7 +199,7 @@ def test_debug_shows_the_traceback(
         (["xyzzy"], "No such command 'xyzzy'. See 'workbench --help'."),
         (["probe", "--siz", "3"], "'--size'"),
         (["probe", "--size", "three"], "'three' is not a valid integer"),
-        (["probe", "extra"], "See 'workbench probe --help'."),
+        (["probe", "one", "extra"], "See 'workbench probe --help'."),
     ],
 )
 def test_usage_error_is_one_line(

@@ -1,6 +1,7 @@
 """Where cards and data are found, and what is said when they are not."""
 
 import hashlib
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -70,6 +71,16 @@ def test_unknown_names_and_missing_urls(card: Card) -> None:
         find_data("run11.csv", card)
     with pytest.raises(BadLog, match="without a url"):
         find_data("run2.csv", card)
+
+
+def test_a_missing_log_without_a_set_names_its_neighbours(card: Card, tmp_path: Path) -> None:
+    bare = replace(card, files=())
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "run7.csv").write_bytes(b"x")
+    with pytest.raises(BadLog, match=r"logs/run77.csv: no such file; did you mean 'run7.csv'\?"):
+        find_data("logs/run77.csv", bare)
+    with pytest.raises(BadLog, match=r"no such file; there is no folder 'log' either"):
+        find_data("log/run7.csv", bare)
 
 
 def test_offline_says_what_to_do(

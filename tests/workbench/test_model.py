@@ -9,13 +9,16 @@ import pytest
 
 from identification.errors import BadModel
 from identification.karnopp import Karnopp
+from identification.library import built_in
 from identification.plant import Actuator, Motor
 from identification.result import Estimate
 from tests.chain import EMPS, TABLES, identified, model_of
+from workbench.effect_values import effect_units, relabelled
 from workbench.model import Model, model_document, read_model
 from workbench.output import dumps
 
 ACTUATOR = Actuator(19530.0, 10405.0)
+SPRING = {"value": 5.0, "unit": "N/m", "sd": 0.1, "low": 4.8, "high": 5.2}
 
 
 def written(folder: Path, document: Any) -> Path:
@@ -49,6 +52,53 @@ def test_an_identified_model_comes_back_as_it_was(tmp_path: Path) -> None:
     assert found.plant is not None and model.plant is not None
     assert found.plant.A == model.plant.A
     assert found.log[0].start == model.log[0].start
+
+
+def test_effects_come_back_and_are_simulated(tmp_path: Path) -> None:
+    stribeck = {
+        "F_s": Estimate(4.0, "N", 0.1, 3.8, 4.2),
+        "v_s": Estimate(None, "m/s", reason="too fast", assumed=0.03),
+    }
+    model = replace(model_of(TABLES["paper_table1"], ACTUATOR), effects={"stribeck": stribeck})
+    document = model_document(model)
+    assert document["effects"]["stribeck"]["F_s"] == {
+        **{"value": 4.0, "unit": "N", "sd": 0.1, "low": 3.8, "high": 4.2}
+    }
+    found = read_model(written(tmp_path, document))
+    assert model_document(found) == document
+    (one,) = found.simulated.effects
+    assert (one.key, one.p) == ("stribeck", (4.0, 0.03, 0.0))
+
+
+def test_effects_are_converted_when_read(tmp_path: Path, document: dict[str, Any]) -> None:
+    v_s = {"value": 30.0, "unit": "mm/s", "sd": 1.0, "low": 28.0, "high": 32.0}
+    power = {"value": 2.0, "unit": "N (s/mm)**n", "sd": None, "low": None, "high": None}
+    bare = {"sd": None, "low": None, "high": None}
+    document["effects"] = {
+        "stribeck": {"F_s": {"value": 4e-3, "unit": "kN", **bare}, "v_s": v_s},
+        "nonlinear_viscous": {"k": power, "n": {"value": 1.5, "unit": "1", **bare}},
+    }
+    found = read_model(written(tmp_path, document))
+    stribeck, viscous = found.simulated.effects
+    assert stribeck.values == pytest.approx({"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0})
+    assert viscous.values["k"] == pytest.approx(2.0 * 1e3**1.5)
+    assert found.effects["nonlinear_viscous"]["k"].unit == "N (s/m)**n"
+    assert found.effects["stribeck"]["v_s"].sd == pytest.approx(1e-3)
+
+
+def test_a_rotary_machine_s_effects_have_rotary_units() -> None:
+    library = built_in()
+    units = {key: effect_units(library[key], "rotary") for key in library}
+    assert units["spring"] == {"k": "N m/rad"}
+    assert units["compliance"] == {"flexibility": "rad/(N m)"}
+    assert units["warmup"]["b"] == "N m s/rad"
+    assert units["nonlinear_viscous"]["k"] == "N m (s/rad)**n"
+    assert units["position_dependent_friction"]["c2"] == "N m/rad**2"
+    assert units["sensor_nonlinearity"] == {"a": "1/rad", "b": "1/rad**2"}
+    assert units["end_cushion"]["y_p"] == "rad"
+    assert units["input_delay"] == {"tau": "s"}
+    given = {"k": Estimate(3.0, "N/m", 0.1)}
+    assert relabelled(library["spring"], given, "rotary") == {"k": Estimate(3.0, "N m/rad", 0.1)}
 
 
 def test_a_motor_comes_back(tmp_path: Path) -> None:
@@ -90,7 +140,14 @@ def test_a_known_parameter_has_the_keys_of_the_contract(document: dict[str, Any]
         ({"schema": None}, "no 'schema'"),
         ({"card": 3}, "[card] 3"),
         ({"effects": {"spring": {"k": "stiff"}}}, "effects.spring.k"),
-        ({"effects": {"spring": {"k": 5.0}}}, "[effects] spring cannot be simulated yet"),
+        ({"effects": {"spring": {"k": 5.0}}}, "[effects.spring.k] 5.0: input should be an object"),
+        ({"effects": {"spring": {"K": SPRING}}}, "spring: unknown parameter 'K'; did you mean 'k'"),
+        ({"effects": {"sprung": {"k": SPRING}}}, "unknown effect 'sprung'; did you mean 'spring'?"),
+        ({"effects": {"spring": {}}}, "[effects] spring has no 'k' [N/m]"),
+        ({"effects": {"spring": {"k": {**SPRING, "unit": "N"}}}}, "[effects.spring.k] unit 'N' is"),
+        ({"effects": {"spring": {"k": {**SPRING, "value": None}}}}, "[effects.spring.k] is null"),
+        ({"effects": {"spring": {"k": {**SPRING, "low": 9.0}}}}, "[effects.spring.k] low = 9"),
+        ({"effects": {"spring": {"k": {**SPRING, "value": -5e9}}}}, "must lie in [-1e+07, 1e+07]"),
     ],
 )
 def test_wrong_keys_and_values(
@@ -128,6 +185,25 @@ def test_an_unknown_key_in_depth_is_placed(tmp_path: Path, document: dict[str, A
 def test_null_needs_a_reason_and_a_stand_in(tmp_path: Path, document: dict[str, Any]) -> None:
     document["friction"]["m"] = {"value": None, "unit": "kg", "sd": None}
     assert "[friction.m] is null; it needs a 'reason'" in refused(tmp_path, document)
+
+
+@pytest.mark.parametrize(
+    ("change", "needed"),
+    [
+        ({"log": []}, "[log] is empty; at least one run needed"),
+        ({"log": [{"h": 0.0}]}, "[log] h = 0 s, must be > 0"),
+        ({"log": [{"duration": -1.0}]}, "[log] duration = -1 s, must be > 0"),
+        ({"fit": {"noise_y": -1e-5}}, "[fit] noise_y = -1e-05, must be 0 or more"),
+    ],
+)
+def test_numbers_that_no_fit_has(
+    tmp_path: Path, document: dict[str, Any], change: dict[str, Any], needed: str
+) -> None:
+    if change.get("log"):
+        change = {"log": [{**document["log"][0], **change["log"][0]}]}
+    elif "fit" in change:
+        change = {"fit": {**document["fit"], **change["fit"]}}
+    assert needed in refused(tmp_path, {**document, **change})
 
 
 def test_a_wrong_sign_is_refused(tmp_path: Path, document: dict[str, Any]) -> None:
@@ -176,3 +252,41 @@ def test_travel_is_that_of_all_logs() -> None:
     model: Model = model_of(Karnopp(1, 1, 1, 1, 1, 0.1, -0.1, 2, -2), ACTUATOR)
     wide = replace(model.log[0], travel=(-0.3, 0.05))
     assert replace(model, log=(model.log[0], wide)).travel == (-0.3, 0.1)
+
+
+def test_units_are_converted_when_read(tmp_path: Path, document: dict[str, Any]) -> None:
+    mass = dict(document["friction"]["m"])
+    grams = {key: 1e3 * value for key, value in mass.items() if key != "unit"}
+    document["friction"]["m"] = {**grams, "unit": "g"}
+    gain = document["actuator"]["k1"]["value"]
+    document["actuator"]["k1"] |= {"value": 1e-3 * gain, "unit": "kN/(V s)"}
+    blank = {"value": None, "unit": "kN", "reason": "no breakaway", "assumed": 0.02}
+    document["friction"]["F_sp"] = blank
+    found = read_model(written(tmp_path, document))
+    for key in ("value", "sd", "low", "high"):
+        assert getattr(found.friction["m"], key) == pytest.approx(mass[key], rel=1e-12)
+    assert found.friction["m"].unit == "kg"
+    assert found.karnopp.F_sp == pytest.approx(20.0)
+    assert found.actuator is not None
+    assert found.actuator["k1"].value == pytest.approx(gain)
+
+
+@pytest.mark.parametrize(
+    ("table", "name", "unit", "needed"),
+    [
+        ("friction", "m", "N", "[friction.m] unit 'N' is of another kind than 'kg'"),
+        ("friction", "F_vp", "N m", "[friction.F_vp] unit 'N m' is of another kind than 'N s/m'"),
+        ("friction", "m", "kq", "[friction.m] unit 'kq' is unknown"),
+        ("actuator", "k2", "N/V", "[actuator.k2] unit 'N/V' is of another kind than 'N/m'"),
+    ],
+)
+def test_units_of_another_kind_are_refused(
+    tmp_path: Path, document: dict[str, Any], table: str, name: str, unit: str, needed: str
+) -> None:
+    document[table][name]["unit"] = unit
+    assert needed in refused(tmp_path, document)
+
+
+def test_a_rotary_model_has_rotary_units(tmp_path: Path, document: dict[str, Any]) -> None:
+    document["rig"]["motion"] = "rotary"
+    assert "'kg' is of another kind than 'kg m^2'" in refused(tmp_path, document)

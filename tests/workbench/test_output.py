@@ -129,7 +129,7 @@ def test_out_that_is_a_file_is_refused() -> None:
     Path("old").write_text("mine")
     with pytest.raises(BadOutput, match="is a file"):
         OutputFolder("identify", Path("old"), now=NOW).__enter__()
-    with pytest.raises(NotADirectoryError):
+    with pytest.raises(BadOutput, match="--out old/below: cannot be made there"):
         OutputFolder("identify", Path("old/below"), now=NOW).__enter__()
     assert Path("old").read_text() == "mine"
 

@@ -10,7 +10,7 @@ import pytest
 
 from design.loop import LoopRun
 from design.tune import Asked, Goals
-from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable
+from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
 from identification.karnopp import NAMES
 from identification.log import Log, Rig
 from identification.plant import Actuator
@@ -29,6 +29,7 @@ from workbench.identifying import (
 from workbench.model import Model
 from workbench.output import dumps
 from workbench.predicting import COLUMNS, predict, prediction_csv
+from workbench.recipe import PID
 from workbench.recording import record, truth
 from workbench.tuning import corners, design, effort_limit, linear_of
 from workbench.validating import Limits, validate, validation_document
@@ -138,7 +139,7 @@ def test_goals_are_taken() -> None:
     assert strict.margins.modulus >= 0.6
     assert strict.dominant[0] < easy.dominant[0]
     limit = effort_limit(model)
-    assert limit == pytest.approx(20 * np.log10(0.2 * 17.55 / 1e-5))
+    assert limit == pytest.approx(20 * np.log10(0.05 * 17.55 / 1e-5))
 
 
 def without_mass(model: Model) -> Model:
@@ -189,7 +190,7 @@ def test_limits_are_taken() -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
     found = design(model)
     for limits in (Limits(modulus=0.95), Limits(delay=9.0), Limits(standstill=1e-6),
-                   Limits(tracking=1e-3)):  # fmt: skip
+                   Limits(tracking=1e-3), Limits(overshoot=1e-6), Limits(force=0.5)):  # fmt: skip
         result, _ = validate(model, found, rng(), limits=limits)
         assert not result.passed
         assert len(result.figures[result.judged]["model"].missed) == 1
@@ -251,7 +252,20 @@ def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
     assert set(one.signals) == {"t", "r", "y", "F", "u"}
     known = truth("x", recipe, 2)
     assert known["seed"] == 2
-    assert known["friction"]["F_sn"] == {"value": -23.0, "unit": "N"}
+    bare = {"sd": None, "low": None, "high": None}
+    assert known["friction"]["F_sn"] == {"value": -23.0, "unit": "N", **bare}
+    assert known["actuator"]["k1"] == {"value": 19530.0, "unit": "N/(V s)", **bare}
+    turning = truth("x", recipe, 2, motion="rotary")
+    assert turning["friction"]["F_vp"]["unit"] == "N m s/rad"
+    assert turning["actuator"]["k2"]["unit"] == "N m/rad"
+
+
+def test_a_loop_that_runs_away_is_no_log() -> None:
+    _, recipe = short_recipe(1.0)
+    assert recipe.loop is not None
+    wild = replace(recipe.loop, position=PID(1e9, 0.018, 0.072, 0.2), control_limit=None)
+    with pytest.raises(BadCard, match=r"runs away after 0\.0\d+ s"):
+        record("wild", replace(recipe, loop=wild))
 
 
 def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
@@ -268,7 +282,9 @@ def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -
     assert np.max(np.abs(run_loop(motor, found, found.rst, r, rng()).u)) <= 1e-3
 
 
-@pytest.mark.parametrize("name", ["standstill", "tracking", "modulus", "delay"])
+@pytest.mark.parametrize(
+    "name", ["standstill", "tracking", "modulus", "delay", "overshoot", "force"]
+)
 def test_a_limit_that_is_no_number_is_never_kept(name: str) -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
     result, _ = validate(model, design(model), rng(), limits=Limits(**{name: np.nan}))

@@ -38,7 +38,7 @@ def test_a_recipe_is_read_whole(tmp_path: Path) -> None:
     found = recipe(tmp_path, RECIPE)
     assert found.plant.friction.F_sn == -23.0
     assert found.plant.actuator == Actuator(19530.0, 10405.0)
-    assert found.plant.effects["spring"]["k"] == 3.0
+    assert [(one.key, one.values) for one in found.plant.effects] == [("spring", {"k": 3.0})]
     assert found.reference == Steps((0.0, 0.1), 0.5)
     assert found.loop is not None
     assert found.loop.position == PD(200.0, 0.1, 0.2)
@@ -96,6 +96,60 @@ def test_every_position_controller(tmp_path: Path, text: str, value: object) -> 
     assert loop.position == value
 
 
+@pytest.mark.parametrize(
+    ("written", "key", "values"),
+    [
+        (
+            'stribeck = { F_s = "4 N", v_s = "30 mm/s" }',
+            "stribeck",
+            {"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0},
+        ),
+        ('input_delay = { tau = "12 ms" }', "input_delay", {"tau": 0.012}),
+        (
+            'load_dependent_friction = { mu = "10 %", asymmetry = -0.1 }',
+            "load_dependent_friction",
+            {"mu": 0.1, "asymmetry": -0.1},
+        ),
+        (
+            'nonlinear_viscous = { k = "0.1 N (s/mm)**2", n = "2" }',
+            "nonlinear_viscous",
+            {"k": 1e5, "n": 2.0, "asymmetry": 0.0},
+        ),
+    ],
+)
+def test_effects_are_written_in_any_unit(
+    tmp_path: Path, written: str, key: str, values: dict[str, float]
+) -> None:
+    (one,) = recipe(tmp_path, RECIPE.replace("spring = { k = 3.0 }", written)).plant.effects
+    assert one.key == key
+    assert one.values == pytest.approx(values, rel=1e-12)
+
+
+def test_a_rotary_recipe_writes_its_effects_in_rad_and_newton_metres(tmp_path: Path) -> None:
+    turning = HEAD.replace('kind = "force"', 'kind = "force"\nmotion = "rotary"')
+    path = tmp_path / "card.toml"
+    for unit, needed in (("N m/rad", None), ("N/m", "another kind than 'N m/rad'")):
+        text = RECIPE.replace("k = 3.0", f'k = "3 {unit}"')
+        path.write_text(turning + text, encoding="utf-8")
+        if needed is None:
+            found = load_card(path).recipe
+            assert found is not None
+            assert found.plant.effects[0].values == {"k": 3.0}
+        else:
+            with pytest.raises(BadCard, match=needed):
+                load_card(path)
+
+
+def test_a_log_s_card_needs_no_effect_of_its_recipe(tmp_path: Path) -> None:
+    path = tmp_path / "card.toml"
+    path.write_text(HEAD + RECIPE.replace("spring", "magnet"), encoding="utf-8")
+    with pytest.raises(BadCard, match="--effects FOLDER"):
+        load_card(path)
+    found = load_card(path, with_recipe=False)
+    assert found.recipe is None
+    assert set(found.signals) == {"t", "r", "y", "F", "u"}
+
+
 def test_open_loop_by_command_and_motor(tmp_path: Path) -> None:
     lines = [line for line in RECIPE.splitlines() if not line.startswith(("loop", "actuator"))]
     text = "\n".join([*lines, 'drive = "command"', "motor = { k_a = 35.15 }"])
@@ -118,6 +172,27 @@ def test_open_loop_by_command_and_motor(tmp_path: Path) -> None:
         ("seed = 7", 'drive = "command"', "needs a 'loop'"),
         (", force = { k_i = 0.02, T_i = 0.05 }", "", "needs loop.force with an actuator"),
         ("h_s = 1e-3", "h_s = 0", "[recipe.h_s] 0: "),
+        ("duration_s = 2.0", "duration_s = 1e-4", "makes 0.1 samples, 100 to 1e+08 needed"),
+        ("duration_s = 2.0", "duration_s = 1e15", "makes 1e+18 samples"),
+        (
+            'kind = "steps", levels = [0.0, 0.1], dwell_s = 0.5',
+            'kind = "sum", parts = [{ kind = "multisine", amplitude = 1, low_hz = 1, '
+            "high_hz = 600 }]",
+            "high_hz = 600 is not below half the sampling rate (500 Hz",
+        ),
+        ("h_s = 1e-3", "h_s = true", "[recipe] h_s needs a value, not true or false"),
+        ("levels = [0.0, 0.1]", "levels = 0.1", "[recipe.reference.steps.levels] 0.1: a list"),
+        ("spring", "sprung", "[recipe] effects: unknown effect 'sprung'; did you mean 'spring'?"),
+        ("{ k = 3.0 }", "{ K = 3.0 }", "spring: unknown parameter 'K'; did you mean 'k'?"),
+        ("{ k = 3.0 }", "{}", "effects: spring has no 'k' [N/m]"),
+        ("{ k = 3.0 }", "3.0", "[recipe.effects.spring] 3.0: a table"),
+        ("{ k = 3.0 }", "{ k = true }", "spring.k = True: a number in 'N/m' or a text"),
+        ("{ k = 3.0 }", "{ k = [1] }", "spring.k = [1]: a number in 'N/m' or a text"),
+        ("{ k = 3.0 }", "{ k = nan }", "effect 'spring': k = nan N/m, must lie in"),
+        ("{ k = 3.0 }", '{ k = "3 N" }', "spring.k: unit 'N' is of another kind than 'N/m'"),
+        ("{ k = 3.0 }", '{ k = "3 N/q" }', "spring.k: unit 'N/q' is unknown"),
+        ("{ k = 3.0 }", '{ k = "stiff" }', "spring.k = 'stiff': no number with a unit"),
+        ("{ k = 3.0 }", "{ k = -1e99 }", "k = -1e+99 N/m, must lie in"),
     ],
 )
 def test_contradictions_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:

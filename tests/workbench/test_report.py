@@ -1,6 +1,7 @@
 """Reports: whole, self-contained, labelled, small; lines keep their peaks."""
 
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
 
 import numpy as np
@@ -8,12 +9,15 @@ import pytest
 
 from identification.plant import Actuator
 from tests.chain import TABLES, identified, model_of
+from workbench.parameter_units import actuator_units, friction_units
+from workbench.pipeline import Identified
 from workbench.report.figures import POINTS, spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_report, identification_report, validation_report
 from workbench.tuning import design
 from workbench.validating import validate
+from workbench.validation_views import validation_lines
 
 LARGEST = 2_000_000
 VOID = {"meta", "br", "img", "hr"}
@@ -58,6 +62,40 @@ def test_identification_report() -> None:
     for text in ("position [m]", "applied force [N]", "velocity [m/s]", "friction force [N]",
                  "time [s]", "moving mass", "95 % interval", "short.csv", "a remark"):  # fmt: skip
         assert text in html
+
+
+def test_a_rotary_report_shows_rotary_units() -> None:
+    found = turned(identified())
+    html = checked(identification_report(found), 3)
+    for text in ("position [rad]", "applied force [N m]", "velocity [rad/s]", "N m s/rad",
+                 "kg m^2", "moment of inertia", "breakaway torque", "N m/(V s)"):  # fmt: skip
+        assert text in html
+    for text in ("[m]", "[N]", "[m/s]", ">kg<", ">N s/m<", "moving mass", " m rms", " N/m "):
+        assert text not in html
+
+
+def turned(found: Identified) -> Identified:
+    """The same numbers as those of a rotary machine."""
+    model = found.model
+    friction, actuator = friction_units("rotary"), actuator_units("rotary")
+    turning = replace(
+        model,
+        rig=replace(model.rig, motion="rotary"),
+        friction={name: replace(e, unit=friction[name]) for name, e in model.friction.items()},
+        actuator={n: replace(e, unit=actuator[n]) for n, e in (model.actuator or {}).items()},
+    )
+    return replace(found, model=turning)
+
+
+def test_a_rotary_design_and_validation_show_rotary_units() -> None:
+    model = turned(identified()).model
+    found = design(model)
+    html = checked(design_report(found, model.rotary), 2)
+    assert "[dB, N m/rad]" in html and " V/(N m)," in html
+    assert "N/m" not in html and "V/N," not in html
+    result, _ = validate(model, found, np.random.default_rng(0))
+    assert any(re.match(r"steps of [\d.]+ rad;", line) for line in validation_lines(result, True))
+    assert any(re.match(r"steps of [\d.]+ m;", line) for line in validation_lines(result))
 
 
 def test_design_report() -> None:

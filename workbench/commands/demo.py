@@ -31,6 +31,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     from workbench.model import model_document
     from workbench.report.reports import design_report, identification_report, validation_report
     from workbench.validating import validation_document
+    from workbench.validation_views import missed
 
     card = load_card(card_path(RECIPE))
     with OutputFolder("demo", out, now=datetime.now()) as folder:
@@ -42,7 +43,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
         folder.write_json("validation.json", validation_document(validation))
         rotary = identified.model.rotary
         folder.write_text("identification.html", identification_report(identified))
-        folder.write_text("design.html", design_report(found.design))
+        folder.write_text("design.html", design_report(found.design, rotary))
         folder.write_text("report.html", validation_report(validation, found.traces, rotary))
     result = {
         "recipe": RECIPE,
@@ -50,6 +51,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
         "worst_error": found.worst_error,
         "recommended": found.design.recommended,
         "passed": validation.passed,
+        "reason": missed(validation),
         "out": folder.final,
     }
     emit(result, as_json, lambda: demo_view(found, folder.final))

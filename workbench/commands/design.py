@@ -6,7 +6,7 @@ from typing import Literal
 
 import click
 
-from workbench.options import POSITIVE
+from workbench.options import POSITIVE, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -33,6 +33,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
 @click.option(
     "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
 )
+@effects_option
 @output_options
 def command(
     model_file: Path,
@@ -43,24 +44,27 @@ def command(
     design_period: float | None,
     modulus: float,
     delay: float,
+    effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
-) -> None:
+) -> int:
     """Design PID and RST controllers by pole placement, with margins and the compensator.
 
     Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
-    keeps the margins. Exit status 1: the model carries no design; 2: no controller meets what was
-    asked.
+    keeps the margins. Exit status 1: the model carries no design, or no controller keeps the goals
+    (design.json then says what each misses, and recommends none); 2: the poles asked for cannot be
+    placed.
     """
     from design.tune import Asked, Goals
     from workbench.design_values import design_document
     from workbench.design_views import design_view
     from workbench.model import read_model
     from workbench.options import parse_auxiliary, parse_poles
+    from workbench.own_effects import library
     from workbench.report.reports import design_report
     from workbench.tuning import design, effort_limit
 
-    model = read_model(model_file)
+    model = read_model(model_file, library(effects))
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     goals = Goals(modulus, delay, effort_limit(model))
     with OutputFolder("design", out, now=datetime.now()) as folder:
@@ -68,5 +72,10 @@ def command(
             found = design(model, asked, goals=goals, source=source, period=design_period)
         document = design_document(found)
         folder.write_json("design.json", document)
-        folder.write_text("report.html", design_report(found))
-    emit({**document, "out": folder.final}, as_json, lambda: design_view(found, folder.final))
+        folder.write_text("report.html", design_report(found, model.rotary))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: design_view(found, folder.final, model.rotary),
+    )
+    return 1 if found.recommended == "none" else 0

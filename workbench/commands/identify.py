@@ -7,7 +7,7 @@ from typing import Literal
 
 import click
 
-from workbench.options import POSITIVE
+from workbench.options import POSITIVE, card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 STAGES = {
@@ -21,7 +21,7 @@ REST = (0.65, 0.9)
 
 @click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...")
-@click.option("--card", required=True, help="Path of the card, or the name of a shipped one.")
+@card_option
 @click.option(
     "--drive",
     type=click.Choice(["force", "command"]),

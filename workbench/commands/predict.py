@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.options import POSITIVE
+from workbench.options import POSITIVE, card_option, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.command(epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a")
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("log", metavar="LOG")
-@click.option("--card", required=True, help="Path of the card, or the name of a shipped one.")
+@card_option
 @click.option(
     "--window", type=POSITIVE, metavar="S", help="Restart from the measured state every S."
 )
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     type=click.Choice(["force", "command"]),
     help="What drives the run.  [default: the command where the model has an actuator]",
 )
+@effects_option
 @output_options
 def command(
     model_file: Path,
@@ -33,20 +34,28 @@ def command(
     card: str,
     window: float | None,
     drive: Literal["force", "command"] | None,
+    effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
 ) -> None:
-    """Predict force and position of a log by a model; nothing is fitted on the log.
+    """Predict force and position of a log by a model and its effects; nothing is fitted on it.
 
     Writes prediction.csv: t, force_applied, force_predicted (inverse model), force_simulated
     (actuator driven by the command), position_measured, position_simulated (free run).
     """
+    from identification.errors import BadModel
     from workbench.model import read_model
+    from workbench.own_effects import library
     from workbench.predicting import predict, prediction_csv
     from workbench.sources import read_sources
 
-    model = read_model(model_file)
+    model = read_model(model_file, library(effects))
     sources = read_sources([log], card)
+    if sources.rig.motion != model.rig.motion:
+        raise BadModel(
+            f"{model_file}: of a {model.rig.motion} machine, but {sources.card.path} says"
+            f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
+        )
     with OutputFolder("predict", out, now=datetime.now()) as folder:
         with progress("predicting", as_json=as_json):
             found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
@@ -85,7 +94,9 @@ def _errors(found: "list[Prediction]") -> dict[str, float | None]:
 
 
 def _lines(summary: Mapping[str, object], rotary: bool, remarks: tuple[str, ...]) -> list[str]:
-    length, force = ("rad", "N m") if rotary else ("m", "N")
+    from workbench.parameter_units import shown
+
+    length, _, force, *_ = shown(rotary)
     by = "the command" if summary["drive"] == "command" else "the applied force"
     window = summary["window"]
     start = "free run" if window is None else f"restarted every {window} s"

@@ -6,6 +6,7 @@ from typing import Literal
 
 import click
 
+from workbench.options import effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -19,39 +20,42 @@ from workbench.output import OutputFolder, emit, output_options, progress
     default="csv",
     show_default=True,
 )
+@effects_option
 @output_options
 def command(
     card_name: str,
     seed: int | None,
     form: Literal["csv", "parquet"],
+    effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
 ) -> None:
     """Make the log of a recipe, its truth beside it.
 
     CARD is a path or the name of a shipped card with a [recipe]. Writes <card>.csv or .parquet,
-    which the same card reads, and truth.json, which no command reads.
+    which the same card reads, and truth.json with parameters and effects, which no command reads.
     """
     import pandas as pd
 
     from identification.errors import BadCard
     from workbench.card import load_card
     from workbench.fetch import card_path
+    from workbench.own_effects import library
     from workbench.recording import as_columns, record, truth
 
-    card = load_card(card_path(card_name))
+    card = load_card(card_path(card_name), library(effects))
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
     with OutputFolder("simulate", out, now=datetime.now()) as folder:
         with progress("simulating", as_json=as_json):
-            log = record(card.name, card.recipe, seed)
+            log = record(card.name, card.recipe, seed, card.rig())
         name = f"{card.name}.{form}"
         frame = pd.DataFrame(as_columns(log, card))
         if form == "csv":
             frame.to_csv(folder.path / name, index=False, float_format="%.12g")
         else:
             frame.to_parquet(folder.path / name, index=False)
-        known = truth(card.name, card.recipe, seed)
+        known = truth(card.name, card.recipe, seed, motion=card.rig().motion)
         folder.write_json("truth.json", known)
     result = {"log": folder.final / name, "samples": len(log), "seed": known["seed"], "h": log.h}
     emit({**result, "out": folder.final}, as_json, lambda: _said(result, folder.final))

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from workbench.options import POSITIVE
+from workbench.options import POSITIVE, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -33,7 +33,16 @@ from workbench.output import OutputFolder, emit, output_options, progress
     "--tracking", type=POSITIVE, default=0.15, show_default=True,
     help="Largest rms error along the smooth reference, relative to its amplitude.",
 )  # fmt: skip
+@click.option(
+    "--overshoot", type=POSITIVE, default=0.1, show_default=True,
+    help="Largest overshoot, relative to the step.",
+)  # fmt: skip
+@click.option(
+    "--force", type=POSITIVE, default=1.2, show_default=True,
+    help="Largest force, relative to the largest in the logs of the machine's model.",
+)  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@effects_option
 @output_options
 def command(
     model_file: Path,
@@ -43,11 +52,16 @@ def command(
     delay: float,
     standstill: float,
     tracking: float,
+    overshoot: float,
+    force: float,
     seed: int,
+    effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
 ) -> int:
     """Check a design on a plant in simulation: margins, steps, a smooth reference, limit cycles.
+
+    Judged too: overshoot, largest force, and whether the command reaches the card's limit.
 
     Writes validation.json and report.html. Exit status 1: the recommended controller does not keep
     the limits on every plant.
@@ -56,13 +70,15 @@ def command(
 
     from workbench.design_values import read_design
     from workbench.model import read_model
+    from workbench.own_effects import library
     from workbench.report.reports import validation_report
     from workbench.validating import Limits, validate, validation_document
     from workbench.validation_views import validation_view
 
-    model, found = read_model(model_file), read_design(design_file)
-    plant = read_model(plant_file) if plant_file else None
-    limits = Limits(modulus, delay, standstill, tracking)
+    known = library(effects)
+    model, found = read_model(model_file, known), read_design(design_file)
+    plant = read_model(plant_file, known) if plant_file else None
+    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     with OutputFolder("validate", out, now=datetime.now()) as folder:
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)

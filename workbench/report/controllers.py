@@ -8,15 +8,16 @@ from design.rst import closed_loop
 from identification.arrays import Array
 from workbench.design_values import Controller, Design
 from workbench.design_views import HEAD, design_lines, margin_rows, polynomial_lines
+from workbench.parameter_units import shown
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, style
 from workbench.report.page import Section, render
 
 COLOURS = {"rst": REFERENCE, "pid": MODEL}
 
 
-def controllers(found: Design) -> Section:
+def controllers(found: Design, rotary: bool = False) -> Section:
     """Margins of both loops and what they rest on."""
-    html = render("table", head=HEAD, rows=margin_rows(found), lines=design_lines(found))
+    html = render("table", head=HEAD, rows=margin_rows(found), lines=design_lines(found, rotary))
     return Section("Controllers", html)
 
 
@@ -26,7 +27,7 @@ def coefficients(found: Design) -> Section:
     return Section("Coefficients", render("lines", lines=text))
 
 
-def sensitivity(found: Design) -> Section:
+def sensitivity(found: Design, rotary: bool = False) -> Section:
     """|S_yp| with its limit, and |S_up|."""
     A, B = np.array(found.plant.A), np.array(found.plant.B)
     w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h
@@ -41,7 +42,12 @@ def sensitivity(found: Design) -> Section:
         top = right.get_ylim()[1]
         right.set_ylim(top - 80.0, top)
         label(left, "frequency [rad/s]", "|S_yp| [dB]", "disturbance to position")
-        label(right, "frequency [rad/s]", "|S_up| [dB, N/m]", "measurement noise to force")
+        label(
+            right,
+            "frequency [rad/s]",
+            f"|S_up| [dB, {shown(rotary).stiffness}]",
+            "measurement noise to force",
+        )
         left.legend(loc="lower right")
         svg = inline(drawn, "sensitivity", "sensitivity functions against frequency")
     caption = "Below 0 dB the loop suppresses disturbances; the peak of |S_yp| is 1/modulus margin."

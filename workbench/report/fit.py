@@ -7,6 +7,7 @@ from identification.inverse_model import Smoothing, force_predicted
 from identification.log import Log
 from identification.simulate import FreeRun
 from workbench.model import Model
+from workbench.parameter_units import shown
 from workbench.report.figures import MEASURED, MODEL, figure, inline, label, line, style
 from workbench.report.page import Section, render
 from workbench.views import held
@@ -16,7 +17,7 @@ ZOOM = 0.12  # part of the log shown enlarged
 
 def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
     """Position and force of one log, the whole of it and its liveliest part."""
-    length, force = ("rad", "N m") if model.rotary else ("m", "N")
+    units = shown(model.rotary)
     t = log["t"] - log["t"][0]
     position = run.y if run else None
     predicted = run.F if run else log["F"]
@@ -33,9 +34,9 @@ def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
                 line(at, t[where], log[name][where], color=MEASURED, label="measured")
                 if simulated is not None:
                     line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
-        label(axes[0][0], "", f"position [{length}]", "whole log")
+        label(axes[0][0], "", f"position [{units.position}]", "whole log")
         label(axes[0][1], "", "", "its liveliest part")
-        label(axes[1][0], "time [s]", f"applied force [{force}]")
+        label(axes[1][0], "time [s]", f"applied force [{units.force}]")
         label(axes[1][1], "time [s]", "")
         drawn.legend(*axes[1][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
         svg = inline(drawn, "fit", "measured and simulated position and force over time")

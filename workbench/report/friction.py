@@ -12,6 +12,7 @@ from identification.karnopp import NAMES, Karnopp
 from identification.log import Log
 from identification.result import KarnoppFit
 from workbench.model import Model
+from workbench.parameter_units import shown
 from workbench.report.figures import BAND, MEASURED, MODEL, figure, inline, label, spread, style
 from workbench.report.page import Section, render
 
@@ -43,7 +44,7 @@ def friction_data(model: Model, log: Log) -> FrictionData:
 
 def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
     """Friction of the log's samples against velocity, with the Karnopp curve and its band."""
-    speed, force = ("rad/s", "N m") if model.rotary else ("m/s", "N")
+    units = shown(model.rotary)
     data, p = friction_data(model, log), model.karnopp
     v_p = np.linspace(p.dv_p, max(float(data.v.max()), 1.2 * p.dv_p), 80)
     v_n = np.linspace(min(float(data.v.min()), 1.2 * p.dv_n), p.dv_n, 80)
@@ -66,7 +67,7 @@ def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
         axes.axvspan(p.dv_n, p.dv_p, color="#0072b2", alpha=0.10, lw=0, label="stick band")
         _limits(axes, p, v_n[0], v_p[-1])
         axes.legend(loc="upper left", markerscale=2.5)
-        label(axes, f"velocity [{speed}]", f"friction force [{force}]")
+        label(axes, f"velocity [{units.velocity}]", f"friction force [{units.force}]")
         svg = inline(drawn, "friction", "friction force against velocity, data and model")
     return Section("Friction", render("figure", svg=svg, caption=_caption(model)))
 

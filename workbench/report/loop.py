@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from design.loop import LoopRun
+from workbench.parameter_units import shown
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, line, style
 from workbench.report.page import Section, render
 from workbench.validating import Traces, Validation
@@ -15,15 +16,16 @@ if TYPE_CHECKING:
 COLOURS = {"rst": REFERENCE, "pid": MODEL}
 
 
-def judged(found: Validation) -> Section:
+def judged(found: Validation, rotary: bool) -> Section:
     """Every controller on every plant, and what it misses."""
-    html = render("table", head=HEAD, rows=validation_rows(found), lines=validation_lines(found))
+    lines = validation_lines(found, rotary)
+    html = render("table", head=HEAD, rows=validation_rows(found, rotary), lines=lines)
     return Section("Verdict", html)
 
 
 def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Section:
     """Position, error and force in the loop on one plant, both controllers."""
-    length, force = ("rad", "N m") if rotary else ("m", "N")
+    units = shown(rotary)
     with style():
         drawn = figure(9.0, 6.2)
         axes = drawn.subplots(3, 2, sharex="col")
@@ -33,10 +35,10 @@ def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> 
                 trace = run.step if kind == "step" else run.smooth
                 _lines([row[column] for row in axes], trace, name, number == 0)
             axes[2][column].set_xlabel("time [s]")
-        label(axes[0][0], "", f"position [{length}]", "steps")
+        label(axes[0][0], "", f"position [{units.position}]", "steps")
         label(axes[0][1], "", "", "smooth reference")
-        label(axes[1][0], "", f"error [{length}]")
-        label(axes[2][0], "time [s]", f"applied force [{force}]")
+        label(axes[1][0], "", f"error [{units.position}]")
+        label(axes[2][0], "time [s]", f"applied force [{units.force}]")
         handles = axes[0][0].get_legend_handles_labels()
         drawn.legend(*handles, loc="outside upper right", ncols=3)
         svg = inline(drawn, f"loop-{place}", "simulated loop: position, error and force")

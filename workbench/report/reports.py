@@ -37,13 +37,18 @@ def identification_report(found: Identified) -> str:
     return page(f"Identification of {model.card}", summary(model), sections)
 
 
-def design_report(found: Design) -> str:
+def design_report(found: Design, rotary: bool = False) -> str:
     """HTML: the controllers, their margins, what they do to noise, how fast they are."""
     lead = (
         f"{found.recommended.upper()} recommended, position loop every"
         f" {1e3 * found.plant.h:.4g} ms; designed on the {found.plant.source} plant."
     )
-    sections = (controllers(found), step_response(found), sensitivity(found), coefficients(found))
+    sections = (
+        controllers(found, rotary),
+        step_response(found),
+        sensitivity(found, rotary),
+        coefficients(found),
+    )
     return page(f"Design for {found.card}", lead, sections)
 
 
@@ -52,5 +57,5 @@ def validation_report(
 ) -> str:
     """HTML: whether the design holds in simulation, and what the loop does."""
     places = dict.fromkeys(place for _, place in traces)
-    sections = (judged(found), *(loop(traces, place, rotary) for place in places))
+    sections = (judged(found, rotary), *(loop(traces, place, rotary) for place in places))
     return page(f"Validation for {found.card}", f"{verdict(found)}.", sections)

@@ -8,6 +8,7 @@ from identification.inverse_model import SURE
 from identification.log import Log
 from identification.simulate import FreeRun
 from workbench.model import Model
+from workbench.parameter_units import shown
 from workbench.report.figures import MODEL, REFERENCE, figure, inline, label, line, style
 from workbench.report.friction import friction_data
 from workbench.report.page import Section, render
@@ -17,7 +18,7 @@ BAND_ALPHA = 0.45
 
 def residual(model: Model, log: Log, run: FreeRun | None) -> Section:
     """Position's and force's residual over time, with the noise that a perfect model leaves."""
-    length, force = ("rad", "N m") if model.rotary else ("m", "N")
+    units = shown(model.rotary)
     t = log["t"] - log["t"][0]
     noise = model.fit.noise_y
     with style():
@@ -29,7 +30,7 @@ def residual(model: Model, log: Log, run: FreeRun | None) -> Section:
             -2 * noise, 2 * noise, color=REFERENCE, alpha=BAND_ALPHA, lw=0, zorder=3,
             label="±2σ of the sensor",
         )  # fmt: skip
-        label(top, "", f"position [{length}]", "measured less simulated")
+        label(top, "", f"position [{units.position}]", "measured less simulated")
         drawn.legend(*top.get_legend_handles_labels(), loc="outside upper right")
         if run and model.rig.kind != "motor" and model.fit.drive == "command":
             sigma = 2 * model.fit.noise_F
@@ -40,7 +41,7 @@ def residual(model: Model, log: Log, run: FreeRun | None) -> Section:
             times, left = _force_residual(model, log)
             bottom.plot(times, left, ".", ms=2.5, mew=0, color=MODEL, rasterized=True)
             title = "applied force less the equation of motion's, while sliding"
-        label(bottom, "time [s]", f"force [{force}]", title)
+        label(bottom, "time [s]", f"force [{units.force}]", title)
         svg = inline(drawn, "residual", "residual of position and force over time")
     return Section("What the model leaves", render("figure", svg=svg, caption=_caption(model)))
 

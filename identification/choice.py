@@ -1,0 +1,287 @@
+"""Which effects are missing: forward choice with exchange, against a calibrated threshold."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.candidates import (
+    ACTUATOR,
+    BREAKAWAY,
+    MECHANICAL,
+    REST,
+    Candidate,
+    Outcome,
+    Stage,
+    base_outcomes,
+    best_of,
+    outcome,
+    reached,
+    shown_to_true,
+)
+from identification.evidence import Moving, moving
+from identification.library import Library
+
+ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
+MOST = 4  # effects in one machine
+DRAWS = 200  # of the null hypothesis
+SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
+LEVEL = 0.01  # chance up to which a gain is no luck
+MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
+SHIFT = 1.0  # of the position's noise
+MATERIAL_RATE = 0.002  # of the spread of dF/dt
+PENALTY = 5.0  # criterion that each parameter more has to gain
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One effect taken: the candidate, its p-value, its rivals in order, stage and base before."""
+
+    candidate: Candidate
+    p_value: float
+    rivals: tuple[Candidate, ...]
+    stage: Stage
+    base: Mapping[str, Outcome]
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The plain stage, the steps taken, and the stage with all effects in it."""
+
+    start: Stage
+    first: Mapping[str, Outcome]
+    steps: tuple[Step, ...]
+    end: Stage
+    base: Mapping[str, Outcome]
+
+
+def settled(stage: Stage) -> tuple[Stage, dict[str, Outcome]]:
+    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes."""
+    found = base_outcomes(stage)
+    for _ in range(2):
+        theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
+        theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
+        stage = replace(stage, theta=theta, theta_a=theta_a)
+        found = base_outcomes(stage)
+    return stage, found
+
+
+def first_stage(logs: Sequence[Moving], by_command: bool) -> tuple[Stage, dict[str, Outcome]]:
+    """The model without effects."""
+    first = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0])
+    return settled(Stage(tuple(logs), *first, by_command))
+
+
+def choose(
+    logs: Sequence[Moving], by_command: bool, library: Library, rng: np.random.Generator,
+    report: Progress,
+) -> Choice:  # fmt: skip
+    """Effects that the logs call for, one after the other, each judged beside those before."""
+    start, first = first_stage(logs, by_command)
+    stage, base, steps = start, first, list[Step]()
+    for turn in range(MOST):
+        done = partial(_report, report, turn)
+        step = next_step(stage, base, library, rng, done)
+        if step is None:
+            break
+        steps.append(step)
+        stage, base = settled(replace(absorb(step.stage, step.candidate), scales={}))
+        if len(stage.chosen) > 1:
+            stage, base, steps = polished(stage, base, steps)
+    return Choice(start, first, tuple(steps), stage, base)
+
+
+def _report(report: Progress, turn: int, part: float) -> None:
+    report("tracing", (turn + part) / MOST)
+
+
+def polished(
+    stage: Stage, base: Mapping[str, Outcome], steps: list[Step]
+) -> tuple[Stage, dict[str, Outcome], list[Step]]:
+    """Every effect kept as columns at its best beside the others; those not needed any more go."""
+    scales = {equation: max(1.0, spread(o)) for equation, o in base.items()}
+    for effect, _values in stage.chosen[:-1]:
+        others = tuple(x for x in stage.chosen if x[0].key != effect.key)
+        without = replace(stage, chosen=others, scales=scales)
+        candidate = best_of(without, effect, base_outcomes(without))
+        at = next(i for i, s in enumerate(steps) if s.candidate.effect.key == effect.key)
+        if candidate is None or merit(candidate) <= 0:
+            stage, steps = replace(stage, chosen=others), steps[:at] + steps[at + 1 :]
+            continue
+        renewed = [(e, candidate.values if e.key == effect.key else v) for e, v in stage.chosen]
+        stage = replace(stage, chosen=tuple(renewed))
+        steps = [*steps]
+        steps[at] = replace(
+            steps[at], candidate=replace(steps[at].candidate, values=candidate.values)
+        )
+    stage, found = settled(replace(stage, scales={}))
+    return stage, found, steps
+
+
+def next_step(
+    stage: Stage, base: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
+    report: Callable[[float], None],
+) -> Step | None:  # fmt: skip
+    """The effect that gains most, if it is material and no luck; None where there is none."""
+    taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
+    keys = [k for k in library if k not in taken and k not in ABSORBED]
+    found: list[Candidate] = []
+    for i, key in enumerate(keys):
+        candidate = best_of(stage, library[key], base)
+        if candidate is not None:
+            found.append(candidate)
+        report((i + 1) / len(keys))
+    if not found:
+        return None
+    scales = scales_of(found, base)
+    scaled = replace(stage, scales=scales)
+    base = base_outcomes(scaled)
+    ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
+    best = ranked[0]
+    if not material(best, scaled, base):
+        ranked = [c for c in ranked if material(c, scaled, base)]
+        if not ranked:
+            return None
+        best = ranked[0]
+    p_value = chance(best, ranked, scaled, base, rng)
+    if p_value > LEVEL or merit(best) <= 0 or share(best, base) < SHARE:
+        return None
+    return Step(best, p_value, tuple(ranked[1:]), scaled, base)
+
+
+def merit(candidate: Candidate) -> float:
+    """Gain less what its parameters would gain by luck."""
+    return candidate.gain - PENALTY * len(candidate.effect.params)
+
+
+def share(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
+    """Share of what is missing in its equations that an effect explains."""
+    missing = sum(max(base[k].criterion - len(base[k].rows.b), 0.0) for k in candidate.outcomes)
+    return float(candidate.gain / max(missing, candidate.gain, 1e-300))
+
+
+def scales_of(found: Sequence[Candidate], base: Mapping[str, Outcome]) -> dict[str, float]:
+    """Square that the best candidate leaves in each equation, 1 at least: what is noise to all."""
+    out = {}
+    for equation, o in base.items():
+        options = [c.outcomes[equation] for c in found if equation in c.outcomes] + [o]
+        out[equation] = max(1.0, min(spread(x) for x in options))
+    return out
+
+
+def spread(o: Outcome) -> float:
+    """Mean square of the rows that count."""
+    kept = o.fit.residual[o.rows.speed >= o.slowest]
+    if o.robust:
+        return float(np.median(kept**2)) / 0.455  # of a chi-square with one degree
+    return float(np.mean(kept**2)) if len(kept) else 1.0
+
+
+def rescaled(stage: Stage, candidate: Candidate, base: Mapping[str, Outcome]) -> Candidate:
+    """The candidate judged at the stage's scales."""
+    outcomes = {e: outcome(stage, e, o.rows) for e, o in candidate.outcomes.items()}
+    gain = sum(base[e].criterion - o.criterion for e, o in outcomes.items())
+    return replace(candidate, outcomes=outcomes, gain=float(gain))
+
+
+def contribution_rms(candidate: Candidate, base: Mapping[str, Outcome], equation: str) -> float:
+    """Root mean square of what the effect changes in an equation, in its unit."""
+    before, after = base[equation], candidate.outcomes[equation]
+    keep = after.rows.speed >= max(before.slowest, after.slowest)
+    moved = before.fit.residual * before.rows.sd - after.fit.residual * after.rows.sd
+    return float(np.sqrt(np.mean(moved[keep] ** 2))) if np.any(keep) else 0.0
+
+
+def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) -> bool:
+    """Whether the effect is large enough to matter to the machine, noise apart."""
+    level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
+    if candidate.effect.acts == "sensor":
+        return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
+    for equation in candidate.outcomes:
+        size = contribution_rms(candidate, base, equation)
+        if equation == MECHANICAL and size > MATERIAL * level:
+            return True
+        if equation == ACTUATOR and size > MATERIAL_RATE * float(np.std(base[equation].rows.b)):
+            return True
+        if equation == REST and size > float(np.median(base[equation].rows.sd)):
+            return True
+        if equation == BREAKAWAY and size > 10 * MATERIAL * level:
+            return True
+    return False
+
+
+def shift_rms(candidate: Candidate, stage: Stage, one: Moving) -> float:
+    """Spread of what a sensor effect adds to the shown position [m]."""
+    true = shown_to_true(candidate.effect, candidate.values, one, stage)
+    return float(np.std(one.log["y"] - true))
+
+
+def chance(
+    best: Candidate, rivals: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome],
+    rng: np.random.Generator,
+) -> float:  # fmt: skip
+    """Chance that some effect of the library gains as much where none is missing.
+
+    The model without the effect is given the residual that the best candidate leaves, its signs
+    drawn anew by stretches of time, which keeps its colour; the largest gain of any candidate's
+    columns in any draw is compared.
+    """
+    largest = np.zeros(DRAWS)
+    for equation in best.outcomes:
+        o, kept = best.outcomes[equation], base[equation]
+        n = len(o.rows.b)
+        stretch = np.minimum(
+            np.arange(n) * max(8, n // 25) // n if n >= 50 else np.arange(n), n - 1
+        )
+        signs = rng.choice([-1.0, 1.0], size=(int(stretch.max()) + 1, DRAWS))[stretch]
+        residual, limit = o.fit.residual, 3.0 * np.sqrt(stage.scale(equation))
+        if o.robust:
+            residual = np.clip(residual, -limit, limit)
+        noise = residual[:, np.newaxis] * signs
+        heavy = o.rows.speed >= o.slowest
+        noise = noise * heavy[:, np.newaxis]
+        A = kept.rows.X / kept.rows.sd[:, np.newaxis] * heavy[:, np.newaxis]
+        Q = np.linalg.qr(A)[0] if A.shape[1] else np.zeros((n, 0))
+        noise = noise - Q @ (Q.T @ noise)
+        gains = np.zeros(DRAWS)
+        for c in (best, *rivals):
+            if equation not in c.outcomes:
+                continue
+            own = directions(c.outcomes[equation], kept) * heavy[:, np.newaxis]
+            if o.robust:
+                own = np.clip(own, -limit, limit)
+            own = own - Q @ (Q.T @ own)
+            P = np.linalg.qr(own)[0]
+            gains = np.maximum(gains, np.sum((P.T @ noise) ** 2, axis=0))
+        largest += gains / stage.scale(equation)
+    # The search over shapes finds more than one place would: as many as parameters searched.
+    return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
+
+
+SEARCHED = 2.0
+
+
+def directions(o: Outcome, base: Outcome) -> Array:
+    """Whitened columns (r, k) by which an effect moves the rows."""
+    more = o.rows.X[:, base.rows.X.shape[1] :] / o.rows.sd[:, np.newaxis]
+    moved = (base.fit.residual - o.fit.residual)[:, np.newaxis]
+    return more if more.shape[1] else moved
+
+
+def absorb(stage: Stage, candidate: Candidate) -> Stage:
+    """The stage with the effect in it: its columns kept, or the logs' signals freed of it."""
+    effect, values = candidate.effect, candidate.values
+    if effect.acts not in ("sensor", "command", "delay"):
+        return replace(stage, chosen=(*stage.chosen, (effect, values)))
+    logs = []
+    for one in stage.logs:
+        if effect.acts == "sensor":
+            log = one.log.with_signals(y=shown_to_true(effect, values, one, stage))
+        else:
+            whole = reached(effect, values, one, stage)
+            log = one.log.with_signals(u=np.append(np.diff(whole), 0.0) / one.log.h)
+        logs.append(moving(log, held=one.held, by_command=one.whole is not None))
+    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key))

@@ -1,0 +1,179 @@
+"""What an effect is: one declaration that simulation, regression, trace and reports all read.
+
+A kernel is a plain function of floats
+
+    value(t, y, v, F, u, d, z, c, f, s, p) -> float
+
+t [s] since the log's start, y [m], v [m/s] of the body, F applied force [N], u command [V];
+d direction: +1 or -1 (0 at rest, in `evolve`); z the effect's own state; c Coulomb level and f
+whole friction of the nine parameters in direction d [N], positive (at rest both are the stick
+limit); s the signals of `signals` in their order, p the parameters in the order of `params`.
+Rotary rigs use rad, N m and kg m^2 in the same places.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, get_args
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.compiled import kernel_pointer
+from identification.errors import BadModel
+
+Acts = Literal["slip", "stiction", "friction", "bristle", "force", "actuator", "command", "delay",
+               "sensor"]  # fmt: skip
+# What `value` returns, by where the effect acts.
+GIVES: Mapping[Acts, str] = {
+    "slip": "friction added while sliding [N], positive against the motion",
+    "stiction": "force added to the stick limit in direction d [N]",
+    "friction": "friction added while sliding and to the stick limit [N]",
+    "bristle": "slope dF/dy of the elastic friction force z [N/m]; it replaces sticking",
+    "force": "driving force added [N], positive towards +y",
+    "actuator": "rate added to dF/dt [N/s]",
+    "command": "command that reaches the actuator in place of u [V]",
+    "delay": "time by which the command is late [s]",
+    "sensor": "position that the transducer shows in place of y [m]",
+}
+Kernel = Callable[..., float]
+# A number and numbers, as the kernels' eleven arguments are annotated.
+R = float
+Rs = Sequence[float]
+MAX_PARAMS = 8
+MAX_SIGNALS = 4
+
+
+@dataclass(frozen=True)
+class Param:
+    """One parameter: unit, bounds, a typical value, and whether the effect is linear in it.
+
+    `default` is what a recipe may leave out. Bounds in SI.
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    typical: float
+    meaning: str
+    linear: bool = False
+    default: float | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One physical effect that the Karnopp model lacks.
+
+    equation: of `value`, as text that a computer-algebra package reads, in the kernel's symbols
+    and the names of `params` and `signals`. evolve: the state after dt, `evolve(dt, t, ..., p)`;
+    initial: the state at the start, as `value` (0 where None). signals: names of the log's signals
+    that it uses, of which those in `needs` must be there (others read as 0). depends_on: signals
+    with which its contribution varies. Raises BadModel where the declaration contradicts itself.
+    """
+
+    key: str
+    meaning: str
+    equation: str
+    source: str
+    acts: Acts
+    params: tuple[Param, ...]
+    value: Kernel
+    depends_on: tuple[str, ...]
+    evolve: Kernel | None = None
+    initial: Kernel | None = None
+    signals: tuple[str, ...] = ()
+    needs: tuple[str, ...] = ()
+    separate: str = ""
+
+    def __post_init__(self) -> None:
+        problem = None
+        if not self.key.isidentifier():
+            problem = "its key must be a word of letters, digits and underscores"
+        elif self.acts not in get_args(Acts):
+            problem = f"acts = {self.acts!r}, must be one of {', '.join(get_args(Acts))}"
+        elif len(self.params) > MAX_PARAMS or len(self.signals) > MAX_SIGNALS:
+            problem = f"at most {MAX_PARAMS} parameters and {MAX_SIGNALS} signals"
+        elif not set(self.needs) <= set(self.signals):
+            problem = f"needs {self.needs} must be among its signals {self.signals}"
+        for p in self.params:
+            values = [p.typical] if p.default is None else [p.typical, p.default]
+            if not all(p.low <= value <= p.high for value in values):
+                problem = f"{p.name}: typical and default must lie in [{p.low:g}, {p.high:g}]"
+        if problem:
+            raise BadModel(f"effect {self.key!r}: {problem}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(p.name for p in self.params)
+
+    @property
+    def linear(self) -> tuple[str, ...]:
+        """Names of the parameters in which `value` is linear."""
+        return tuple(p.name for p in self.params if p.linear)
+
+    @cached_property
+    def pointers(self) -> tuple[Any, Any, Any]:
+        """Compiled `value`, `evolve` and `initial`, None where there is none; cached on disk."""
+        parts = ((self.value, False), (self.evolve, True), (self.initial, False))
+        return tuple(k and kernel_pointer(k, self.key, step) for k, step in parts)  # type: ignore[return-value]
+
+    @property
+    def addresses(self) -> tuple[int, int, int]:
+        """Addresses of the compiled kernels, 0 where there is none."""
+        value, evolve, initial = (int(k.address) if k else 0 for k in self.pointers)
+        return value, evolve, initial
+
+    def acting(self, values: Mapping[str, float]) -> "Acting":
+        """The effect with these parameters; raises BadModel where one is unknown or missing."""
+        return Acting(self, tuple(self._one(p, values) for p in self._known(values)))
+
+    def _known(self, values: Mapping[str, float]) -> tuple[Param, ...]:
+        for name in values:
+            if name not in self.names:
+                raise BadModel(
+                    f"effect {self.key!r} has no parameter {name!r}; it has {', '.join(self.names)}"
+                )
+        return self.params
+
+    def _one(self, p: Param, values: Mapping[str, float]) -> float:
+        value = values.get(p.name, p.default)
+        if value is None:
+            raise BadModel(f"effect {self.key!r} lacks {p.name} [{p.unit}]: {p.meaning}")
+        if not (np.isfinite(value) and p.low <= value <= p.high):
+            raise BadModel(
+                f"effect {self.key!r}: {p.name} = {value:g} {p.unit}, must lie in"
+                f" [{p.low:g}, {p.high:g}]"
+            )
+        return float(value)
+
+
+@dataclass(frozen=True)
+class Acting:
+    """An effect with its parameters, in the order of `effect.params`."""
+
+    effect: Effect
+    p: tuple[float, ...]
+
+    @property
+    def key(self) -> str:
+        """The effect's key."""
+        return self.effect.key
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Parameters by name."""
+        return dict(zip(self.effect.names, self.p, strict=True))
+
+    @property
+    def array(self) -> Array:
+        """Parameters as the kernels take them, (MAX_PARAMS,)."""
+        return np.pad(np.array(self.p, dtype=np.float64), (0, MAX_PARAMS - len(self.p)))
+
+
+def asymmetry() -> Param:
+    """Relative difference of the two directions; the effect's size is times (1 + asymmetry d)."""
+    return Param(
+        "asymmetry", "1", -1.0, 1.0, 0.0, "how much more in positive direction", default=0.0
+    )

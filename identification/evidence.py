@@ -1,0 +1,201 @@
+"""The two equations of a machine as weighted regressions, in which every effect is a candidate.
+
+Mechanical, in windows of sliding in one direction (N):
+    mean F = m second y + (+-)F_c + F_v first y + (+-)friction added - force added.
+Actuator, in windows over the whole log (N/s), where a linear actuator has a logged command:
+    first F = k1 mean u - k2 first y + offset + rate added.
+Each row is divided by what the sensors' noise makes of it, so a complete model leaves 1.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray, IntArray
+from identification.differentiate import differentiate
+from identification.karnopp import Karnopp
+from identification.log import Log
+from identification.weak_form import (
+    Windows,
+    all_windows,
+    noise_gain,
+    sliding_windows,
+    weights,
+)
+
+SECONDS = 0.06  # of a window
+FEWEST = 16  # samples in a window
+SURE = 5.0  # times the velocity's noise from which its sign is sure
+BLOCKS = 8  # stretches of a log that are left out in turn
+MECHANICAL, ACTUATOR = "mechanical", "actuator"
+FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
+POSITIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
+FRICTIONAL = ("slip", "friction")
+IN_ACTUATOR = ("actuator", "command", "delay")
+QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
+GUESS = Karnopp(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Moving:
+    """One log with its motion, and its windows in the two equations (actuator: None without u)."""
+
+    log: Log
+    signals: Mapping[str, Array]
+    sliding: Windows
+    up: BoolArray
+    speed: Array
+    whole: Windows | None
+    noise_y: float
+    noise_F: float
+    held: bool
+    v_noise: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A regression b = X theta: b (r,), X (r, k), sd (r,) of b, block (r,) of time, speed (r,)."""
+
+    b: Array
+    X: Array
+    sd: Array
+    block: IntArray
+    speed: Array
+    names: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Least squares of `Rows`: theta (k,), residual in units of sd (r,), cost its square sum."""
+
+    theta: Array
+    residual: Array
+    cost: float
+
+
+def local_noise(x: Array, h: float) -> float:
+    """White noise of a signal (one sigma) from the quiet part of it; a fast input does not count.
+
+    Third differences in short stretches: motion and input raise most of them, noise is in all.
+    """
+    d3 = np.diff(np.asarray(x, dtype=np.float64), 3) / np.sqrt(20.0)
+    size = 25
+    count = len(d3) // size
+    if count < 4:
+        return float(np.sqrt(np.mean(d3**2)))
+    power = np.sort(np.mean(d3[: count * size].reshape(count, size) ** 2, axis=1))
+    # The mean of the lowest fifth of chi-squares with about 9 independent values.
+    return float(np.sqrt(np.mean(power[: max(1, int(QUIET * count))]) / 0.45))
+
+
+def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
+    """A log with its motion and windows. held: the force is a command held over each period."""
+    h = log.h
+    motion = differentiate(log["y"], h)
+    threshold = SURE * motion.v_noise
+    d = np.where(motion.v > threshold, 1.0, np.where(motion.v < -threshold, -1.0, 0.0))
+    length = max(FEWEST, 2 * round(SECONDS / h / 2))
+    sliding = sliding_windows(d, length, h)
+    view = np.lib.stride_tricks.sliding_window_view(np.abs(motion.v), length + 1)
+    u = log["u"] if "u" in log else np.zeros(len(log))
+    signals = {
+        **{k: np.asarray(v) for k, v in log.signals.items()},
+        "v": motion.v, "a": motion.a, "smooth": motion.y, "d": d, "u": u,
+    }  # fmt: skip
+    whole = all_windows(len(log), length, h) if by_command else None
+    noise_F = 0.0 if held else local_noise(log["F"], h)
+    return Moving(
+        log, signals, sliding, d[sliding.middle] > 0, np.min(view[sliding.start], axis=1), whole,
+        min(motion.noise, local_noise(log["y"], h)), noise_F, held, motion.v_noise,
+    )  # fmt: skip
+
+
+def mechanical(one: Moving, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
+    """Rows of the mechanical equation with the five parameters m, F_cp, F_cn, F_vp, F_vn.
+
+    theta: a first estimate of them, for the rows' noise; y: position in place of the log's [m];
+    k1: of the actuator, whose force has kinks where its command jumps.
+    """
+    w, up = one.sliding, one.up
+    y = one.log["y"] if y is None else y
+    speed = w.first @ y
+    X = np.column_stack([w.second @ y, 1.0 * up, -1.0 * ~up, speed * up, speed * ~up])
+    b = (w.held if one.held else w.mean) @ one.log["F"]
+    if k1 != 0.0:
+        impulse = k1 * integral(one.log["u"], one.log.h)
+        b = b + w.kinked @ impulse - w.mean @ impulse
+    mean, first, second, *_ = weights(w.length, one.log.h)
+    spread = [
+        one.noise_F**2 * noise_gain(mean)
+        + one.noise_y**2 * noise_gain(theta[0] * second + viscous * first)
+        for viscous in (theta[3], theta[4])
+    ]
+    sd = np.sqrt(np.where(up, spread[0], spread[1]))
+    return Rows(b, X, sd, _blocks(w, len(one.log)), one.speed, FIVE)
+
+
+def actuator(one: Moving, theta: Array, y: Array | None = None, u: Array | None = None) -> Rows:
+    """Rows of the actuator equation with k1, k2 and an offset; theta: a first estimate of them.
+
+    u: integral of the command that reaches the actuator [V s] at every sample.
+    """
+    assert one.whole is not None
+    w = one.whole
+    y = one.log["y"] if y is None else y
+    reached = integral(one.log["u"], one.log.h) if u is None else u
+    X = np.column_stack([w.first @ reached, -(w.first @ y), np.ones(len(w.start))])
+    _, first, *_ = weights(w.length, one.log.h)
+    sd = np.sqrt(one.noise_F**2 + (theta[1] * one.noise_y) ** 2) * np.sqrt(noise_gain(first))
+    r = len(w.start)
+    return Rows(
+        w.first @ one.log["F"], X, np.full(r, sd), _blocks(w, len(one.log)), np.full(r, np.inf),
+        ("k1", "k2", "offset"),
+    )  # fmt: skip
+
+
+def integral(u: Array, h: float) -> Array:
+    """Integral of a held command up to each sample [V s]."""
+    return h * np.concatenate([[0.0], np.cumsum(u)[:-1]])
+
+
+def _blocks(w: Windows, n: int) -> IntArray:
+    return (w.middle * BLOCKS // n).astype(np.int64)
+
+
+def stacked(parts: Sequence[Rows]) -> Rows:
+    """Rows of several logs as one regression; their blocks are kept apart."""
+    block = np.concatenate([p.block + BLOCKS * i for i, p in enumerate(parts)])
+    join = [np.concatenate([getattr(p, k) for p in parts]) for k in ("b", "X", "sd", "speed")]
+    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names)
+
+
+def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None) -> Fitted:
+    """Weighted least squares; `keep` (r,) masks rows out of the fit (their residual is kept).
+
+    positive: columns whose parameter is 0 where it would come out negative.
+    """
+    A, c = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
+    mask = np.ones(len(c), dtype=bool) if keep is None else keep
+    scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+
+    def least_squares(at: IntArray) -> Array:
+        theta = np.linalg.lstsq(A[np.ix_(mask, at)] / scale[at], c[mask], rcond=1e-10)[0]
+        return np.asarray(theta / scale[at])
+
+    none = np.zeros(0, dtype=np.int64)
+    theta = non_negative(least_squares, A.shape[1], none if positive is None else positive)
+    residual = c - A @ theta
+    return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
+
+
+def non_negative(fit: Callable[[IntArray], Array], k: int, positive: IntArray) -> Array:
+    """Parameters (k,) of `fit` on a set of columns, those in `positive` not below 0."""
+    at = np.arange(k)
+    while True:
+        theta = np.zeros(k)
+        theta[at] = fit(at)
+        below = positive[theta[positive] < 0.0]
+        if not len(below):
+            return theta
+        at = np.setdiff1d(at, below)

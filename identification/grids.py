@@ -1,0 +1,56 @@
+"""Where a parameter in which an effect is not linear is tried first: from its unit and the log."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.effects._base import Effect, Param
+from identification.evidence import Moving
+
+SPEEDS = (0.02, 0.04, 0.07, 0.12, 0.2, 0.33, 0.55, 0.9, 1.5)  # of the speed rarely exceeded
+PLACES = (0.1, 0.25, 0.4, 0.55, 0.65, 0.75, 0.85, 0.92, 0.97)  # of half the travel
+PLAYS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the travel
+SAMPLES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+SHARES = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
+TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
+SHARPEST = 0.02  # s, shortest passage of one period that the windows still show
+LONG = 1.0  # s, typical value from which a time is compared with the log and not its period
+
+
+def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
+    """Values of `p` to try first, sorted; they also bound its refinement."""
+    one = max(logs, key=lambda each: each.log.duration)
+    y, h = one.log["y"], one.log.h
+    travel, middle = float(np.ptp(y)), 0.5 * float(np.max(y) + np.min(y))
+    speed = float(np.quantile(np.abs(one.signals["v"]), 0.95))
+    if p.name == "period":
+        found = _periods(effect, one, travel)
+    elif p.unit in ("m/s", "rad/s"):
+        found = speed * np.array(SPEEDS)
+    elif p.unit in ("m", "rad") and p.low < 0:
+        found = middle + np.sign(p.typical) * 0.5 * travel * np.array(PLACES)
+    elif p.unit in ("m", "rad"):
+        found = travel * np.array(PLAYS)
+    elif p.unit == "s":
+        found = one.log.duration * np.array(SHARES) if p.typical >= LONG else h * np.array(SAMPLES)
+    elif p.unit == "V":
+        found = float(np.quantile(np.abs(one.signals["u"]), 0.7)) * np.array(SPEEDS)
+    elif p.name == "n":
+        found = np.array(POWERS)
+    elif p.low < 0 < p.high:
+        found = p.typical * np.array([-3.0, -1.0, -0.3, 0.3, 1.0, 3.0])
+    else:
+        found = p.typical * np.array(TYPICAL)
+    return np.unique(np.clip(found, p.low, p.high))
+
+
+def _periods(effect: Effect, one: Moving, travel: float) -> Array:
+    """Periods [m] that the travel holds at least once (a force) or half (friction)."""
+    slow = float(np.quantile(np.abs(one.signals["v"]), 0.5))
+    shortest = max(SHARPEST * slow, 1e-3 * travel)
+    fewest = 1.0 if effect.acts == "force" else 0.5
+    most = max(travel / shortest, 2.0 * fewest)
+    most = min(most, 200.0 if effect.acts == "force" else 12.0)
+    return travel / np.arange(fewest, most + 0.25, 0.4)

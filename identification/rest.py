@@ -1,0 +1,177 @@
+"""Evidence in rest and breakaway: what a stuck body does, and the force at which it lets go.
+
+A stuck Karnopp body does not move at all, and lets go at F_sp or F_sn whatever came before. In
+rest the shown position against force tells elasticity; at breakaway force against the time at
+rest, place, pressure tells what the limits depend on.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.evidence import BLOCKS, Moving, Rows
+
+LEAST = 0.6  # of the direction's median force, below which an event is none
+RATE = 4  # samples over which the force's rate is taken
+MEAN = 8  # samples in a row of rest
+SHORTEST = 4  # rows in a stretch
+CALM = 3.0  # times the noise that the halves of a row may differ by, beyond what force explains
+ONSET = 5.0  # times the noise at which a body has moved
+ONSETS = 30  # samples before it is seen at which a motion may have begun
+RUN = 4.0  # times ONSET that it then goes on to move, or it was no breakaway
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """Rows of rest of one log: first sample (r,) of each mean, and its stretch (r,)."""
+
+    start: IntArray
+    stretch: IntArray
+
+
+@dataclass(frozen=True, eq=False)
+class Breakaways:
+    """Events of one log: last sample at rest (k,), direction, time at rest [s], force
+    [N] and its rate [N/s], positive where it rises in the direction of motion."""
+
+    at: IntArray
+    direction: Array
+    rested: Array
+    force: Array
+    rate: Array
+
+
+def stretches(one: Moving, shortest: int) -> list[tuple[int, int]]:
+    """Stretches of samples (low, high) in which the body is not sure to move."""
+    still = one.signals["d"] == 0
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
+    return [
+        (int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= shortest
+    ]
+
+
+def rests(one: Moving) -> Rest:
+    """Rows of rest, without the ends of a stretch, where the body starts or stops."""
+    margin = MEAN
+    starts, number = [], []
+    for i, (low, high) in enumerate(stretches(one, (SHORTEST + 2) * MEAN)):
+        own = np.arange(low + margin, high - margin - MEAN + 1, MEAN)
+        if len(own) >= SHORTEST:
+            starts.append(own)
+            number.append(np.full(len(own), i))
+    if not starts:
+        none = np.zeros(0, dtype=np.int64)
+        return Rest(none, none)
+    return Rest(np.concatenate(starts).astype(np.int64), np.concatenate(number).astype(np.int64))
+
+
+def means(x: Array, rest: Rest) -> Array:
+    """Means of a signal over the rows, less the mean over their stretch, (r,)."""
+    view = np.lib.stride_tricks.sliding_window_view(np.asarray(x), MEAN)
+    rows: Array = np.asarray(view[rest.start].mean(axis=1))
+    if not len(rows):
+        return rows
+    count = np.bincount(rest.stretch)
+    level = np.bincount(rest.stretch, rows) / np.maximum(count, 1)
+    return np.asarray(rows - level[rest.stretch])
+
+
+def rest_rows(one: Moving, rest: Rest, moved: Array | None = None) -> Rows:
+    """Rows of the shown position in rest [m], less what an effect makes of it, `moved` (n,)."""
+    y = one.log["y"] if moved is None else one.log["y"] - moved
+    b = means(y, rest)
+    sd = np.full(len(b), one.noise_y / np.sqrt(MEAN))
+    block = (rest.start * BLOCKS // len(one.log)).astype(np.int64)
+    return Rows(b, np.zeros((len(b), 0)), sd, block, np.full(len(b), np.inf), ())
+
+
+def breakaways(one: Moving, m: float) -> Breakaways:
+    """Every sure breakaway: a rest of at least 24 samples, then motion in one direction.
+
+    m: mass [kg]. The body has let go at the sample from which the rise of the force since then,
+    integrated twice, gives the motion seen; that sample's force is the limit.
+    """
+    y, F, h = one.log["y"], one.log["F"], one.log.h
+    found: list[tuple[float, float, float, float, float]] = []
+    for low, high in stretches(one, 3 * MEAN):
+        if high + MEAN >= len(y):
+            continue
+        level = (
+            float(np.mean(y[low + MEAN : high - MEAN]))
+            if high - low > 3 * MEAN
+            else float(y[low + MEAN])
+        )
+        way = float(np.sign(one.signals["d"][high]))
+        end = min(high + MEAN, len(y))
+        seen = way * (y[low:end] - level)
+        moved = np.flatnonzero(seen < ONSET * one.noise_y)
+        if not len(moved) or seen[-1] < RUN * ONSET * one.noise_y:
+            continue
+        onset = _onset(seen, way * F[low:end], int(moved[-1]), h, m)
+        if onset is None or onset < 2 * MEAN:
+            continue
+        at = int(onset)
+        part = onset - at
+        force = float((1 - part) * F[low + at] + part * F[low + at + 1])
+        rate = (
+            way
+            * float(F[low + at + 1] - F[max(low + at - RATE, 0)])
+            / ((min(RATE, low + at) + 1) * h)
+        )
+        found.append((float(low + at), way, onset * h, force, rate))
+    k = np.array(found).reshape(-1, 5)
+    for way in (1.0, -1.0):  # a body that is pushed on at the start of a log has not broken away
+        own = k[:, 1] == way
+        if np.any(own):
+            middle = np.median(way * k[own, 3])
+            k = k[~own | (way * k[:, 3] > LEAST * middle)]
+    return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
+
+
+def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None:
+    """Sample (with its fraction) at which a body of mass m lets go, from the motion that follows.
+
+    seen: displacement [m] in the direction of motion, F: force in it [N], last: latest onset.
+    """
+    errors = []
+    stop = min(len(seen) - 1, last + MEAN)
+    tried = range(max(0, last - ONSETS), last + 1)
+    for j in tried:
+        a = np.maximum(F[j : stop + 1] - F[j], 0.0) / m
+        v = h * np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]))])
+        x = h * np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]))])
+        head = seen[max(0, last - ONSETS) : j]
+        errors.append(float(np.sum((seen[j : stop + 1] - x) ** 2) + np.sum(head**2)))
+    i = int(np.argmin(errors))
+    if i in (0, len(errors) - 1):
+        return None
+    before, here, after = errors[i - 1 : i + 2]
+    shift = 0.5 * (before - after) / max(before - 2 * here + after, 1e-300)
+    return float(tried[i] + np.clip(shift, -0.5, 0.5))
+
+
+def breakaway_rows(
+    one: Moving, events: Breakaways, columns: Sequence[Array] = (), names: tuple[str, ...] = ()
+) -> Rows:
+    """Rows of the breakaway force F_sp or -F_sn [N] with further columns (k,)."""
+    up = events.direction > 0
+    # What is late in seeing the motion is the more, the faster the force rises.
+    X = np.column_stack([1.0 * up, -1.0 * ~up, events.direction * events.rate, *columns])
+    sd = np.full(len(up), scatter(events))
+    block = (events.at * BLOCKS // len(one.log)).astype(np.int64)
+    return Rows(
+        events.force, X, sd, block, np.full(len(up), np.inf), ("F_sp", "-F_sn", "rate", *names)
+    )
+
+
+def scatter(events: Breakaways) -> float:
+    """Spread of the breakaway forces [N] of one direction between neighbours in time at rest."""
+    steps = []
+    for way in (1.0, -1.0):
+        own = events.direction == way
+        order = np.argsort(events.rested[own], kind="stable")
+        steps.append(np.diff(events.force[own][order]) / np.sqrt(2.0))
+    joined = np.abs(np.concatenate(steps))
+    return max(1.48 * float(np.median(joined)), 1e-9) if len(joined) >= 3 else np.inf

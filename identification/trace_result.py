@@ -1,0 +1,108 @@
+"""What a trace gives: verdict, errors before and after, effects, rivals, what is left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from identification.arrays import Array
+from identification.effects._base import Effect
+from identification.plant import Plant
+from identification.result import Estimate
+
+Verdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Errors of one model on logs or stretches that it has not seen (`test`), or has (`train`).
+
+    force_rms [N] and force_relative: mechanical equation; position_rms [m]: free run in windows of
+    2 s; actuator_rms [N/s]: actuator equation. None where there is no such equation or no test.
+    """
+
+    force_rms: float | None
+    force_relative: float | None
+    position_rms: float | None
+    actuator_rms: float | None
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that was added: its parameters, the share of what was missing that it explains,
+    and the chance that the largest gain of a model without any effect is as large."""
+
+    effect: Effect
+    params: Mapping[str, Estimate]
+    explained: float
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect that was not taken: its error on stretches left out, and why not."""
+
+    key: str
+    test_force_rms: float | None
+    why_not: str
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """What the residual depends on: signals, and the share of it that they explain."""
+
+    depends_on: tuple[str, ...]
+    explained: float
+
+
+@dataclass(frozen=True)
+class Change:
+    """A parameter that differs between the training and the test logs."""
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    sd: float
+
+
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """Rows of an equation for the pictures, all (r,): time [s] over all logs in a row, `log` index,
+    residual before and after [N or N/s], noise (one sigma), and signals by name at the rows."""
+
+    equation: str
+    t: Array
+    log: Array
+    before: Array
+    after: Array
+    noise: Array
+    signals: Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """The result of `trace.trace`.
+
+    before, after: errors by "train" and "test"; noise_y [m], noise_F [N]: of the sensors;
+    noise_force [N], noise_actuator [N/s]: what the sensors alone leave in the two equations;
+    parameters_before, parameters_after: the nine and k1, k2 by name; plant: the model after, with
+    its effects; next_experiment: one sentence, "" where none is needed; remarks: a line each.
+    """
+
+    verdict: Verdict
+    before: Mapping[str, Errors]
+    after: Mapping[str, Errors]
+    noise_y: float
+    noise_F: float
+    noise_force: float
+    noise_actuator: float | None
+    effects: tuple[FoundEffect, ...]
+    rivals: tuple[Rival, ...]
+    unknown: Dependence
+    drift: tuple[Change, ...]
+    next_experiment: str
+    parameters_before: Mapping[str, Estimate]
+    parameters_after: Mapping[str, Estimate]
+    plant: Plant
+    residuals: tuple[Residual, ...]
+    remarks: tuple[str, ...] = field(default=())

@@ -1,0 +1,146 @@
+"""The controllers recommended by default, and those that are not, judged as an engineer would."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from design.tune import Asked, Goals
+from identification.plant import Actuator, Motor
+from tests.chain import EMPS, TABLES, model_of
+from workbench.closed_loop import run_loop
+from workbench.design_values import Design
+from workbench.model import Model
+from workbench.tuning import design, reference_demand
+from workbench.validating import validate
+
+ACTUATOR = Actuator(19530.0, 10405.0)
+MODELS = {name: model_of(p, ACTUATOR) for name, p in TABLES.items()}
+MODELS["emps"] = model_of(EMPS, k_a=35.15)
+
+
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+@pytest.mark.parametrize("name", list(MODELS))
+def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) -> None:
+    model = MODELS[name]
+    found = design(model)
+    assert found.recommended == "rst" and found.rst is not None and found.pid is not None
+    result, traces = validate(model, found, rng())
+    assert result.passed
+    for kind, controller in found.controllers.items():
+        one = result.figures[kind]["model"]
+        assert controller.missed == ()
+        assert controller.margins.modulus >= 0.5
+        assert controller.margins.delay_samples is None or controller.margins.delay_samples >= 2.0
+        assert sum(controller.T) == pytest.approx(sum(controller.R), rel=1e-9)
+        assert controller.overshoot <= 0.05
+        assert one.overshoot <= 0.05
+        assert one.force_peak <= 1.05 * model.force_peak
+        assert one.command_noise is not None and one.command_noise < 0.05
+        # Not by choosing a slow controller: a ramp is followed a few samples behind.
+        assert 0.0 < controller.lag < (0.06 if kind == "rst" and name != "emps" else 0.11)
+    assert result.figures["rst"]["model"].smooth_relative < 0.03
+    assert ("rst", "model") in traces
+
+
+def test_a_pid_s_weights_are_between_none_and_all_of_the_reference() -> None:
+    for model in MODELS.values():
+        found = design(model)
+        assert found.pid is not None and found.pid.gains is not None
+        for weight in (found.pid.gains.b, found.pid.gains.c):
+            assert -1e-9 <= weight <= 1.0 + 1e-9
+
+
+def test_the_reference_is_moved_no_faster_than_the_force_allows() -> None:
+    model = MODELS["paper_table2"]
+    weak = replace(model, log=(replace(model.log[0], force_peak=100.0),))
+    slow, fast = design(weak), design(model)
+    assert slow.rst is not None and fast.rst is not None
+    assert slow.rst.rate is not None and fast.rst.rate is not None
+    assert slow.rst.rate < 0.6 * fast.rst.rate
+    result, _ = validate(weak, slow, rng())
+    assert result.figures["rst"]["model"].force_peak <= 105.0
+    assert any("move the reference" in (one.note or "") for one in slow.controllers.values())
+
+
+def test_the_command_limit_bounds_it_too() -> None:
+    model = MODELS["paper_table2"]
+    limited = replace(model, rig=replace(model.rig, control_limit=0.3))
+    found = design(limited)
+    assert found.rst is not None and found.rst.rate is not None
+    result, _ = validate(limited, found, rng())
+    peak = result.figures["rst"]["model"].command_peak
+    assert peak is not None and peak < 0.3
+    motor = replace(MODELS["emps"], rig=replace(MODELS["emps"].rig, control_limit=4.0))
+    assert isinstance(motor.simulated.actuator, Motor)
+    assert reference_demand(motor, None).force == pytest.approx(4.0 * 35.15 - 25.0)
+
+
+def test_the_run_has_the_reference_as_given() -> None:
+    model = MODELS["paper_table2"]
+    found = design(model)
+    assert found.rst is not None
+    r = np.repeat([0.0, 0.1], 500)
+    run = run_loop(model, found, found.rst, r, rng())
+    assert np.array_equal(run.r, r)
+    free = run_loop(model, found, replace(found.rst, rate=None), r, rng())
+    assert np.max(np.abs(free.F)) > 2.0 * np.max(np.abs(run.F))
+
+
+@pytest.mark.parametrize(
+    ("asked", "goals"),
+    [(Asked((300.0, 0.7)), Goals()), (Asked(), Goals(modulus=0.99)), (Asked((15, 1)), Goals(0.97))],
+)
+def test_what_misses_the_goals_is_not_recommended(asked: Asked, goals: Goals) -> None:
+    found = design(MODELS["paper_table2"], asked, goals=goals)
+    assert found.recommended == "none"
+    for name, one in found.controllers.items():
+        assert one.missed
+        assert any(f"{name.upper()}: {one.missed[0]}" in line for line in found.remarks)
+    result, _ = validate(MODELS["paper_table2"], found, rng())
+    assert result.judged == "rst"
+
+
+def test_the_pid_is_recommended_where_only_it_keeps_the_goals() -> None:
+    found: Design = design(
+        MODELS["paper_table2"], Asked((36.2, 1.0)), goals=Goals(modulus=0.4, effort=82.0)
+    )
+    assert found.rst is not None and found.pid is not None
+    assert found.rst.missed and not found.pid.missed
+    assert found.recommended == "pid"
+
+
+def failing(model: Model, **changes: float) -> tuple[str, ...]:
+    """What the default design misses where it is validated on a changed rig or log."""
+    found = design(model)
+    rig = replace(model.rig, control_limit=changes.get("control_limit"))
+    log = (replace(model.log[0], force_peak=changes.get("force_peak", model.force_peak)),)
+    result, _ = validate(model, found, rng(), plant=replace(model, rig=rig, log=log))
+    assert result.passed == (not result.figures["rst"]["plant"].missed)
+    return result.figures["rst"]["plant"].missed
+
+
+def test_validation_judges_force_and_command() -> None:
+    model = MODELS["paper_table2"]
+    assert failing(model) == ()
+    (said,) = failing(model, force_peak=120.0)
+    assert said.startswith("peak force") and "the logs show 120 at most" in said
+    (said,) = failing(model, control_limit=0.4)
+    assert said == "the command reaches its limit of 0.4 V"
+    assert failing(model, control_limit=5.0) == ()
+
+
+def test_validation_judges_overshoot() -> None:
+    model = MODELS["paper_table2"]
+    found = design(model)
+    assert found.pid is not None
+    hasty = replace(found.pid, T=found.pid.R, rate=None)
+    result, _ = validate(model, replace(found, pid=hasty, recommended="pid"), rng())
+    assert result.judged == "pid" and not result.passed
+    one = result.figures["pid"]["model"]
+    assert one.overshoot > 0.2
+    assert any(said.startswith("overshoot") for said in one.missed)
+    assert one.settling > 0.2

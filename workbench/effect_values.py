@@ -1,0 +1,140 @@
+"""Parameters of effects: as cards and results write them, and as simulation takes them."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+
+from identification.effects._base import Acting, Effect
+from identification.errors import BadCard, BadModel
+from identification.library import Library
+from identification.result import Estimate
+from workbench.parameter_units import in_unit
+from workbench.units import Motion, conversion
+
+_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
+_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
+
+
+def effect_units(effect: Effect, motion: Motion) -> dict[str, str]:
+    """Units of an effect's parameters, by name; an exponent may be the name of a parameter.
+
+    Effects declare them for a linear machine; a rotary one has rad and N m in the same places.
+    """
+    return {p.name: p.unit if motion == "linear" else _turned(p.unit) for p in effect.params}
+
+
+def known_effect(key: str, library: Library) -> Effect:
+    """The effect of that key; raises BadModel with the nearest one where there is none."""
+    from workbench.card import nearest
+
+    if key not in library:
+        raise BadModel(
+            f"unknown effect {key!r}{nearest(key, library)}; one of your own needs its folder:"
+            " --effects FOLDER"
+        )
+    return library[key]
+
+
+def written_effect(
+    key: str, written: Mapping[str, object], library: Library, motion: Motion = "linear"
+) -> Acting:
+    """The effect as a card writes it: numbers in SI, or texts with a unit such as "30 mm/s".
+
+    Raises BadModel, naming key and parameter, where one is unknown, missing, out of its bounds or
+    of another kind.
+    """
+    effect = known_effect(key, library)
+    units = effect_units(effect, motion)
+    _check_names(key, written, effect)
+    plain = {name: value for name, value in written.items() if not isinstance(value, str)}
+    for name, value in plain.items():
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise BadModel(
+                f"{key}.{name} = {value!r}: a number in {units[name]!r} or a text with its unit"
+                f' needed, as "{_example(effect, name)}"'
+            )
+    values = {name: float(str(value)) for name, value in plain.items()}
+    # Units with an exponent of their own last, when the exponent is known.
+    for name in sorted(written, key=lambda name: "**" in units[name]):
+        text = written[name]
+        if isinstance(text, str):
+            unit = _EXPONENT.sub(lambda found: f"**{values.get(found[1], 1.0):g}", units[name])
+            values[name] = _with_unit(f"{key}.{name}", text, unit, _example(effect, name))
+    return effect.acting(values)
+
+
+def estimates_in_si(
+    key: str, estimates: Mapping[str, Estimate], library: Library, motion: Motion
+) -> dict[str, Estimate]:
+    """An effect's estimates in their SI units; raises BadModel as `written_effect`."""
+    effect = known_effect(key, library)
+    units = effect_units(effect, motion)
+    _check_names(key, estimates, effect)
+
+    def value(name: str) -> float:
+        found = estimates.get(name)
+        return 1.0 if found is None or found.value is None else found.value
+
+    out: dict[str, Estimate] = {}
+    for name, found in estimates.items():
+        unit = units[name]
+        if found.unit == unit:
+            out[name] = found
+            continue
+        plain = _EXPONENT.sub(lambda part: f"**{value(part[1]):g}", found.unit)
+        target = _EXPONENT.sub(lambda part: f"**{value(part[1]):g}", unit)
+        same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]")
+        out[name] = replace(same, unit=unit)
+    return out
+
+
+def relabelled(
+    effect: Effect, estimates: Mapping[str, Estimate], motion: Motion
+) -> dict[str, Estimate]:
+    """Estimates in SI under the units of the machine's motion; their numbers are as they were."""
+    units = effect_units(effect, motion)
+    return {name: replace(found, unit=units[name]) for name, found in estimates.items()}
+
+
+def exact(acting: Acting, motion: Motion) -> dict[str, Estimate]:
+    """Parameters that are known exactly, as those of a recipe."""
+    units = effect_units(acting.effect, motion)
+    return {name: Estimate(value, units[name]) for name, value in acting.values.items()}
+
+
+def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
+    from workbench.card import nearest
+
+    for name in given:
+        if name not in effect.names:
+            raise BadModel(f"{key}: unknown parameter {name!r}{nearest(name, effect.names)}")
+    for p in effect.params:
+        if p.name not in given and p.default is None:
+            raise BadModel(f"{key} has no {p.name!r} [{p.unit}], {p.meaning}; add it")
+
+
+def _with_unit(where: str, text: str, unit: str, example: str) -> float:
+    """The number in `text` in SI; raises BadModel where it is of another kind than `unit`."""
+    found = _NUMBER.fullmatch(text)
+    if found is None:
+        raise BadModel(f'{where} = {text!r}: no number with a unit; write it as "{example}"')
+    try:
+        scale = conversion(found[2], unit)
+    except BadCard as error:
+        raise BadModel(f"{where}: {error}; {unit!r} needed") from None
+    if scale is None:
+        raise BadModel(
+            f'{where}: unit {found[2]!r} is of another kind than {unit!r}; write it as "{example}"'
+        )
+    return scale.factor * float(found[1]) + scale.shift
+
+
+def _example(effect: Effect, name: str) -> str:
+    p = effect.params[effect.names.index(name)]
+    return f"{p.typical:g}" if p.unit == "1" else f"{p.typical:g} {p.unit}"
+
+
+def _turned(unit: str) -> str:
+    """The unit on a rotary machine."""
+    turned = re.sub(r"\bm\b", "rad", unit)
+    return re.sub(r"(/?)\bN\b", lambda found: "/(N m)" if found[1] else "N m", turned)

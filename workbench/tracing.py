@@ -1,0 +1,181 @@
+"""Training and test runs -> trace: what the model lacks, errors before and after, and the model."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.karnopp import NAMES
+from identification.library import Library
+from identification.log import Rig
+from identification.result import Estimate
+from identification.trace import trace
+from identification.trace_result import Errors, Trace
+from workbench.effect_values import relabelled
+from workbench.identifying import Source, arx_plant
+from workbench.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
+from workbench.sources import Sources
+
+SCHEMA = "trace/1"
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Traced:
+    """A trace, the model after it, and the runs that it was made of."""
+
+    trace: Trace
+    model: Model
+    train: tuple[Source, ...]
+    test: tuple[Source, ...]
+    remarks: tuple[str, ...]
+
+
+def trace_sources(
+    train: Sources, test: Sources | None, library: Library, seed: int = 0,
+    on_progress: Progress | None = None,
+) -> Traced:  # fmt: skip
+    """The trace of the machine that the sources are of.
+
+    Raises BadLog where a test log is a training log, NotIdentifiable where too little slides.
+    """
+    seen = test.runs if test else ()
+    _no_twins(train.runs, seen)
+    if test and test.rig != train.rig:
+        raise BadLog(
+            f"{test.runs[0].file}: the card gives it another rig than {train.runs[0].file}; trace"
+            " machines one by one"
+        )
+    found = trace(
+        [source.log for source in train.runs],
+        [source.log for source in seen],
+        train.rig,
+        library,
+        np.random.default_rng(seed),
+        on_progress=on_progress,
+    )
+    remarks = (*train.remarks, *(test.remarks if test else ()))
+    model = model_of(found, train, library)
+    return Traced(found, model, train.runs, seen, remarks)
+
+
+def _no_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
+    """Refuses a test file with the bytes of a training file."""
+    names = {source.sha256: source.file for source in train}
+    for source in test:
+        if source.sha256 in names:
+            raise BadLog(
+                f"{source.file}: the same bytes as {names[source.sha256]}, which is trained on;"
+                " test on a log that the fit has not seen"
+            )
+
+
+def model_of(found: Trace, sources: Sources, library: Library) -> Model:
+    """The model after the trace, as model.json holds it."""
+    rig = sources.rig
+    actuator = {k: v for k, v in found.parameters_after.items() if k not in NAMES}
+    if rig.kind == "motor" and rig.force_per_command is not None:
+        unit = "N m/V" if rig.motion == "rotary" else "N/V"
+        actuator = {"k_a": Estimate(rig.force_per_command, unit, reason="given by the card")}
+    errors = found.after["train"]
+    plant, reason = _arx(sources)
+    chi = (errors.force_rms or 0.0) ** 2 / max(found.noise_force, 1e-300) ** 2
+    return Model(
+        card=sources.card.name,
+        rig=rig,
+        friction={name: found.parameters_after[name] for name in NAMES},
+        actuator=actuator or None,
+        plant=plant,
+        plant_reason=reason,
+        fit=FitSummary(
+            drive="command" if actuator else "force",
+            stiffness=0.0,
+            noise_y=found.noise_y,
+            noise_F=found.noise_F,
+            chi_square=chi,
+            adequate=found.verdict in ("none", "effect", "drift"),
+            evaluations=0,
+            force_relative=errors.force_relative,
+            force_rms=errors.force_rms,
+            remarks=found.remarks,
+        ),
+        log=tuple(_entry(source, errors, chi) for source in sources.runs),
+        versions=versions(),
+        effects={e.effect.key: relabelled(e.effect, e.params, rig.motion) for e in found.effects},
+        library=library,
+    )
+
+
+def _arx(sources: Sources) -> tuple[ArxPlant | None, str | None]:
+    try:
+        return arx_plant([source.log for source in sources.runs]), None
+    except (NotIdentifiable, BadLog, BadModel) as error:
+        return None, str(error)
+
+
+def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
+    log = source.log
+    return LogEntry(
+        file=source.file,
+        sha256=source.sha256,
+        rows=source.rows,
+        start=(float(log["y"][0]), 0.0, float(log["F"][0])),
+        travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
+        force_peak=float(np.max(np.abs(log["F"]))),
+        duration=log.duration,
+        h=log.h,
+        position_rms=errors.position_rms,
+        force_rms=None,
+        chi_square=chi,
+    )
+
+
+def trace_document(traced: Traced, rig: Rig) -> dict[str, Any]:
+    """The trace as trace.json writes it."""
+    found = traced.trace
+    return {
+        "schema": SCHEMA,
+        "card": traced.model.card,
+        "log": _fingerprints(traced.train),
+        "test_log": _fingerprints(traced.test),
+        "verdict": found.verdict,
+        "before": {name: asdict(errors) for name, errors in found.before.items()},
+        "after": {name: asdict(errors) for name, errors in found.after.items()},
+        "noise_floor": {
+            "force_rms": found.noise_force,
+            "actuator_rms": found.noise_actuator,
+        },
+        "effects": [
+            {
+                "key": e.effect.key,
+                "params": _numbers(relabelled(e.effect, e.params, rig.motion)),
+                "explained": e.explained,
+                "p_value": e.p_value,
+            }
+            for e in found.effects
+        ],
+        "rivals": [asdict(rival) for rival in found.rivals],
+        "unknown": {
+            "depends_on": list(found.unknown.depends_on),
+            "explained": found.unknown.explained,
+        },
+        "drift": [asdict(change) for change in found.drift],
+        "next_experiment": found.next_experiment,
+        "parameters": {
+            "before": _numbers(found.parameters_before),
+            "after": _numbers(found.parameters_after),
+        },
+        "remarks": [*traced.remarks, *found.remarks],
+        "versions": versions(),
+    }
+
+
+def _fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
+    found = {s.sha256: {"file": s.file, "sha256": s.sha256, "rows": s.rows} for s in sources}
+    return list(found.values())
+
+
+def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, Any]:
+    return {name: as_number(e) for name, e in estimates.items()}
