@@ -54,6 +54,7 @@ TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that m
 ROUNDS = 4  # of substitution where a contribution depends on the friction itself
 FEWEST_EVENTS = 6
 ROBUST = 9.0  # square from which a row of rest counts less
+BLURRED = 1e3  # times the noise, of a row that says nothing
 OUTSIDE = 1e12  # criterion of parameters outside their bounds
 
 
@@ -64,7 +65,9 @@ class Stage:
     logs: with sensor and command effects found already taken out; theta: m, F_cp, F_cn, F_vp,
     F_vn; theta_a: k1, k2, offset; chosen: effects found so far whose sizes are fitted anew with
     every candidate, at these values; taken: keys of those taken out of the logs; theta_f: in place
-    of theta, for the levels that effects ask for (the rows' noise stays as theta makes it);
+    of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
+    speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
+    out, and when it is crossed is not seen;
     scales: by equation, what its rows' squares are divided by.
     """
 
@@ -75,6 +78,8 @@ class Stage:
     chosen: tuple[tuple[Effect, Values], ...] = ()
     taken: tuple[str, ...] = ()
     theta_f: Array | None = None
+    band: float = 0.0
+    play: bool = False
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     @cached_property
@@ -182,10 +187,22 @@ def plain(
     if equation == MECHANICAL:
         return mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
     if equation == ACTUATOR:
-        return actuator(one, stage.theta_a, y, u)
+        rows = actuator(one, stage.theta_a, y, u)
+        if stage.play:
+            rows = replace(rows, sd=np.where(one_way(one), rows.sd, BLURRED * rows.sd))
+        return rows
     if equation == REST:
         return rest_rows(one, stage.at_rest[i], None if y is None else one.log["y"] - y)
     return breakaway_rows(one, stage.events[i])
+
+
+def one_way(one: Moving) -> BoolArray:
+    """Rows of the actuator equation without a reversal, in which a play may be crossed, (r,)."""
+    assert one.whole is not None
+    way = np.sign(one.signals["v"])
+    turns = np.concatenate([[0], np.cumsum((way[1:] != way[:-1]) | (one.signals["d"][1:] == 0))])
+    low, high = one.whole.start, one.whole.start + one.whole.length
+    return np.asarray(turns[high] == turns[low])
 
 
 def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, rows: Rows) -> Rows:

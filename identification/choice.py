@@ -76,11 +76,13 @@ def first_stage(logs: Sequence[Moving], by_command: bool) -> tuple[Stage, dict[s
 
 
 def choose(
-    logs: Sequence[Moving], by_command: bool, library: Library, rng: np.random.Generator,
+    start: Stage, first: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
     report: Progress,
 ) -> Choice:  # fmt: skip
-    """Effects that the logs call for, one after the other, each judged beside those before."""
-    start, first = first_stage(logs, by_command)
+    """Effects that the logs call for, one after the other, each judged beside those before.
+
+    start, first: the plain model and what it leaves, as `first_stage` gives them.
+    """
     stage, base, steps = start, first, list[Step]()
     for turn in range(MOST):
         done = partial(_report, report, turn)
@@ -187,9 +189,17 @@ def rescaled(stage: Stage, candidate: Candidate, base: Mapping[str, Outcome]) ->
     return replace(candidate, outcomes=outcomes, gain=float(gain))
 
 
-def contribution_rms(candidate: Candidate, base: Mapping[str, Outcome], equation: str) -> float:
+def contribution_rms(
+    candidate: Candidate, base: Mapping[str, Outcome], equation: str, band: float
+) -> float:
     """Root mean square of what the effect changes in an equation, in its unit."""
     before, after = base[equation], candidate.outcomes[equation]
+    own = after.rows.X.shape[1] - before.rows.X.shape[1]
+    if own > 0 and not after.robust:
+        # In the band the body takes any force: what an effect does there says nothing.
+        fast = after.rows.speed >= max(after.slowest, band)
+        moved = (after.rows.X[:, -own:] @ after.fit.theta[-own:])[fast]
+        return float(np.sqrt(np.mean(moved**2))) if len(moved) else 0.0
     keep = after.rows.speed >= max(before.slowest, after.slowest)
     moved = before.fit.residual * before.rows.sd - after.fit.residual * after.rows.sd
     return float(np.sqrt(np.mean(moved[keep] ** 2))) if np.any(keep) else 0.0
@@ -201,7 +211,7 @@ def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) ->
     if candidate.effect.acts == "sensor":
         return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
     for equation in candidate.outcomes:
-        size = contribution_rms(candidate, base, equation)
+        size = contribution_rms(candidate, base, equation, stage.band)
         if equation == MECHANICAL and size > MATERIAL * level:
             return True
         if equation == ACTUATOR and size > MATERIAL_RATE * float(np.std(base[equation].rows.b)):
@@ -284,4 +294,5 @@ def absorb(stage: Stage, candidate: Candidate) -> Stage:
             whole = reached(effect, values, one, stage)
             log = one.log.with_signals(u=np.append(np.diff(whole), 0.0) / one.log.h)
         logs.append(moving(log, held=one.held, by_command=one.whole is not None))
-    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key))
+    play = stage.play or (effect.acts == "sensor" and effect.evolve is not None)
+    return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

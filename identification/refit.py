@@ -23,6 +23,8 @@ from identification.simulate import FreeRun, free_run
 SECONDS = 2.0  # of a window
 CALM = 40.0  # samples around a wanted restart in which a rest is looked for
 ROBUST = 3.0  # residual in noise units from which it counts less
+WHOLE = np.inf  # seconds of a window that is the whole log
+FOLLOWED = 2.0  # robust square up to which a whole run is followed
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
 STEP = 1e-4
 TRIES = 6  # of the damping in one step
@@ -43,7 +45,8 @@ class Refit:
 def restarts(one: Moving, seconds: float = SECONDS) -> tuple[IntArray, Array, Array]:
     """Samples, positions and velocities from which windows start, at rest where one is near."""
     n, h = len(one.log), one.log.h
-    step, y, v, d = max(2, round(seconds / h)), one.log["y"], one.signals["v"], one.signals["d"]
+    step = max(2, round(min(seconds / h, 2.0 * n)))
+    y, v, d = one.log["y"], one.signals["v"], one.signals["d"]
     reach = max(2, round(0.25 * step))
     at = [0]
     for wanted in range(step, n - step // 2, step):
@@ -129,11 +132,13 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
     return Plant(Karnopp(*nine), actuator, tuple(effects))
 
 
-def residuals(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Array:
+def residuals(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float = SECONDS
+) -> Array:
     """Position (and, by command, force) errors in units of the sensors' noise, all logs."""
     parts: list[Array] = []
     for one in logs:
-        run = window_run(plant, one, drive)
+        run = window_run(plant, one, drive, seconds)
         if run is None:
             parts.append(np.full(len(one.log) * (2 if drive == "command" else 1), 1e6))
             continue
@@ -186,21 +191,24 @@ def refit(
         out[open_] = x * unit[open_]
         return out
 
-    def fun(x: Array) -> Array:
-        whole = full(x)
-        r = residuals(plant_with(plant, names, whole), logs, drive)
-        r = np.sign(r) * np.sqrt(np.log1p((r / ROBUST) ** 2)) * ROBUST
-        pull = (whole[tied] - x0[tied]) / (LOOSE * trust[tied])
-        return np.concatenate([r, pull])
+    def left(x: Array, seconds: float) -> Array:
+        r = residuals(plant_with(plant, names, full(x)), logs, drive, seconds)
+        return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / ROBUST) ** 2)) * ROBUST)
 
-    x, J, cost = gauss_newton(fun, x0[open_] / unit[open_], evaluations)
+    def in_windows(x: Array) -> Array:
+        pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
+        return np.concatenate([left(x, SECONDS), pull])
+
+    x, J, cost = gauss_newton(in_windows, x0[open_] / unit[open_], evaluations)
+    if drive == "command" and isinstance(plant.actuator, Actuator):
+        # F + k2 y follows the command, so a whole run does not drift: no window's start errs in it.
+        again = gauss_newton(lambda at: left(at, WHOLE), x, evaluations)
+        if again[2] / len(again[1]) < FOLLOWED:
+            x, J, cost = again
     best = plant_with(plant, names, full(x))
     r = residuals(best, logs, drive)
     chi = float(np.mean(np.minimum(r**2, 1e6)))
-    information = J.T @ J
-    spread = np.sqrt(
-        np.maximum(np.diag(np.linalg.pinv(information)), 0.0) * max(cost / len(r), 1.0)
-    )
+    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * cost / len(J))
     sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
     return Refit(best, sd, chi)
 

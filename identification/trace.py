@@ -18,6 +18,7 @@ from identification.candidates import (
     Candidate,
     Outcome,
     Stage,
+    one_way,
     with_sizes,
 )
 from identification.choice import (
@@ -26,6 +27,7 @@ from identification.choice import (
     Step,
     absorb,
     choose,
+    first_stage,
     merit,
     share,
     spread,
@@ -33,7 +35,7 @@ from identification.choice import (
 from identification.dependence import dependence
 from identification.effects._base import Effect
 from identification.errors import NotIdentifiable
-from identification.evidence import Moving, Rows, actuator, moving, solve, stacked
+from identification.evidence import BLOCKS, Moving, Rows, actuator, moving, solve, stacked
 from identification.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.library import Library
 from identification.log import Log, Rig
@@ -77,6 +79,8 @@ SHAPE = 0.03  # relative trust in a searched parameter
 OUT_OF_LOGS = ("sensor", "command", "delay")
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 SHOWN = 6  # rivals of each effect
+MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
+STRETCHES = 64  # of a log, every eighth of which is left out together
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
@@ -114,10 +118,11 @@ def trace(
     logs = [moving(log, held=held, by_command=by_command) for log in train]
     _enough(logs)
     report("tracing", 0.0)
-    choice = choose(logs, by_command, library, rng, report)
     drive: Drive = "command" if by_command or held else "force"
-    report("refitting", 0.0)
-    before = _model(choice.start, choice.first, (), logs, drive, rig)
+    start, first = first_stage(logs, by_command)
+    before = _model(start, first, (), logs, drive, rig)
+    start = replace(start, band=_band(before))
+    choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
     after = before
     if choice.steps:
@@ -127,6 +132,8 @@ def trace(
     left = _left_over(choice, after)
     drift = _drift(after, choice.steps, seen, rig) if seen else ()
     verdict = _verdict(choice, left, drift)
+    if verdict == "none" and _too_much(choice, after):
+        verdict = "unknown"
     slowest = choice.base[MECHANICAL].slowest
     if after.led:
         remarks.append("the motion is imposed (inertia is of no account): no free run is judged")
@@ -372,8 +379,8 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
     best = Dependence((), 0.0)
     for equation, o in choice.base.items():
         keep = _judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
-        if equation == ACTUATOR and _has_play(choice):
-            keep = keep & _one_way(choice.end)
+        if equation == ACTUATOR and choice.end.play:
+            keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
         if np.count_nonzero(keep) < FEWEST_ROWS:
             continue
         signals = {k: v[keep] for k, v in _signals_at(choice.end, equation).items()}
@@ -386,7 +393,8 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
             limit = 3.0 * np.sqrt(max(spread(o), 1.0))
             r = np.clip(r, -limit, limit)
         way = np.asarray(signals.get("v", r) >= 0)
-        found = dependence(r, signals, way, o.rows.block[keep])
+        n = len(r)  # fine stretches in turn, or no function of time could be judged
+        found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
         left = found.explained * float(np.mean(r**2))
         whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
         if not found.depends_on or left < STRUCTURED or left < SHARE_LEFT * whole:
@@ -399,37 +407,28 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
     return best
 
 
-def _has_play(choice: Choice) -> bool:
-    """Whether a transducer with a memory was found."""
-    found = (step.candidate.effect for step in choice.steps)
-    return any(effect.acts == "sensor" and effect.evolve is not None for effect in found)
-
-
-def _one_way(stage: Stage) -> BoolArray:
-    """Rows of the actuator equation without a reversal, in which a play may be crossed, (r,)."""
-    out = []
-    for one in stage.logs:
-        assert one.whole is not None
-        still = np.concatenate([[0], np.cumsum(one.signals["d"] != np.sign(one.signals["v"]))])
-        turns = np.concatenate(
-            [[0], np.cumsum(np.abs(np.diff(np.sign(one.signals["v"]))) > 0), [0]]
-        )
-        low, high = one.whole.start, one.whole.start + one.whole.length
-        out.append((still[high] == still[low]) & (turns[high] == turns[low]))
-    return np.concatenate(out)
-
-
 def _judged(o: Outcome, after: Model) -> BoolArray:
     """Rows of sliding above the band that the free run shows (or the regression's, without one)."""
-    p = after.plant.friction
-    band = BEYOND * max(p.dv_p, -p.dv_n)
-    slowest = o.slowest if after.led else min(o.slowest, band)
+    slowest = o.slowest if after.led else min(o.slowest, _band(after))
     return np.asarray(o.rows.speed >= slowest)
+
+
+def _band(model: Model) -> float:
+    """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
+    p = model.plant.friction
+    return 0.0 if model.led else BEYOND * max(p.dv_p, -p.dv_n)
 
 
 def _level(choice: Choice) -> float:
     """Coulomb level [N]."""
     return 0.5 * float(np.sum(np.abs(choice.end.theta[1:3])))
+
+
+def _too_much(choice: Choice, after: Model) -> bool:
+    """Whether far more than the sensors' noise is left, of whatever structure."""
+    o = choice.base[MECHANICAL]
+    r = o.fit.residual[_judged(o, after) & (o.rows.speed >= o.slowest)]
+    return bool(len(r) and np.mean(r**2) > MUCH**2)
 
 
 def _verdict(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Verdict:

@@ -1,53 +1,156 @@
 """A trace in words and tables, for a terminal and for its report."""
 
+import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from identification.trace_result import Errors, Trace
+from identification.effects._base import GIVES
+from identification.result import Estimate
+from identification.trace_result import Change, Errors, FoundEffect, Rival, Trace
 from workbench.parameter_units import shown
-from workbench.tracing import Traced
+from workbench.tracing import Traced, effect_estimates
+from workbench.units import Motion
 from workbench.views import Row, in_digits, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group
 
-ERRORS_HEAD = ("error", "train before", "after", "held out before", "after", "sensors' noise")
-EFFECT_HEAD = ("effect", "parameter", "value", "95 % interval", "meaning")
+EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
 RIVAL_HEAD = ("rival", "force left", "why not")
-CHANGE_HEAD = ("parameter", "without effect", "with it", "unit", "change")
+SAME_HEAD = ("parameter", "value", "unit", "95 % interval")
+CHANGE_HEAD = ("parameter", "before", "after", "unit", "95 % interval after", "change")
 DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
+SHOWS = 0.8  # of the force error; an effect that leaves more shows in another error
+MOST = 1000.0  # change shown [%]
+NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
-def sentence(found: Trace, rotary: bool) -> str:
-    """The verdict in one plain sentence."""
-    unit = shown(rotary).force
-    names = " and ".join(f"{e.effect.key} ({e.effect.meaning})" for e in found.effects)
-    before, after = found.before["test"].force_rms, found.after["test"].force_rms
-    errors = ""
-    if before is not None and after is not None and found.effects:
-        errors = (
-            f" Held-out force error {before:.3g} {unit} -> {after:.3g} {unit}"
-            f" (sensors' noise {found.noise_force:.2g} {unit})."
+class Told(NamedTuple):
+    """The error by which a trace is told: its name, before, after, its noise, and its unit."""
+
+    name: str
+    before: float
+    after: float
+    noise: float | None
+    unit: str
+
+
+def words(key: str) -> str:
+    """An effect's key as words."""
+    return key.replace("_", " ")
+
+
+def errors_head(tested: bool) -> Row:
+    """Head of the table of errors; tested: on test logs, not on stretches left out."""
+    test = "held out" if tested else "left out"
+    return ("error", "train before", "after", f"{test} before", "after", "sensors' noise")
+
+
+def sentence(traced: Traced) -> str:
+    """The verdict in one or two plain sentences."""
+    found = traced.trace
+    names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
+    errors = f" {fall(traced)}" if found.effects else ""
+    changed = ", ".join(_changed(change) for change in found.drift)
+    match found.verdict:
+        case "none":
+            return nothing_missing(found, shown(traced.model.rotary).force)
+        case "effect":
+            also = f" The test logs also differ in {changed}." if changed else ""
+            return f"Missing: {names}.{errors}{also}"
+        case "drift":
+            return (
+                f"Drift: between training and test logs the machine changed in {changed};"
+                " its structure holds."
+            )
+        case "inseparable":
+            others = " or ".join(words(key) for key in dict.fromkeys(alike(found)))
+            rival = f" They do not tell it from {others}." if others else ""
+            return f"Inseparable: these logs call for {names}.{rival}{errors}"
+        case _:
+            signals = ", ".join(found.unknown.depends_on)
+            share = f"{100 * found.unknown.explained:.0f} %"
+            known = f" Part of it is {names}.{errors}" if found.effects else ""
+            return (
+                f"Unknown: what is left depends on {signals} (which accounts for {share} of it),"
+                f" and no effect of the library explains it.{known}"
+            )
+
+
+def nothing_missing(found: Trace, unit: str) -> str:
+    """The verdict "none" in words; what is left may be more than noise, without a structure."""
+    left, noise = found.after["test"].force_rms, found.noise_force
+    if left is None:
+        return "Nothing is missing."
+    if left <= NOISE * noise:
+        return (
+            f"Nothing is missing: the model leaves {left:.3g} {unit} of force, the sensors' noise"
+            f" alone {noise:.3g} {unit}."
         )
-    signals = ", ".join(found.unknown.depends_on)
-    if found.verdict == "none":
-        return "Nothing is missing: the model leaves no more than the sensors' noise explains."
-    if found.verdict == "effect":
-        return f"Missing: {names}.{errors}"
-    if found.verdict == "drift":
-        which = ", ".join(change.name for change in found.drift)
-        return f"The structure holds, but the machine has drifted in {which}."
-    if found.verdict == "inseparable":
-        return f"These logs do not tell it from a rival: {names}.{errors}"
-    known = f" Part of it is {names}.{errors}" if found.effects else ""
-    return f"Unknown: what is left depends on {signals}, and no effect explains it.{known}"
+    return (
+        f"No effect is missing that these logs show: what is left ({left:.3g} {unit}, sensors'"
+        f" noise {noise:.3g} {unit}) depends on none of their signals."
+    )
+
+
+def fall(traced: Traced) -> str:
+    """How the error fell in which the effects show."""
+    told = told_by(traced)
+    if told is None:
+        return ""
+    noise = "" if told.noise is None else f" (sensors' noise {told.noise:.3g} {told.unit})"
+    return f"{told.name} {told.before:.3g} {told.unit} -> {told.after:.3g} {told.unit}{noise}."
+
+
+def told_by(traced: Traced) -> Told | None:
+    """The force error, or where that hardly falls the one that falls most."""
+    found, units = traced.trace, shown(traced.model.rotary)
+    before, after = found.before["test"], found.after["test"]
+    where = "Held-out" if traced.test else "On stretches left out,"
+    noise, rate = found.noise_force, found.noise_actuator
+    every = (
+        Told(f"{where} force error", *_both(before, after, "force_rms"), noise, units.force),
+        Told(
+            f"{where} error of the actuator equation",
+            *_both(before, after, "actuator_rms"),
+            rate,
+            f"{units.force}/s",
+        ),
+        Told(
+            f"{where} position error in 2 s",
+            *_both(before, after, "position_rms"),
+            found.noise_y,
+            units.position,
+        ),
+    )
+    known = [told for told in every if math.isfinite(told.before) and told.before > 0]
+    if not known:
+        return None
+    if known[0] is every[0] and known[0].after <= SHOWS * known[0].before:
+        return known[0]
+    return min(known, key=lambda told: told.after / told.before)
+
+
+def _both(before: Errors, after: Errors, key: str) -> tuple[float, float]:
+    values = (getattr(before, key), getattr(after, key))
+    return values if None not in values else (math.nan, math.nan)
+
+
+def alike(found: Trace) -> tuple[str, ...]:
+    """Keys of the rivals that explain as much as an effect taken; the first, where none says so."""
+    keys = [r.key for r in found.rivals if r.why_not.startswith("explains as much")]
+    return tuple(keys or [r.key for r in found.rivals[:1]])
 
 
 def error_rows(found: Trace, rotary: bool) -> list[Row]:
     """Errors before and after, on training and held-out logs."""
     units = shown(rotary)
-    noise = {"force_rms": found.noise_force, "actuator_rms": found.noise_actuator}
+    noise = {
+        "force_rms": found.noise_force,
+        "actuator_rms": found.noise_actuator,
+        "position_rms": found.noise_y,
+    }
     names = {
         "force_rms": f"force, equation of motion [{units.force}]",
         "force_relative": "the same, of the applied force [%]",
@@ -72,41 +175,94 @@ def _cell(errors: Errors, key: str, factor: float) -> str:
     return "-" if value is None else f"{factor * value:.3g}"
 
 
-def effect_rows(found: Trace) -> list[Row]:
+def effect_rows(found: Trace, motion: Motion) -> list[Row]:
     """Every effect's parameters."""
     out: list[Row] = []
     for e in found.effects:
+        estimates = effect_estimates(e, motion)
         for p in e.effect.params:
-            value = e.params[p.name]
-            number = "-" if value.value is None else f"{value.value:.4g} {value.unit}"
-            interval = "held"
-            if value.value is not None and value.low is not None and value.high is not None:
-                interval = " to ".join(in_digits((value.low, value.high), value.value, value.sd))
-            out.append((e.effect.key, p.name, number, interval, p.meaning))
+            value, interval = _value_cells(estimates[p.name])
+            if estimates[p.name].value in (p.low, p.high):
+                interval = "at its bound"
+            unit = "" if p.unit == "1" else estimates[p.name].unit
+            out.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
     return out
 
 
-def rival_rows(found: Trace, rotary: bool) -> list[Row]:
-    """Rivals in the order of what they leave."""
-    unit = shown(rotary).force
+def _value_cells(estimate: Estimate) -> tuple[str, str]:
+    """Value and interval, with the digits that mean something."""
+    if estimate.value is None:
+        return "-", estimate.reason or "not identified"
+    if estimate.low is None or estimate.high is None or not estimate.sd:
+        return f"{estimate.value:.4g}", estimate.reason or "held"
+    numbers = (estimate.value, estimate.low, estimate.high)
+    value, low, high = in_digits(numbers, estimate.value, estimate.sd)
+    return value, f"{low} to {high}"
+
+
+def effect_lines(found: Trace) -> list[str]:
+    """Equation, source and worth of every effect."""
     return [
-        (r.key, "-" if r.test_force_rms is None else f"{r.test_force_rms:.3g} {unit}", r.why_not)
-        for r in found.rivals
+        f"{words(e.effect.key)}: {e.effect.equation}; {GIVES[e.effect.acts]}. {_worth(e)}."
+        f" Source: {e.effect.source}."
+        for e in found.effects
+    ]
+
+
+def _worth(e: FoundEffect) -> str:
+    chance = f"p = {e.p_value:.2g}" if e.p_value >= 1e-4 else "p < 1e-4"
+    return f"It explains {100 * e.explained:.3g} % of what was missing (by luck: {chance})"
+
+
+def rival_rows(found: Trace, rotary: bool) -> list[Row]:
+    """Rivals in the order of the force error that they leave; last those that leave none."""
+    unit = shown(rotary).force
+
+    def left(rival: Rival) -> float:
+        return math.inf if rival.test_force_rms is None else rival.test_force_rms
+
+    return [
+        (
+            words(r.key),
+            "-" if r.test_force_rms is None else f"{r.test_force_rms:.3g} {unit}",
+            r.why_not,
+        )
+        for r in sorted(found.rivals, key=left)
     ]
 
 
 def change_rows(found: Trace) -> list[Row]:
-    """How the plain parameters change when the effect joins."""
+    """The plain parameters; before and after the effects joined, where any did (`change_head`)."""
     out: list[Row] = []
-    for name, before in found.parameters_before.items():
-        after = found.parameters_after[name]
-        if before.value is None or after.value is None:
-            continue
-        change = 100 * (after.value - before.value) / before.value if before.value else 0.0
-        out.append(
-            (name, f"{before.value:.4g}", f"{after.value:.4g}", before.unit, f"{change:+.2g} %")
-        )
+    for name, after in found.parameters_after.items():
+        value, interval = _value_cells(after)
+        before = found.parameters_before.get(name)
+        if not found.effects:
+            out.append((name, value, after.unit, interval))
+        elif before is None or before.value is None or after.value is None:
+            out.append((name, "-", value, after.unit, interval, ""))
+        else:
+            (was,) = in_digits((before.value,), before.value, before.sd)
+            change = percent(before.value, after.value)
+            out.append((name, was, value, after.unit, interval, change))
     return out
+
+
+def change_head(found: Trace) -> Row:
+    """Head of the table of the plain parameters."""
+    return CHANGE_HEAD if found.effects else SAME_HEAD
+
+
+def percent(before: float, after: float) -> str:
+    """Change in percent; empty where there is nothing to compare with."""
+    if before == 0:
+        return ""
+    change = 100 * (after - before) / before
+    if abs(change) > MOST:
+        return f"over {MOST:+.0f} %" if change > 0 else f"below {-MOST:+.0f} %"
+    if round(change, 4) == 0:
+        return "0 %"
+    return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
 
 
 def drift_rows(found: Trace) -> list[Row]:
@@ -117,10 +273,22 @@ def drift_rows(found: Trace) -> list[Row]:
             f"{c.before:.4g}",
             f"{c.after:.4g} ± {1.96 * c.sd:.2g}",
             c.unit,
-            f"{100 * (c.after - c.before) / c.before:+.3g} %" if c.before else "",
+            percent(c.before, c.after),
         )
         for c in found.drift
     ]
+
+
+def _changed(change: Change) -> str:
+    """One change in words."""
+    by = percent(change.before, change.after)
+    much = f" ({by})" if by else ""
+    return f"{change.name} from {change.before:.4g} to {change.after:.4g} {change.unit}{much}"
+
+
+def next_run(found: Trace) -> str:
+    """The run that would tell more, as a sentence; empty where none is needed."""
+    return f"Next run: {found.next_experiment.rstrip('.')}." if found.next_experiment else ""
 
 
 def trace_view(traced: Traced, folder: Path) -> "Group":
@@ -128,22 +296,21 @@ def trace_view(traced: Traced, folder: Path) -> "Group":
     from rich.console import Group, RenderableType
 
     found, rotary = traced.trace, traced.model.rotary
-    parts: list[RenderableType] = [sentence(found, rotary), ""]
-    parts.append(table(ERRORS_HEAD, error_rows(found, rotary)))
+    parts: list[RenderableType] = [sentence(traced)]
+    parts.append(table(errors_head(bool(traced.test)), error_rows(found, rotary)))
     sections: Sequence[tuple[Sequence[str], list[Row]]] = (
-        (EFFECT_HEAD, effect_rows(found)),
-        (CHANGE_HEAD, change_rows(found) if found.effects else []),
+        (EFFECT_HEAD, effect_rows(found, traced.model.rig.motion)),
         (RIVAL_HEAD, rival_rows(found, rotary)),
+        (change_head(found), change_rows(found)),
         (DRIFT_HEAD, drift_rows(found)),
     )
-    parts.extend(table(head, rows) for head, rows in sections if rows)
-    for e in found.effects:
-        parts.append(
-            f"{e.effect.key} explains {100 * e.explained:.3g} % of what was missing;"
-            f" by luck: p = {e.p_value:.2g}"
-        )
+    for head, rows in sections:
+        if rows:
+            parts.append(table(head, rows))
+        if head is EFFECT_HEAD:
+            parts.extend(effect_lines(found))
     if found.next_experiment:
-        parts.append(f"next run: {found.next_experiment}")
+        parts.append(next_run(found))
     parts.extend(f"note: {line}" for line in (*traced.remarks, *found.remarks))
     parts.append(written(folder, "trace.json", "model.json", "report.html"))
     return Group(*parts)

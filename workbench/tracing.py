@@ -9,14 +9,16 @@ import numpy as np
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.karnopp import NAMES
 from identification.library import Library
-from identification.log import Rig
 from identification.result import Estimate
 from identification.trace import trace
-from identification.trace_result import Errors, Trace
+from identification.trace_result import Errors, FoundEffect, Trace
+from workbench.card import load_card
 from workbench.effect_values import relabelled
+from workbench.fetch import card_path
 from workbench.identifying import Source, arx_plant
 from workbench.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
 from workbench.sources import Sources
+from workbench.units import Motion
 
 SCHEMA = "trace/1"
 Progress = Callable[[str, float], None]
@@ -33,6 +35,25 @@ class Traced:
     remarks: tuple[str, ...]
 
 
+def named_logs(
+    logs: Sequence[str], tests: Sequence[str], card_name: str
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Names of the training and the test logs: those given, or without any the card's split.
+
+    Raises BadCard; BadLog where neither the command nor the card names a training log.
+    """
+    if logs:
+        return tuple(logs), tuple(tests)
+    card = load_card(card_path(card_name), with_recipe=False)
+    train = card.split.get("train", ())
+    if not train:
+        raise BadLog(
+            f"{card.name}: no log to train on is named, and the card has no [split] train = [...];"
+            " name a LOG"
+        )
+    return train, tuple(tests) or card.split.get("test", ())
+
+
 def trace_sources(
     train: Sources, test: Sources | None, library: Library, seed: int = 0,
     on_progress: Progress | None = None,
@@ -42,6 +63,11 @@ def trace_sources(
     Raises BadLog where a test log is a training log, NotIdentifiable where too little slides.
     """
     seen = test.runs if test else ()
+    if train.rig.kind == "motor" and not train.rig.force_per_command:
+        raise BadLog(
+            f"{train.runs[0].file}: a motor needs its force_per_command; set it under [rig] of the"
+            " card"
+        )
     _no_twins(train.runs, seen)
     if test and test.rig != train.rig:
         raise BadLog(
@@ -56,9 +82,16 @@ def trace_sources(
         np.random.default_rng(seed),
         on_progress=on_progress,
     )
-    remarks = (*train.remarks, *(test.remarks if test else ()))
+    remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
     model = model_of(found, train, library)
     return Traced(found, model, train.runs, seen, remarks)
+
+
+def _held_out(train: Sources) -> list[str]:
+    """A line for each training log that the card's split holds out."""
+    kept = train.card.split.get("test", ())
+    names = dict.fromkeys(source.file for source in train.runs if source.file in kept)
+    return [f"{name}: trained on, though the card's [split] keeps it for tests" for name in names]
 
 
 def _no_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
@@ -67,8 +100,8 @@ def _no_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
     for source in test:
         if source.sha256 in names:
             raise BadLog(
-                f"{source.file}: the same bytes as {names[source.sha256]}, which is trained on;"
-                " test on a log that the fit has not seen"
+                f"--test {source.file}: the same bytes as the training log"
+                f" {names[source.sha256]}; test on a log that the fit has not seen"
             )
 
 
@@ -81,7 +114,7 @@ def model_of(found: Trace, sources: Sources, library: Library) -> Model:
         actuator = {"k_a": Estimate(rig.force_per_command, unit, reason="given by the card")}
     errors = found.after["train"]
     plant, reason = _arx(sources)
-    chi = (errors.force_rms or 0.0) ** 2 / max(found.noise_force, 1e-300) ** 2
+    chi = _chi_square(errors, found)
     return Model(
         card=sources.card.name,
         rig=rig,
@@ -95,7 +128,7 @@ def model_of(found: Trace, sources: Sources, library: Library) -> Model:
             noise_y=found.noise_y,
             noise_F=found.noise_F,
             chi_square=chi,
-            adequate=found.verdict in ("none", "effect", "drift"),
+            adequate=found.verdict != "unknown",
             evaluations=0,
             force_relative=errors.force_relative,
             force_rms=errors.force_rms,
@@ -103,9 +136,16 @@ def model_of(found: Trace, sources: Sources, library: Library) -> Model:
         ),
         log=tuple(_entry(source, errors, chi) for source in sources.runs),
         versions=versions(),
-        effects={e.effect.key: relabelled(e.effect, e.params, rig.motion) for e in found.effects},
+        effects={e.effect.key: effect_estimates(e, rig.motion) for e in found.effects},
         library=library,
     )
+
+
+def _chi_square(errors: Errors, found: Trace) -> float:
+    """Mean square of the equation of motion's residual over that of the sensors' noise."""
+    if errors.force_rms is None or not found.noise_force > 0:
+        return 1.0
+    return (errors.force_rms / found.noise_force) ** 2
 
 
 def _arx(sources: Sources) -> tuple[ArxPlant | None, str | None]:
@@ -132,9 +172,14 @@ def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
     )
 
 
-def trace_document(traced: Traced, rig: Rig) -> dict[str, Any]:
-    """The trace as trace.json writes it."""
-    found = traced.trace
+def effect_estimates(found: FoundEffect, motion: Motion) -> dict[str, Estimate]:
+    """An effect's parameters under the units of the machine's motion."""
+    return relabelled(found.effect, found.params, motion)
+
+
+def trace_document(traced: Traced) -> dict[str, Any]:
+    """The trace as trace.json writes it: the keys of the contract, and what it allows beside."""
+    found, motion = traced.trace, traced.model.rig.motion
     return {
         "schema": SCHEMA,
         "card": traced.model.card,
@@ -143,14 +188,11 @@ def trace_document(traced: Traced, rig: Rig) -> dict[str, Any]:
         "verdict": found.verdict,
         "before": {name: asdict(errors) for name, errors in found.before.items()},
         "after": {name: asdict(errors) for name, errors in found.after.items()},
-        "noise_floor": {
-            "force_rms": found.noise_force,
-            "actuator_rms": found.noise_actuator,
-        },
+        "noise_floor": {"force_rms": found.noise_force},
         "effects": [
             {
                 "key": e.effect.key,
-                "params": _numbers(relabelled(e.effect, e.params, rig.motion)),
+                "params": _numbers(effect_estimates(e, motion)),
                 "explained": e.explained,
                 "p_value": e.p_value,
             }

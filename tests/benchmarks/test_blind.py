@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.blind import ROOT, run
-from benchmarks.blind_cases import Case, effect_keys, make
+from benchmarks.blind_cases import Case, case_of, effect_keys, make
 from benchmarks.blind_effects import SIZES, acting, place_of, right_signals, shows
 from benchmarks.blind_machines import MACHINES, lively, machine, simulated, stream
 from benchmarks.blind_report import clopper_pearson, judged, print_report
@@ -24,6 +24,7 @@ def test_a_run_from_case_to_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     run([case], file, jobs=1, seconds=SECONDS)
     run([case], file, jobs=1, seconds=SECONDS)  # held already: nothing is made again
     lines = [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+    assert case_of(lines[0]["case"]) == case
     assert [line["case"] for line in lines] == ["single:table2:spring:0.4:0"]
     assert set(lines[0]["truth"]["effects"]) == {"spring"}
     assert lines[0]["trace"]["verdict"] != "fault", lines[0]["trace"]

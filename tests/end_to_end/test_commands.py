@@ -6,16 +6,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from identification.effects import spring as spring_module
-from tests.chain import CARD, identified, short_recipe
+from tests.chain import CARD
 from workbench import demonstration
 from workbench.cli import COMMANDS, main
-from workbench.demonstration import Demonstration
-from workbench.recording import truth
-from workbench.tuning import design
 from workbench.validating import Limits, validate
 
 
@@ -309,14 +305,10 @@ def test_a_model_without_a_plant_is_a_refusal(
 def test_a_demo_that_fails_says_so_by_its_status(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    card, recipe = short_recipe()
-    model = identified()
-    found = design(model.model)
-    limits = Limits(standstill=1e-9)
-    result, traces = validate(model.model, found, np.random.default_rng(0), limits=limits)
-    known = truth(card.name, recipe)
-    failed = Demonstration(model, found, result, traces, known)
-    monkeypatch.setattr(demonstration, "demonstrate", lambda *_: failed)
+    def strict(*args: Any, **more: Any) -> Any:
+        return validate(*args, **more, limits=Limits(standstill=1e-9))
+
+    monkeypatch.setattr(demonstration, "validate", strict)
     shown = as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)
     assert shown["passed"] is False
     assert shown["reason"].startswith("RST on the model: error at standstill")
@@ -326,5 +318,6 @@ def test_demo_runs_the_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     found = as_json(capsys, ["demo", "--out", str(tmp_path / "demo")])
     assert found["passed"] is True
     assert found["worst_error"] < 5e-3
-    names = {"model.json", "design.json", "validation.json", "truth.json"}
-    assert names | {"report.html", "design.html", "identification.html"} <= files(tmp_path / "demo")
+    assert found["verdict"] == "effect" and found["effects"] == ["stribeck"]
+    names = {"model.json", "design.json", "validation.json", "truth.json", "trace.json"}
+    assert names | {"report.html", "design.html", "validation.html"} <= files(tmp_path / "demo")

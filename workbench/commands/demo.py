@@ -5,10 +5,16 @@ from pathlib import Path
 
 import click
 
-from workbench.commands.identify import staged
+from workbench.commands.trace import staged
 from workbench.output import OutputFolder, emit, output_options, progress
 
-RECIPE = "paper_table2"
+RECIPE = "demo"
+STAGES = {
+    "tracing": (0.0, 0.6),
+    "refitting": (0.6, 0.85),
+    "judging": (0.85, 0.9),
+    "designing": (0.9, 1.0),
+}
 
 
 @click.command(epilog="Example: workbench demo --out demo")
@@ -20,34 +26,40 @@ RECIPE = "paper_table2"
 def command(seed: int, as_json: bool, out: Path | None) -> int:
     """Run the whole chain on a shipped recipe and write a report.
 
-    Simulates the paper's rig (table 2) in its PID loop, identifies it from that log alone, designs
-    PID and RST, checks them in simulation. Tracing a residual to its effect is not part of it yet.
-    Exit status 1: the recommended controller does not keep the limits.
+    Simulates two runs of the paper's rig (table 2) with an effect that is declared nowhere but in
+    the truth file, finds that effect from one log, judges it on the other, designs PID and RST on
+    the model found, and checks them in simulation. Exit status 1: the effect is not found, or the
+    recommended controller does not keep the limits.
     """
     from workbench.card import load_card
     from workbench.demonstration import demo_view, demonstrate
     from workbench.design_values import design_document
     from workbench.fetch import card_path
     from workbench.model import model_document
-    from workbench.report.reports import design_report, identification_report, validation_report
+    from workbench.report.reports import design_report, validation_report
+    from workbench.report.trace import trace_report
+    from workbench.tracing import trace_document
     from workbench.validating import validation_document
     from workbench.validation_views import missed
 
     card = load_card(card_path(RECIPE))
     with OutputFolder("demo", out, now=datetime.now()) as folder:
         with progress("demo", 1.0, as_json=as_json) as advance:
-            found = demonstrate(card, folder.path, seed, staged(advance))
-        identified, validation = found.identified, found.validation
-        folder.write_json("model.json", model_document(identified.model))
+            found = demonstrate(card, folder.path, seed, staged(advance, STAGES))
+        traced, validation = found.traced, found.validation
+        folder.write_json("trace.json", trace_document(traced))
+        folder.write_json("model.json", model_document(traced.model))
         folder.write_json("design.json", design_document(found.design))
         folder.write_json("validation.json", validation_document(validation))
-        rotary = identified.model.rotary
-        folder.write_text("identification.html", identification_report(identified))
+        rotary = traced.model.rotary
+        folder.write_text("report.html", trace_report(traced))
         folder.write_text("design.html", design_report(found.design, rotary))
-        folder.write_text("report.html", validation_report(validation, found.traces, rotary))
+        folder.write_text("validation.html", validation_report(validation, found.traces, rotary))
     result = {
         "recipe": RECIPE,
         "seed": seed,
+        "verdict": traced.trace.verdict,
+        "effects": [e.effect.key for e in traced.trace.effects],
         "worst_error": found.worst_error,
         "recommended": found.design.recommended,
         "passed": validation.passed,

@@ -1,0 +1,41 @@
+"""Dependence: the signal on which a residual depends, and none where it is noise."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.dependence import dependence
+
+
+def signals(n: int, rng: np.random.Generator) -> dict[str, Array]:
+    return {"v": rng.normal(size=n), "y": rng.uniform(-1, 1, n), "t": np.linspace(0, 60, n)}
+
+
+@pytest.mark.parametrize("name", ["v", "y", "t"])
+def test_names_the_signal(name: str) -> None:
+    rng = np.random.default_rng(3)
+    n = 2000
+    s = signals(n, rng)
+    up = s["v"] > 0
+    r = np.where(up, 1.0, -1.0) * np.tanh(s[name] - np.median(s[name])) + 0.5 * rng.normal(size=n)
+    found = dependence(r, s, up, np.arange(n) * 8 // n)
+    assert found.depends_on[0] == name
+
+
+def test_a_fine_ripple_is_seen() -> None:
+    rng = np.random.default_rng(4)
+    n = 4000
+    s = signals(n, rng)
+    r = np.sin(2 * np.pi * s["y"] / 0.15) + 0.3 * rng.normal(size=n)
+    found = dependence(r, s, s["v"] > 0, np.arange(n) % 400 * 8 // 400)
+    assert found.depends_on == ("y",)
+
+
+def test_noise_depends_on_nothing() -> None:
+    named = 0
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        s = signals(1500, rng)
+        r = rng.normal(size=1500)
+        named += bool(dependence(r, s, s["v"] > 0, np.arange(1500) * 8 // 1500).depends_on)
+    assert named == 0

@@ -1,0 +1,117 @@
+"""Trace: the right effect on a log that has it, nothing on one that lacks none, drift as drift."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.karnopp import Karnopp
+from identification.library import Library, built_in
+from identification.log import Log, Rig
+from identification.plant import Actuator, Plant
+from identification.simulate import free_run
+from identification.trace import trace
+from identification.trace_result import Trace
+
+H = 2e-3
+RIG = Rig("force")
+PLAIN = Karnopp(2.5, 15.0, 18.0, 120.0, 150.0, 0.008, -0.01, 19.0, -23.0)
+ACTUATOR = Actuator(19530.0, 10405.0)
+
+
+def command(n: int, seed: int) -> Array:
+    """A command that moves the body as slow sines and a few steps would have it, at rest first."""
+    rng = np.random.default_rng(seed)
+    t = H * np.arange(n)
+    lines = rng.uniform(0.05, 1.5, 12)
+    r = sum(
+        a * np.sin(2 * np.pi * f * t + p)
+        for a, f, p in zip(1 / lines, lines, rng.uniform(0, 6.3, 12), strict=True)
+    )
+    r = 0.06 * r / np.std(r) + np.repeat(rng.uniform(-0.02, 0.02, n // 1000 + 1), 1000)[:n]
+    u = np.diff(r, append=r[-1]) / H * ACTUATOR.k2 / ACTUATOR.k1
+    u[:200] = 0.0
+    return np.clip(u, -3.0, 3.0)
+
+
+def made(seed: int, plain: Karnopp = PLAIN, n: int = 15_000, **effects: dict[str, float]) -> Log:
+    """30 s at 500 Hz of the plant with these effects, with the paper's noise."""
+    acting = tuple(built_in()[key].acting(values) for key, values in effects.items())
+    rng = np.random.default_rng(seed + 1)
+    blank = Log(
+        f"run{seed}",
+        {"t": H * np.arange(n), "u": command(n, seed), "y": np.zeros(n), "F": np.zeros(n)},
+    )
+    run = free_run(Plant(plain, ACTUATOR, acting), blank, (0.0, 0.0, 0.0), "command")
+    return blank.with_signals(
+        y=run.shown + 1e-5 * rng.standard_normal(n), F=run.F + 1e-2 * rng.standard_normal(n)
+    )
+
+
+def traced(train: Log, *test: Log, library: Library | None = None) -> Trace:
+    return trace([train], list(test), RIG, library or built_in(), np.random.default_rng(0))
+
+
+def test_nothing_is_missing_where_nothing_is() -> None:
+    before = made(11)
+    copies = {key: np.array(values) for key, values in before.signals.items()}
+    found = traced(before, made(12))
+    assert found.verdict == "none"
+    assert not found.effects and not found.drift and not found.unknown.depends_on
+    assert found.after["test"].force_rms == pytest.approx(found.noise_force, rel=0.15)
+    for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn", "dv_p", "dv_n", "F_sp", "F_sn"):
+        value = found.parameters_after[name].value
+        assert value == pytest.approx(getattr(PLAIN, name), rel=5e-3), name
+    for key, values in copies.items():
+        assert np.array_equal(before[key], values)
+
+
+@pytest.mark.parametrize(
+    ("key", "values"),
+    [
+        ("stribeck", {"F_s": 3.5, "v_s": 0.04}),
+        ("warmup", {"a": -0.25, "tau": 10.0}),
+        ("valve_dead_zone", {"u_d": 0.03}),
+        ("cogging", {"a": 2.0, "b": 1.5, "period": 0.03}),
+        ("sensor_nonlinearity", {"a": 0.05}),
+    ],
+)
+def test_the_effect_is_named_and_its_size_found(key: str, values: dict[str, Any]) -> None:
+    found = traced(made(21, **{key: values}), made(22, **{key: values}))
+    assert found.verdict == "effect"
+    assert [e.effect.key for e in found.effects] == [key]
+    for name, value in values.items():
+        assert found.effects[0].params[name].value == pytest.approx(value, rel=0.1), name
+    assert found.effects[0].p_value <= 0.01
+    errors = "actuator_rms" if key == "valve_dead_zone" else "force_rms"
+    before, after = getattr(found.before["test"], errors), getattr(found.after["test"], errors)
+    assert after < 0.6 * before
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "signal"),
+    [
+        ("warmup", {"a": -0.25, "tau": 10.0}, "t"),
+        ("position_dependent_friction", {"a": 3.0, "period": 0.1}, "y"),
+    ],
+)
+def test_an_effect_that_the_library_lacks_is_unknown(
+    key: str, values: dict[str, Any], signal: str
+) -> None:
+    library = {k: e for k, e in built_in().items() if k != key}
+    found = traced(made(31, **{key: values}), made(32, **{key: values}), library=library)
+    assert found.verdict == "unknown"
+    assert signal in found.unknown.depends_on
+    assert found.next_experiment
+
+
+def test_other_parameters_are_drift() -> None:
+    worn = replace(PLAIN, F_cp=12.0, F_vn=180.0)
+    found = traced(made(41), made(42, worn))
+    assert found.verdict == "drift"
+    changes = {change.name: change for change in found.drift}
+    assert set(changes) == {"F_cp", "F_vn"}
+    assert changes["F_cp"].after == pytest.approx(12.0, rel=0.01)
+    assert changes["F_vn"].after == pytest.approx(180.0, rel=0.01)
