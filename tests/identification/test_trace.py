@@ -1,5 +1,6 @@
 """Trace: the right effect on a log that has it, nothing on one that lacks none, drift as drift."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -36,9 +37,14 @@ def command(n: int, seed: int) -> Array:
     return np.clip(u, -3.0, 3.0)
 
 
-def made(seed: int, plain: Karnopp = PLAIN, n: int = 15_000, **effects: dict[str, float]) -> Log:
+def made(
+    seed: int,
+    effects: Mapping[str, Mapping[str, float]] | None = None,
+    plain: Karnopp = PLAIN,
+    n: int = 15_000,
+) -> Log:
     """30 s at 500 Hz of the plant with these effects, with the paper's noise."""
-    acting = tuple(built_in()[key].acting(values) for key, values in effects.items())
+    acting = tuple(built_in()[key].acting(values) for key, values in (effects or {}).items())
     rng = np.random.default_rng(seed + 1)
     blank = Log(
         f"run{seed}",
@@ -79,7 +85,7 @@ def test_nothing_is_missing_where_nothing_is() -> None:
     ],
 )
 def test_the_effect_is_named_and_its_size_found(key: str, values: dict[str, Any]) -> None:
-    found = traced(made(21, **{key: values}), made(22, **{key: values}))
+    found = traced(made(21, {key: values}), made(22, {key: values}))
     assert found.verdict == "effect"
     assert [e.effect.key for e in found.effects] == [key]
     for name, value in values.items():
@@ -101,7 +107,7 @@ def test_an_effect_that_the_library_lacks_is_unknown(
     key: str, values: dict[str, Any], signal: str
 ) -> None:
     library = {k: e for k, e in built_in().items() if k != key}
-    found = traced(made(31, **{key: values}), made(32, **{key: values}), library=library)
+    found = traced(made(31, {key: values}), made(32, {key: values}), library=library)
     assert found.verdict == "unknown"
     assert signal in found.unknown.depends_on
     assert found.next_experiment
@@ -109,7 +115,7 @@ def test_an_effect_that_the_library_lacks_is_unknown(
 
 def test_other_parameters_are_drift() -> None:
     worn = replace(PLAIN, F_cp=12.0, F_vn=180.0)
-    found = traced(made(41), made(42, worn))
+    found = traced(made(41), made(42, plain=worn))
     assert found.verdict == "drift"
     changes = {change.name: change for change in found.drift}
     assert set(changes) == {"F_cp", "F_vn"}
