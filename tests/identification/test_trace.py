@@ -34,7 +34,7 @@ def command(n: int, seed: int) -> Array:
     r = 0.06 * r / np.std(r) + np.repeat(rng.uniform(-0.02, 0.02, n // 1000 + 1), 1000)[:n]
     u = np.diff(r, append=r[-1]) / H * ACTUATOR.k2 / ACTUATOR.k1
     u[:200] = 0.0
-    return np.clip(u, -3.0, 3.0)
+    return np.asarray(np.clip(u, -3.0, 3.0), dtype=np.float64)
 
 
 def made(
@@ -48,7 +48,12 @@ def made(
     rng = np.random.default_rng(seed + 1)
     blank = Log(
         f"run{seed}",
-        {"t": H * np.arange(n), "u": command(n, seed), "y": np.zeros(n), "F": np.zeros(n)},
+        {
+            "t": H * np.arange(n, dtype=np.float64),
+            "u": command(n, seed),
+            "y": np.zeros(n),
+            "F": np.zeros(n),
+        },
     )
     run = free_run(Plant(plain, ACTUATOR, acting), blank, (0.0, 0.0, 0.0), "command")
     return blank.with_signals(
