@@ -21,7 +21,7 @@ from identification.candidates import (
     reached,
     shown_to_true,
 )
-from identification.evidence import Moving, moving
+from identification.evidence import Moving, moving, solve, stacked
 from identification.library import Library
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
@@ -30,6 +30,9 @@ DRAWS = 200  # of the null hypothesis
 SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
 LEVEL = 0.01  # chance up to which a gain is no luck
 MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
+CARRIES = 0.95  # of the error on logs left out, that an effect may leave
+MOSTLY = 0.55  # of what is missing, where much is left in the end
+FAR = 25.0  # square in noise units from which much is left
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 PENALTY = 5.0  # criterion that each parameter more has to gain
@@ -93,7 +96,54 @@ def choose(
         stage, base = settled(replace(absorb(step.stage, step.candidate), scales={}))
         if len(stage.chosen) > 1:
             stage, base, steps = polished(stage, base, steps)
+    if steps and misfit(base):
+        stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base)
+
+
+def misfit(base: Mapping[str, Outcome]) -> bool:
+    """Whether far more than the sensors' noise is left when nothing more is found."""
+    return any(spread(base[e]) > FAR for e in (MECHANICAL, ACTUATOR) if e in base)
+
+
+def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Outcome], list[Step]]:
+    """The leading steps that carry over to logs left out, or else explain most of what is missing.
+
+    Where much is left whatever is added, a term that explains a part of it lowers the training
+    error and may raise that of another run (measured on EMPS).
+    """
+    kept: list[Step] = []
+    stage, base = start, base_outcomes(start)
+    slowest = base[MECHANICAL].slowest
+    error = left_out_error(stage, slowest)
+    for step in steps:
+        after, found = settled(replace(absorb(stage, step.candidate), scales={}))
+        without = left_out_error(after, slowest)
+        carries = without < CARRIES * error if error > 0 else False
+        if not carries and share(step.candidate, step.base) < MOSTLY:
+            break
+        kept.append(step)
+        stage, base, error = after, found, without
+    return stage, base, kept
+
+
+def left_out_error(stage: Stage, slowest: float) -> float:
+    """Root mean square of the mechanical equation [N] on each log, fitted on all others.
+
+    0 where there is one log only.
+    """
+    parts = stage.parts[MECHANICAL]
+    if len(parts) < 2:
+        return 0.0
+    rows = stacked(parts)
+    of_log = np.repeat(np.arange(len(parts)), [len(p.b) for p in parts])
+    keep = rows.speed >= slowest
+    r = np.zeros(len(rows.b))
+    for i in range(len(parts)):
+        out = of_log == i
+        theta = solve(rows, keep & ~out).theta
+        r[out] = rows.b[out] - rows.X[out] @ theta
+    return float(np.sqrt(np.mean(r[keep] ** 2)))
 
 
 def _report(report: Progress, turn: int, part: float) -> None:

@@ -22,6 +22,7 @@ from identification.candidates import (
     with_sizes,
 )
 from identification.choice import (
+    FAR,
     MATERIAL,
     Choice,
     Step,
@@ -56,9 +57,10 @@ from identification.trace_result import (
 Progress = Callable[[str, float], None]
 FEWEST_ROWS = 30
 SHARE_LEFT = 0.002  # of what was missing, that may be left with structure
+ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
 STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 ALIKE = 10.0  # gain by which two effects that explain equally may differ
-LINEAR_ACTUATOR = 0.7  # share of dF/dt that a linear actuator may leave, to be one at all
+LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed has to gain
 DRIFT_SHARE = 0.1  # of the test logs' square error that it has to take away
 DRIFT_LEAST = 0.01  # of its value, that it changes at least
@@ -80,6 +82,7 @@ OUT_OF_LOGS = ("sensor", "command", "delay")
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 SHOWN = 6  # rivals of each effect
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
+OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
@@ -296,8 +299,9 @@ def _left_out(stage: Stage, equation: str, slowest: float) -> tuple[Array, Array
     return r[keep], rows.b[keep]
 
 
-def _rms(r: Array) -> float | None:
-    return float(np.sqrt(np.mean(r**2))) if len(r) else None
+def _rms(r: Array) -> float:
+    """Root mean square; 0 of nothing."""
+    return float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
 
 
 def _errors(
@@ -323,7 +327,7 @@ def _errors(
         size = _rms(force[0])
         out[name] = Errors(
             force_rms=size,
-            force_relative=size / whole if size is not None and whole else None,
+            force_relative=size / whole if whole else None,
             position_rms=None if model.led else position_rms(model.plant, over, drive),
             actuator_rms=_rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
         )
@@ -386,6 +390,8 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
         signals = {k: v[keep] for k, v in _signals_at(choice.end, equation).items()}
         if equation == BREAKAWAY:  # force and command at breakaway are what is judged
             signals = {k: v for k, v in signals.items() if k not in ("F", "u", "v", "reversal")}
+        if equation == MECHANICAL and _rms(o.fit.residual * o.rows.sd) > OWN * _rms(o.rows.b):
+            signals.pop("F", None)  # a large residual is itself a good part of F
         if any(effect.acts == "bristle" for effect, _ in choice.end.chosen):
             signals.pop("reversal", None)  # its rise is judged in the free run
         r = o.fit.residual[keep]
@@ -397,7 +403,9 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
         found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
         left = found.explained * float(np.mean(r**2))
         whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
-        if not found.depends_on or left < STRUCTURED or left < SHARE_LEFT * whole:
+        rough = bool(choice.steps) and spread(o) > FAR
+        part = ROUGH_LEFT if rough else SHARE_LEFT
+        if not found.depends_on or left < STRUCTURED or left < part * whole:
             continue
         size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
         if size < LEFT_LEAST.get(equation, 0.0) * _level(choice):

@@ -51,7 +51,8 @@ def sentence(traced: Traced) -> str:
     """The verdict in one or two plain sentences."""
     found = traced.trace
     names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
-    errors = f" {fall(traced)}" if found.effects else ""
+    told = fall(traced) if found.effects else ""
+    errors = f" {told}" if told else ""
     changed = ", ".join(_changed(change) for change in found.drift)
     match found.verdict:
         case "none":
@@ -84,9 +85,10 @@ def nothing_missing(found: Trace, unit: str) -> str:
     if left is None:
         return "Nothing is missing."
     if left <= NOISE * noise:
+        where = "" if found.noise_actuator is not None else " in the equation of motion"
         return (
-            f"Nothing is missing: the model leaves {left:.3g} {unit} of force, the sensors' noise"
-            f" alone {noise:.3g} {unit}."
+            f"Nothing is missing{where}: the model leaves {left:.3g} {unit} of force, the"
+            f" sensors' noise alone {noise:.3g} {unit}."
         )
     return (
         f"No effect is missing that these logs show: what is left ({left:.3g} {unit}, sensors'"

@@ -65,7 +65,7 @@ def trace_report(traced: Traced) -> str:
     if notes:
         sections.append(Section("Notes", render("lines", lines=notes)))
     lead = f"{sentence(traced)} {next_run(found)}".strip()
-    return page(f"What {model.card} lacks", lead, sections)
+    return page(f"Trace of {model.card}", lead, sections)
 
 
 def _drawn(drawn: list[Picture], rotary: bool) -> list[Section]:

@@ -12,10 +12,18 @@ from identification.karnopp import NAMES, Karnopp
 from identification.trace_result import Trace
 from workbench.model import used
 from workbench.parameter_units import shown
-from workbench.report.figures import MEASURED, MODEL, figure, inline, label, spread, style
+from workbench.report.figures import (
+    MEASURED,
+    MODEL,
+    REFERENCE,
+    figure,
+    inline,
+    label,
+    spread,
+    style,
+)
 from workbench.report.friction import MARGIN, friction_data
 from workbench.report.page import Section, render
-from workbench.report.trace_pictures import BEFORE
 from workbench.trace_views import words
 from workbench.tracing import Traced
 
@@ -71,12 +79,12 @@ def _curves(found: Trace, after: Karnopp, speeds: list[Acting]) -> list[Curve]:
     """Models whose friction is drawn."""
     if found.effects:
         before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
-        return [(before, [], BEFORE, "before"), (after, speeds, MODEL, "after")]
+        return [(before, [], REFERENCE, "before"), (after, speeds, MODEL, "after")]
     if not _drifted(found):
         return [(after, speeds, MODEL, "model")]
     changed = {change.name: change.after for change in found.drift if change.name in NAMES}
     return [
-        (after, [], BEFORE, "on the training logs"),
+        (after, [], REFERENCE, "on the training logs"),
         (replace(after, **changed), [], MODEL, "on the test logs"),
     ]
 

@@ -185,7 +185,7 @@ def over_time(residual: Residual, rotary: bool) -> Section:
         name = f"trace-time-{residual.equation}"
         svg = inline(drawn, name, "residual against time, before and after")
     shares = [
-        f"{inside(values, residual.noise):.0f} % {name}" for values, _, name in _both(residual)
+        f"{inside(values, residual.noise):.0f} % ({name})" for values, _, name in _both(residual)
     ]
     caption = (
         f"{EQUATIONS[residual.equation].capitalize()}, averaged over short windows; a complete"
@@ -199,7 +199,7 @@ def _both(residual: Residual) -> list[tuple[Array, str, str]]:
     """Residual before and after, their colours and names; one, where nothing was added."""
     after = (residual.after, MODEL, "after")
     if np.array_equal(residual.before, residual.after):
-        return [(residual.after, MODEL, "of the model")]
+        return [(residual.after, MODEL, "model")]
     return [(residual.before, BEFORE, "before"), after]
 
 

@@ -1,0 +1,309 @@
+"""A trace as trace.json and model.json, in words, and as a report."""
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.errors import BadLog
+from identification.karnopp import NAMES
+from identification.library import built_in
+from identification.trace_result import Errors, Verdict
+from tests.workbench.test_report import checked
+from tests.workbench.trace_values import residual, sources, trace_of, traced
+from workbench import tracing
+from workbench.model import model_document, read_model
+from workbench.output import dumps
+from workbench.report.trace import trace_report
+from workbench.report.trace_friction import sliding_friction
+from workbench.report.trace_pictures import (
+    along_rows,
+    axis_label,
+    inside,
+    log_starts,
+    pictures,
+    running_median,
+)
+from workbench.trace_views import (
+    change_head,
+    change_rows,
+    drift_rows,
+    effect_rows,
+    error_rows,
+    percent,
+    rival_rows,
+    sentence,
+    trace_view,
+)
+from workbench.tracing import model_of, named_logs, trace_document, trace_sources
+
+CONTRACT = {
+    "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
+    "next_experiment",
+}  # fmt: skip
+BESIDE = {"remarks", "parameters", "card", "log", "test_log", "versions"}
+ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
+NUMBER = {"value", "unit", "sd", "low", "high"}
+
+
+def test_the_document_has_the_keys_of_the_contract() -> None:
+    found = json.loads(dumps(trace_document(traced(trace_of()))))
+    assert set(found) == CONTRACT | BESIDE
+    assert found["schema"] == "trace/1"
+    for when in ("before", "after"):
+        assert {where: set(found[when][where]) for where in found[when]} == {
+            "train": ERRORS,
+            "test": ERRORS,
+        }
+    assert found["noise_floor"] == {"force_rms": 0.069}
+    (effect,) = found["effects"]
+    assert set(effect) == {"key", "params", "explained", "p_value"}
+    assert set(effect["params"]) == {"F_s", "v_s", "asymmetry"}
+    assert all(set(number) == NUMBER for number in effect["params"].values())
+    assert all(set(rival) == {"key", "test_force_rms", "why_not"} for rival in found["rivals"])
+    assert set(found["unknown"]) == {"depends_on", "explained"}
+    assert set(found["parameters"]["after"]) == {*NAMES, "k1", "k2"}
+    assert [log["file"] for log in found["log"] + found["test_log"]] == ["a.csv", "b.csv"]
+    assert found["remarks"] == ["a log was repaired", "a remark of the trace"]
+
+
+def test_numbers_that_do_not_exist_are_null() -> None:
+    found = trace_of()
+    none = {where: Errors(float("nan"), None, None, None) for where in ("train", "test")}
+    document = json.loads(dumps(trace_document(traced(replace(found, before=none)))))
+    assert set(document["before"]["test"].values()) == {None}
+
+
+def test_the_model_after_is_read_back_with_its_effects(tmp_path: Path) -> None:
+    model = traced(trace_of("effect", ("stribeck", "spring"))).model
+    (tmp_path / "model.json").write_text(dumps(model_document(model)), encoding="utf-8")
+    found = read_model(tmp_path / "model.json")
+    assert found.simulated == model.simulated
+    assert {a.key for a in found.acting} == {"stribeck", "spring"}
+    assert found.friction["F_cp"].value == 11.0
+    assert found.plant is not None and found.fit.adequate
+    assert not traced(trace_of("unknown", ())).model.fit.adequate
+
+
+def test_a_force_without_noise_is_no_fault() -> None:
+    model = model_of(replace(trace_of(), noise_force=0.0), sources(), built_in())
+    assert model.fit.chi_square == 1.0
+
+
+def test_a_rotary_machine_has_rotary_units() -> None:
+    found = traced(trace_of("effect", ("stribeck", "spring")), rotary=True)
+    document = trace_document(found)
+    assert document["effects"][0]["params"]["v_s"]["unit"] == "rad/s"
+    assert found.model.effects["spring"]["k"].unit == "N m/rad"
+    assert [row[2] for row in effect_rows(found.trace, "rotary")] == [
+        "N m",
+        "rad/s",
+        "",
+        "N m/rad",
+    ]
+    assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in sentence(found)
+    html = checked(trace_report(found), 4)
+    assert "velocity [rad/s]" in html and "residual [N m]" in html and "[m/s]" not in html
+
+
+def test_a_test_log_that_is_a_training_log_is_refused() -> None:
+    with pytest.raises(BadLog, match=r"--test b\.csv: the same bytes as the training log a\.csv"):
+        trace_sources(sources(), sources("b.csv", "a"), built_in())
+
+
+def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
+    other = sources("b.csv", "b")
+    turned = replace(other, rig=replace(other.rig, motion="rotary"))
+    with pytest.raises(BadLog, match="another rig"):
+        trace_sources(sources(), turned, built_in())
+    motor = replace(other, rig=replace(other.rig, kind="motor", force_per_command=0.0))
+    with pytest.raises(BadLog, match="needs its force_per_command"):
+        trace_sources(motor, None, built_in())
+
+
+def test_the_trace_gets_logs_seed_and_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+
+    def trace(train, test, rig, library, rng, *, on_progress):  # type: ignore[no-untyped-def]
+        given.append((len(train), len(test), rig.kind, sorted(library), rng.integers(1000)))
+        return trace_of()
+
+    monkeypatch.setattr(tracing, "trace", trace)
+    split = sources()
+    split = replace(split, card=replace(split.card, split={"test": ("a.csv",)}))
+    found = trace_sources(split, sources("b.csv", "b"), built_in(), seed=7)
+    expected = np.random.default_rng(7).integers(1000)
+    assert given == [(1, 1, split.rig.kind, sorted(built_in()), expected)]
+    assert "a.csv: trained on, though the card's [split] keeps it for tests" in found.remarks
+    assert trace_sources(sources(), None, built_in()).test == ()
+
+
+def test_logs_that_are_not_named_are_the_cards() -> None:
+    assert named_logs(["a", "b"], ["c"], "no such card") == (("a", "b"), ("c",))
+    assert named_logs([], [], "emps") == (("DATA_EMPS.mat",), ("DATA_EMPS_PULSES.mat",))
+    assert named_logs([], ["c"], "emps") == (("DATA_EMPS.mat",), ("c",))
+    with pytest.raises(BadLog, match="no log to train on"):
+        named_logs([], [], "demo")
+
+
+@pytest.mark.parametrize(
+    ("verdict", "keys", "said"),
+    [
+        ("none", (), "Nothing is missing: the model leaves 0.07 N"),
+        ("effect", ("stribeck",), "Missing: stribeck – friction falls with speed"),
+        ("drift", (), "Drift: between training and test logs the machine changed in F_cp from 12 "),
+        ("unknown", (), "what is left depends on y (which accounts for 40 % of it)"),
+        ("unknown", ("stribeck",), "Part of it is stribeck"),
+        ("inseparable", ("stribeck",), "They do not tell it from spring."),
+    ],
+)
+def test_the_verdict_is_a_plain_sentence(
+    verdict: Verdict, keys: tuple[str, ...], said: str
+) -> None:
+    text = sentence(traced(trace_of(verdict, keys)))
+    assert said in text
+    errors = "Held-out force error 1.83 N -> 0.07 N (sensors' noise 0.069 N)."
+    assert (errors in text) == bool(keys)
+
+
+def test_what_is_left_without_structure_is_not_called_noise() -> None:
+    text = sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
+    assert text.startswith("No effect is missing that these logs show: what is left (0.07 N")
+
+
+def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:
+    text = sentence(traced(replace(trace_of("none", ()), noise_actuator=None)))
+    assert text.startswith("Nothing is missing in the equation of motion: the model leaves 0.07 N")
+
+
+def test_the_error_in_which_an_effect_shows_is_told() -> None:
+    found = trace_of("effect", ("valve_dead_zone",), actuator=True)
+    before = {"train": Errors(0.07, 0.002, 1e-5, 90.0), "test": Errors(0.07, 0.002, 1e-5, 90.0)}
+    shown = replace(found, before=before)
+    assert "Held-out error of the actuator equation 90 N/s -> 5 N/s" in sentence(traced(shown))
+    assert "On stretches left out, error of" in sentence(traced(shown, tested=False))
+    none = {where: Errors(None, None, None, None) for where in before}
+    assert sentence(traced(replace(found, before=none))).endswith("(valve overlap).")
+
+
+def test_rows_of_the_tables() -> None:
+    found = trace_of("drift")
+    assert error_rows(found, False)[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
+    assert [row[0] for row in rival_rows(found, False)] == [
+        "spring",
+        "nonlinear viscous",
+        "cogging",
+    ]
+    changed = {row[0]: row[-1] for row in change_rows(found)}
+    assert changed["F_cp"] == "-8.3 %" and changed["m"] == "0 %"
+    assert len(change_head(found)) == len(change_rows(found)[0])
+    plain = trace_of("none", ())
+    assert len(change_head(plain)) == len(change_rows(plain)[0]) == 4
+    assert drift_rows(found) == [("F_cp", "12", "14.4 ± 0.2", "N", "+20 %")]
+
+
+def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
+    found = trace_of()
+    effect = found.effects[0]
+    v_s = next(p for p in effect.effect.params if p.name == "v_s")
+    params = {
+        **effect.params,
+        "v_s": replace(effect.params["v_s"], value=v_s.high),
+        "asymmetry": replace(effect.params["asymmetry"], value=0.0, sd=0.0),
+    }
+    rows = effect_rows(replace(found, effects=(replace(effect, params=params),)), "linear")
+    assert [row[3] for row in rows[1:]] == ["at its bound", "held"]
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [(2.0, 3.0, "+50 %"), (100.0, 99.0, "-1 %"), (1e-9, 1.0, "over +1000 %"), (0.0, 1.0, ""),
+     (1.0, -1e6, "below -1000 %"), (-2.0, -2.0, "0 %")],
+)  # fmt: skip
+def test_changes_in_percent(before: float, after: float, said: str) -> None:
+    assert percent(before, after) == said
+
+
+def test_the_view_for_a_terminal() -> None:
+    from rich.console import Console
+
+    console = Console(width=120, markup=False)
+    with console.capture() as shown:
+        console.print(trace_view(traced(trace_of("unknown")), Path("out")))
+    text = " ".join(shown.get().split())
+    for part in ("Unknown: what is left depends on y", "held out before", "stribeck F_s", "why not",
+                 "F_s*(1 + asymmetry*d)*exp(-(v/v_s)**2)", "Next run: the same stroke at several",
+                 "note: a remark of the trace", "written: out/trace.json"):  # fmt: skip
+        assert part in text
+
+
+@pytest.mark.parametrize(
+    ("verdict", "keys", "figures"),
+    [("effect", ("stribeck",), 3), ("effect", ("stribeck", "spring"), 4), ("none", (), 3),
+     ("drift", (), 3), ("unknown", ("stribeck",), 4), ("inseparable", ("stribeck",), 3)],
+)  # fmt: skip
+def test_the_report(verdict: Verdict, keys: tuple[str, ...], figures: int) -> None:
+    found = traced(trace_of(verdict, keys))
+    html = checked(trace_report(found), figures)
+    assert re.sub("[<>'&]", "", sentence(found))[:20] in html
+    wanted = ["residual [N]", "95 % of its points in the band", "moving towards +", "Parameters"]
+    if keys:
+        wanted += ["Rivals, by the force", "Armstrong-Helouvry", "fitted: stribeck"]
+    if len(keys) > 1:
+        wanted += ["without spring", "without stribeck"]
+    if verdict == "drift":
+        wanted += ["14.4 ± 0.2", "on the test logs"]
+    if verdict == "unknown":
+        wanted += ["Next experiment", "position [m]"]
+    for text in wanted:
+        assert text in html, text
+
+
+def test_an_effect_without_a_picture_is_named() -> None:
+    html = checked(trace_report(traced(trace_of("effect", ("rising_stiction",)))), 1)
+    assert "rising stiction shows in neither equation" in html
+    assert pictures(replace(trace_of(), residuals=())) == []
+
+
+def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:
+    (shown,) = pictures(trace_of("effect", ("valve_dead_zone",), actuator=True))
+    assert (shown.residual.equation, shown.signal, shown.how) == ("actuator", "u", "before")
+    first, second = pictures(trace_of("effect", ("stribeck", "spring")))
+    assert (first.signal, second.signal) == ("v", "y")
+    rest = pictures(trace_of("unknown", ("stribeck",)))[1]
+    assert (rest.signal, rest.effect) == ("y", None)
+
+
+def test_what_an_effect_takes_away_is_its_own_share_of_the_residual() -> None:
+    found = trace_of("effect", ("stribeck", "spring"))
+    rows = residual("mechanical", ("stribeck", "spring"))
+    taken = [along_rows(acting, rows, found.plant.friction) for acting in found.plant.effects]
+    assert taken[0] is not None and taken[1] is not None
+    np.testing.assert_allclose(taken[0] + taken[1], rows.before - rows.after, atol=1e-12)
+    stateful = trace_of("effect", ("rising_stiction",)).plant
+    assert along_rows(stateful.effects[0], rows, stateful.friction) is None
+
+
+def test_the_running_median_is_not_drawn_across_a_gap() -> None:
+    x = np.concatenate([np.linspace(0.0, 1.0, 300), np.linspace(9.0, 10.0, 300)])
+    at, values = running_median(x, np.ones(600), 30)
+    assert np.count_nonzero(np.isnan(at)) == 1
+    assert set(values[~np.isnan(values)]) == {1.0}
+
+
+def test_shares_starts_and_labels() -> None:
+    assert inside(np.array([0.0, 1.9, -2.1, 5.0]), np.ones(4)) == 50.0
+    assert log_starts(residual("mechanical", ()))[0] == 0.1
+    assert axis_label("temperature", False) == "temperature"
+    assert axis_label("v", True) == "velocity [rad/s]"
+
+
+def test_friction_of_speed_joins_the_curve() -> None:
+    plant = trace_of().plant
+    v = np.array([-0.2, -0.01, 0.01, 0.2])
+    p = plant.friction
+    more = sliding_friction(v, p, list(plant.effects)) - sliding_friction(v, p, [])
+    np.testing.assert_allclose(more, 3.5 * np.sign(v) * np.exp(-((v / 0.05) ** 2)), atol=1e-12)
