@@ -171,12 +171,18 @@ def by_load(effect: Effect) -> bool:
     return effect.acts in FRICTIONAL and "F" in effect.depends_on
 
 
+def split(effect: Effect) -> bool:
+    """Whether its one linear parameter gets a column for each direction."""
+    return in_columns(effect) and "asymmetry" in effect.names and len(effect.linear) == 1
+
+
 def shape_params(effect: Effect) -> list[Param]:
     """Parameters that are searched: those in which its rows are not linear."""
     return [
-        p for p in effect.params
-        if not (p.linear and in_columns(effect)) and p.name != "asymmetry"
-    ]  # fmt: skip
+        p
+        for p in effect.params
+        if not (p.linear and in_columns(effect)) and not (p.name == "asymmetry" and split(effect))
+    ]
 
 
 def plain(
@@ -220,6 +226,8 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
         return _beside(plain(stage, equation, i, y=shown_to_true(effect, shape, one, stage)), rows)
     if effect.acts in ("command", "delay"):
         return _beside(plain(stage, equation, i, u=reached(effect, shape, one, stage)), rows)
+    if split(effect):
+        shape = {**shape, "asymmetry": 0.0}
     if by_load(effect):
         return _implicit(effect, shape, one, stage, rows)
     if effect.acts == "stiction":
@@ -227,7 +235,7 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
     else:
         own, fixed = columns(effect, shape, one, stage)
     names = tuple(f"{effect.key}.{name}" for name in effect.linear)
-    if "asymmetry" in effect.names and len(own) == 1:
+    if split(effect):
         up: BoolArray = one.up if equation == MECHANICAL else stage.events[i].direction > 0
         own, names = [own[0] * up, own[0] * ~up], (f"{names[0]}+", f"{names[0]}-")
     b = rows.b - fixed if not names else rows.b
@@ -450,7 +458,9 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
 
     best = min(starts, key=score)
     if free:
-        best = refined(free, [(float(np.min(g)), float(np.max(g))) for g in grids], best, score)
+        best = refined(
+            free, [bounds_of(p, g) for p, g in zip(free, grids, strict=True)], best, score
+        )
     total, found = trial(stage, effect, best, told_in)
     values = with_sizes(effect, best, found)
     own = stage
@@ -463,6 +473,13 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
         return None
     gain = sum(base[e].criterion for e in told_in) - total
     return Candidate(effect, values, found, float(gain))
+
+
+def bounds_of(p: Param, tried: Array) -> tuple[float, float]:
+    """Where a parameter is refined: between the first values tried, an asymmetry anywhere."""
+    if p.name == "asymmetry":
+        return p.low, p.high
+    return float(np.min(tried)), float(np.max(tried))
 
 
 def needs_rounds(effect: Effect) -> bool:

@@ -25,6 +25,8 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
     y, h = one.log["y"], one.log.h
     travel, middle = float(np.ptp(y)), 0.5 * float(np.max(y) + np.min(y))
     speed = float(np.quantile(np.abs(one.signals["v"]), 0.95))
+    if p.name == "asymmetry":
+        return np.zeros(1)
     if p.name == "period":
         found = _periods(effect, one, travel)
     elif p.unit in ("m/s", "rad/s"):

@@ -82,6 +82,7 @@ OUT_OF_LOGS = ("sensor", "command", "delay")
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 SHOWN = 6  # rivals of each effect
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
+RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
 OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
 BEYOND = 1.3  # times the band, above which sliding friction is judged
@@ -385,7 +386,7 @@ def _left_over(choice: Choice, after: Model) -> Dependence:
         keep = _judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:
             keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
-        if np.count_nonzero(keep) < FEWEST_ROWS:
+        if np.count_nonzero(keep) < FEWEST_ROWS or (o.robust and spread(o) < RESTLESS):
             continue
         signals = {k: v[keep] for k, v in _signals_at(choice.end, equation).items()}
         if equation == BREAKAWAY:  # force and command at breakaway are what is judged
