@@ -55,6 +55,8 @@ ROUNDS = 4  # of substitution where a contribution depends on the friction itsel
 FEWEST_EVENTS = 6
 ROBUST = 9.0  # square from which a row of rest counts less
 BLURRED = 1e3  # times the noise, of a row that says nothing
+LOCKED = 0.1  # of the applied force, at least left to drive
+HOPELESS = 1e3  # times the force to be explained
 OUTSIDE = 1e12  # criterion of parameters outside their bounds
 
 
@@ -181,7 +183,8 @@ def shape_params(effect: Effect) -> list[Param]:
     return [
         p
         for p in effect.params
-        if not (p.linear and in_columns(effect)) and not (p.name == "asymmetry" and split(effect))
+        if not (p.linear and in_columns(effect))
+        and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
     ]
 
 
@@ -277,7 +280,8 @@ def _implicit(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Ro
     raw = contribution(effect, shape, s, h, stage.friction)
     more = contribution(effect, shape, {**s, "F": s["F"] + step}, h, stage.friction)
     steep = 1.0 - d * (one.sliding.mean @ ((more - raw) / step))
-    steep = np.where(np.abs(steep) < 0.05, 0.05, steep)
+    if np.any(steep < LOCKED):  # it would hold itself: no motion could be explained by it
+        return replace(rows, b=HOPELESS * rows.b)
     b = (rows.b - d * (one.sliding.mean @ raw)) / steep
     return replace(rows, b=b, X=rows.X / steep[:, np.newaxis])
 
