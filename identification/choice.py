@@ -6,27 +6,25 @@ from functools import partial
 
 import numpy as np
 
-from identification.arrays import Array
-from identification.candidates import (
+from identification.candidates import Candidate, best_of
+from identification.chance import chance
+from identification.evidence import (
     ACTUATOR,
     BREAKAWAY,
     MECHANICAL,
+    OUT_OF_LOGS,
     REST,
-    Candidate,
-    Outcome,
-    Stage,
-    base_outcomes,
-    best_of,
-    outcome,
-    reached,
-    shown_to_true,
+    Moving,
+    moving,
 )
-from identification.evidence import Moving, moving, solve, stacked
+from identification.held_out import left_out_error
 from identification.library import Library
+from identification.outcome import Outcome, base_outcomes, outcome, spread
+from identification.stage import Stage
+from identification.transforms import reached, shown_to_true
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 MOST = 4  # effects in one machine
-DRAWS = 200  # of the null hypothesis
 SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
 LEVEL = 0.01  # chance up to which a gain is no luck
 MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
@@ -127,25 +125,6 @@ def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Ou
     return stage, base, kept
 
 
-def left_out_error(stage: Stage, slowest: float) -> float:
-    """Root mean square of the mechanical equation [N] on each log, fitted on all others.
-
-    0 where there is one log only.
-    """
-    parts = stage.parts[MECHANICAL]
-    if len(parts) < 2:
-        return 0.0
-    rows = stacked(parts)
-    of_log = np.repeat(np.arange(len(parts)), [len(p.b) for p in parts])
-    keep = rows.speed >= slowest
-    r = np.zeros(len(rows.b))
-    for i in range(len(parts)):
-        out = of_log == i
-        theta = solve(rows, keep & ~out).theta
-        r[out] = rows.b[out] - rows.X[out] @ theta
-    return float(np.sqrt(np.mean(r[keep] ** 2)))
-
-
 def _report(report: Progress, turn: int, part: float) -> None:
     report("tracing", (turn + part) / MOST)
 
@@ -224,14 +203,6 @@ def scales_of(found: Sequence[Candidate], base: Mapping[str, Outcome]) -> dict[s
     return out
 
 
-def spread(o: Outcome) -> float:
-    """Mean square of the rows that count."""
-    kept = o.fit.residual[o.rows.speed >= o.slowest]
-    if o.robust:
-        return float(np.median(kept**2)) / 0.455  # of a chi-square with one degree
-    return float(np.mean(kept**2)) if len(kept) else 1.0
-
-
 def rescaled(stage: Stage, candidate: Candidate, base: Mapping[str, Outcome]) -> Candidate:
     """The candidate judged at the stage's scales."""
     outcomes = {e: outcome(stage, e, o.rows) for e, o in candidate.outcomes.items()}
@@ -275,73 +246,21 @@ def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) ->
 
 def shift_rms(candidate: Candidate, stage: Stage, one: Moving) -> float:
     """Spread of what a sensor effect adds to the shown position [m]."""
-    true = shown_to_true(candidate.effect, candidate.values, one, stage)
+    true = shown_to_true(candidate.effect, candidate.values, one, stage.friction)
     return float(np.std(one.log["y"] - true))
-
-
-def chance(
-    best: Candidate, rivals: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome],
-    rng: np.random.Generator,
-) -> float:  # fmt: skip
-    """Chance that some effect of the library gains as much where none is missing.
-
-    The model without the effect is given the residual that the best candidate leaves, its signs
-    drawn anew by stretches of time, which keeps its colour; the largest gain of any candidate's
-    columns in any draw is compared.
-    """
-    largest = np.zeros(DRAWS)
-    for equation in best.outcomes:
-        o, kept = best.outcomes[equation], base[equation]
-        n = len(o.rows.b)
-        stretch = np.minimum(
-            np.arange(n) * max(8, n // 25) // n if n >= 50 else np.arange(n), n - 1
-        )
-        signs = rng.choice([-1.0, 1.0], size=(int(stretch.max()) + 1, DRAWS))[stretch]
-        residual, limit = o.fit.residual, 3.0 * np.sqrt(stage.scale(equation))
-        if o.robust:
-            residual = np.clip(residual, -limit, limit)
-        noise = residual[:, np.newaxis] * signs
-        heavy = o.rows.speed >= o.slowest
-        noise = noise * heavy[:, np.newaxis]
-        A = kept.rows.X / kept.rows.sd[:, np.newaxis] * heavy[:, np.newaxis]
-        Q = np.linalg.qr(A)[0] if A.shape[1] else np.zeros((n, 0))
-        noise = noise - Q @ (Q.T @ noise)
-        gains = np.zeros(DRAWS)
-        for c in (best, *rivals):
-            if equation not in c.outcomes:
-                continue
-            own = directions(c.outcomes[equation], kept) * heavy[:, np.newaxis]
-            if o.robust:
-                own = np.clip(own, -limit, limit)
-            own = own - Q @ (Q.T @ own)
-            P = np.linalg.qr(own)[0]
-            gains = np.maximum(gains, np.sum((P.T @ noise) ** 2, axis=0))
-        largest += gains / stage.scale(equation)
-    # The search over shapes finds more than one place would: as many as parameters searched.
-    return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
-
-
-SEARCHED = 2.0
-
-
-def directions(o: Outcome, base: Outcome) -> Array:
-    """Whitened columns (r, k) by which an effect moves the rows."""
-    more = o.rows.X[:, base.rows.X.shape[1] :] / o.rows.sd[:, np.newaxis]
-    moved = (base.fit.residual - o.fit.residual)[:, np.newaxis]
-    return more if more.shape[1] else moved
 
 
 def absorb(stage: Stage, candidate: Candidate) -> Stage:
     """The stage with the effect in it: its columns kept, or the logs' signals freed of it."""
     effect, values = candidate.effect, candidate.values
-    if effect.acts not in ("sensor", "command", "delay"):
+    if effect.acts not in OUT_OF_LOGS:
         return replace(stage, chosen=(*stage.chosen, (effect, values)))
     logs = []
     for one in stage.logs:
         if effect.acts == "sensor":
-            log = one.log.with_signals(y=shown_to_true(effect, values, one, stage))
+            log = one.log.with_signals(y=shown_to_true(effect, values, one, stage.friction))
         else:
-            whole = reached(effect, values, one, stage)
+            whole = reached(effect, values, one, stage.friction)
             log = one.log.with_signals(u=np.append(np.diff(whole), 0.0) / one.log.h)
         logs.append(moving(log, held=one.held, by_command=one.whole is not None))
     play = stage.play or (effect.acts == "sensor" and effect.evolve is not None)

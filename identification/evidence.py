@@ -14,7 +14,6 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.differentiate import differentiate
-from identification.karnopp import Karnopp
 from identification.log import Log
 from identification.weak_form import (
     Windows,
@@ -28,13 +27,14 @@ SECONDS = 0.06  # of a window
 FEWEST = 16  # samples in a window
 SURE = 5.0  # times the velocity's noise from which its sign is sure
 BLOCKS = 8  # stretches of a log that are left out in turn
-MECHANICAL, ACTUATOR = "mechanical", "actuator"
+MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
+EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
 POSITIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 FRICTIONAL = ("slip", "friction")
 IN_ACTUATOR = ("actuator", "command", "delay")
+OUT_OF_LOGS = ("sensor", "command", "delay")  # taken out of the signals once found
 QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
-GUESS = Karnopp(1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)

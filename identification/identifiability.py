@@ -10,7 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.karnopp import NAMES, NEGATIVE, ROTARY_UNITS, UNITS
+from identification.karnopp import NAMES, NEGATIVE
+from identification.plant import units_of
 from identification.result import Estimate
 from identification.stepping import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
 
@@ -18,8 +19,6 @@ NEEDED = 3  # events of a kind that make a parameter identifiable
 SLIDING = 50  # samples of sliding a direction needs
 WIDEST = 0.3  # sd relative to the value beyond which the value says nothing
 SMALL = 0.05  # sd relative to the force beside it at which a term is known to be small
-ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m"}
-ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad"}
 
 
 @dataclass(frozen=True)
@@ -63,8 +62,7 @@ def estimates(
     log: str,
 ) -> Mapping[str, Estimate]:
     """Estimate of each of `names` from its value (d,) and equally likely samples (k, d)."""
-    units = {**(ROTARY_UNITS if rotary else UNITS)}
-    units |= ROTARY_ACTUATOR_UNITS if rotary else ACTUATOR_UNITS
+    units = units_of("rotary" if rotary else "linear")
     value_of = dict(zip(names, center, strict=True))
     found = {}
     for column, name in enumerate(names):

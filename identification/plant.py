@@ -1,10 +1,15 @@
 """The plant as one value: mass with Karnopp friction, its actuator, and chosen effects."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from identification.effects._base import Acting
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
+from identification.karnopp import ROTARY_UNITS, UNITS, Karnopp
+
+ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m", "k_a": "N/V"}
+ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad", "k_a": "N m/V"}
 
 
 @dataclass(frozen=True)
@@ -33,3 +38,10 @@ class Plant:
     friction: Karnopp
     actuator: Actuator | Motor | None = None
     effects: tuple[Acting, ...] = ()
+
+
+def units_of(motion: Literal["linear", "rotary"]) -> Mapping[str, str]:
+    """Units of the nine parameters and of the actuator's, by name."""
+    if motion == "rotary":
+        return {**ROTARY_UNITS, **ROTARY_ACTUATOR_UNITS}
+    return {**UNITS, **ACTUATOR_UNITS}

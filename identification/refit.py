@@ -21,7 +21,6 @@ from identification.result import Drive
 from identification.simulate import FreeRun, free_run
 
 SECONDS = 2.0  # of a window
-CALM = 40.0  # samples around a wanted restart in which a rest is looked for
 ROBUST = 3.0  # residual in noise units from which it counts less
 WHOLE = np.inf  # seconds of a window that is the whole log
 FOLLOWED = 2.0  # robust square up to which a whole run is followed

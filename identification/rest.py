@@ -17,7 +17,6 @@ LEAST = 0.6  # of the direction's median force, below which an event is none
 RATE = 4  # samples over which the force's rate is taken
 MEAN = 8  # samples in a row of rest
 SHORTEST = 4  # rows in a stretch
-CALM = 3.0  # times the noise that the halves of a row may differ by, beyond what force explains
 ONSET = 5.0  # times the noise at which a body has moved
 ONSETS = 30  # samples before it is seen at which a motion may have begun
 RUN = 4.0  # times ONSET that it then goes on to move, or it was no breakaway

@@ -6,13 +6,9 @@ from typing import NamedTuple
 
 from identification.errors import BadCard, BadModel
 from identification.karnopp import ROTARY_UNITS, UNITS
+from identification.plant import ACTUATOR_UNITS, ROTARY_ACTUATOR_UNITS
 from identification.result import Estimate
 from workbench.units import Motion, conversion
-
-_ACTUATOR: Mapping[Motion, Mapping[str, str]] = {
-    "linear": {"k1": "N/(V s)", "k2": "N/m", "k_a": "N/V"},
-    "rotary": {"k1": "N m/(V s)", "k2": "N m/rad", "k_a": "N m/V"},
-}
 
 
 class Shown(NamedTuple):
@@ -39,7 +35,7 @@ def friction_units(motion: Motion) -> Mapping[str, str]:
 
 def actuator_units(motion: Motion) -> Mapping[str, str]:
     """Units of k1 and k2, and of k_a."""
-    return _ACTUATOR[motion]
+    return ROTARY_ACTUATOR_UNITS if motion == "rotary" else ACTUATOR_UNITS
 
 
 def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:

@@ -71,12 +71,24 @@ def sentence(traced: Traced) -> str:
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _:
             signals = ", ".join(found.unknown.depends_on)
+            if not signals:
+                return f"Unknown: {unexplained(traced)}"
             share = f"{100 * found.unknown.explained:.0f} %"
             known = f" Part of it is {names}.{errors}" if found.effects else ""
             return (
                 f"Unknown: what is left depends on {signals} (which accounts for {share} of it),"
                 f" and no effect of the library explains it.{known}"
             )
+
+
+def unexplained(traced: Traced) -> str:
+    """What is left where it is far more than noise and depends on no signal."""
+    found, unit = traced.trace, shown(traced.model.rotary).force
+    left = found.after["train"].force_rms
+    return (
+        f"the model leaves {left:.3g} {unit} of force, the sensors' noise alone"
+        f" {found.noise_force:.3g} {unit}, and it depends on none of the signals."
+    )
 
 
 def nothing_missing(found: Trace, unit: str) -> str:

@@ -11,7 +11,7 @@ import pytest
 from identification.errors import BadLog
 from identification.karnopp import NAMES
 from identification.library import built_in
-from identification.trace_result import Errors, Verdict
+from identification.trace_result import Dependence, Errors, Verdict
 from tests.workbench.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench import tracing
@@ -172,6 +172,13 @@ def test_the_verdict_is_a_plain_sentence(
 def test_what_is_left_without_structure_is_not_called_noise() -> None:
     text = sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
     assert text.startswith("No effect is missing that these logs show: what is left (0.07 N")
+
+
+def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
+    found = replace(trace_of("unknown", ()), unknown=Dependence((), 0.0))
+    text = sentence(traced(found))
+    assert text.startswith("Unknown: the model leaves 0.07 N of force")
+    assert "depends on none of the signals" in text
 
 
 def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:

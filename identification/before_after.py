@@ -1,0 +1,61 @@
+"""Errors of a model on the logs of its fit and on logs that it has not seen."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.choice import Step, absorb
+from identification.evidence import ACTUATOR, MECHANICAL, OUT_OF_LOGS, Moving, stacked
+from identification.held_out import left_out, residual
+from identification.outcome import Outcome, rms
+from identification.refit import position_rms
+from identification.result import Drive
+from identification.stage import Stage
+from identification.structure import Model
+from identification.trace_result import Errors
+
+
+def errors_of(
+    model: Model, slowest: float, steps: Sequence[Step], logs: Sequence[Moving],
+    seen: Sequence[Moving], drive: Drive,
+) -> dict[str, Errors]:  # fmt: skip
+    """Errors of a model on the training and the test logs; `slowest` [m/s]: rows that count."""
+    own, found = model.stage, model.outcomes
+    out = {}
+    other = seen_by(own, steps, seen) if seen else own
+    for name, stage, over in (("train", own, logs), ("test", other, seen or logs)):
+        errors: dict[str, tuple[Array, Array]] = {}
+        for equation in (MECHANICAL, ACTUATOR):
+            if equation not in found:
+                continue
+            low = slowest if equation == MECHANICAL else 0.0
+            if name == "test" and not seen:
+                errors[equation] = left_out(stacked(stage.parts[equation]), low)
+            else:
+                errors[equation] = residual(stage, equation, found[equation].fit.theta, low)
+        force = errors[MECHANICAL]
+        whole = rms(force[1])
+        size = rms(force[0])
+        out[name] = Errors(
+            force_rms=size,
+            force_relative=size / whole if whole else None,
+            position_rms=None if model.led else position_rms(model.plant, over, drive),
+            actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
+        )
+    return out
+
+
+def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stage:
+    """The stage of other logs with the same structure and effects taken out of their signals."""
+    own = replace(stage, logs=tuple(logs), chosen=(), taken=(), scales={})
+    for step in steps:
+        if step.candidate.effect.acts in OUT_OF_LOGS:
+            own = absorb(own, step.candidate)
+    return replace(own, chosen=stage.chosen)
+
+
+def noise_of(base: Mapping[str, Outcome], equation: str) -> float | None:
+    """What the sensors alone leave in an equation's rows (one sigma, root mean square)."""
+    return float(np.sqrt(np.mean(base[equation].rows.sd ** 2))) if equation in base else None

@@ -1,0 +1,61 @@
+"""Chance that some effect of a whole library gains as much where none is missing."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.candidates import Candidate
+from identification.outcome import Outcome
+from identification.stage import Stage
+
+DRAWS = 200  # of the null hypothesis
+SEARCHED = 2.0  # times the gain of columns at one place: the search over shapes finds more
+
+
+def chance(
+    best: Candidate, rivals: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome],
+    rng: np.random.Generator,
+) -> float:  # fmt: skip
+    """Chance that some effect of the library gains as much where none is missing.
+
+    The model without the effect is given the residual that the best candidate leaves, its signs
+    drawn anew by stretches of time, which keeps its colour; the largest gain of any candidate's
+    columns in any draw is compared.
+    """
+    largest = np.zeros(DRAWS)
+    for equation in best.outcomes:
+        o, kept = best.outcomes[equation], base[equation]
+        n = len(o.rows.b)
+        stretch = np.minimum(
+            np.arange(n) * max(8, n // 25) // n if n >= 50 else np.arange(n), n - 1
+        )
+        signs = rng.choice([-1.0, 1.0], size=(int(stretch.max()) + 1, DRAWS))[stretch]
+        residual, limit = o.fit.residual, 3.0 * np.sqrt(stage.scale(equation))
+        if o.robust:
+            residual = np.clip(residual, -limit, limit)
+        noise = residual[:, np.newaxis] * signs
+        heavy = o.rows.speed >= o.slowest
+        noise = noise * heavy[:, np.newaxis]
+        A = kept.rows.X / kept.rows.sd[:, np.newaxis] * heavy[:, np.newaxis]
+        Q = np.linalg.qr(A)[0] if A.shape[1] else np.zeros((n, 0))
+        noise = noise - Q @ (Q.T @ noise)
+        gains = np.zeros(DRAWS)
+        for c in (best, *rivals):
+            if equation not in c.outcomes:
+                continue
+            own = directions(c.outcomes[equation], kept) * heavy[:, np.newaxis]
+            if o.robust:
+                own = np.clip(own, -limit, limit)
+            own = own - Q @ (Q.T @ own)
+            P = np.linalg.qr(own)[0]
+            gains = np.maximum(gains, np.sum((P.T @ noise) ** 2, axis=0))
+        largest += gains / stage.scale(equation)
+    return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
+
+
+def directions(o: Outcome, base: Outcome) -> Array:
+    """Whitened columns (r, k) by which an effect moves the rows."""
+    more = o.rows.X[:, base.rows.X.shape[1] :] / o.rows.sd[:, np.newaxis]
+    moved = (base.fit.residual - o.fit.residual)[:, np.newaxis]
+    return more if more.shape[1] else moved

@@ -1,0 +1,65 @@
+"""In which equations an effect shows, and which of its parameters are columns there."""
+
+import re
+from collections.abc import Mapping
+
+from identification.effects._base import Effect, Param
+from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR, MECHANICAL, REST
+
+Values = Mapping[str, float]
+
+
+def equations_of(effect: Effect, by_command: bool) -> tuple[str, ...]:
+    """The equations in which an effect shows."""
+    if effect.acts in (*FRICTIONAL, "force"):
+        return (MECHANICAL,)
+    if effect.acts == "bristle":
+        return (MECHANICAL, REST)
+    if effect.acts == "stiction":
+        return (BREAKAWAY,)
+    if effect.acts in IN_ACTUATOR:
+        return (ACTUATOR,) if by_command else ()
+    if "F" in effect.depends_on:
+        # In the actuator equation it is another k1 and k2 only.
+        return (MECHANICAL, REST)
+    return (MECHANICAL, ACTUATOR) if by_command else (MECHANICAL,)
+
+
+def in_columns(effect: Effect) -> bool:
+    """Whether its linear parameters are columns of a regression."""
+    return effect.acts in (*FRICTIONAL, "force", "actuator", "stiction") and not by_load(effect)
+
+
+def by_load(effect: Effect) -> bool:
+    """Whether it is friction that depends on the applied force, which is the regression's b."""
+    return effect.acts in FRICTIONAL and "F" in effect.depends_on
+
+
+def split(effect: Effect) -> bool:
+    """Whether its one linear parameter gets a column for each direction."""
+    return in_columns(effect) and "asymmetry" in effect.names and len(effect.linear) == 1
+
+
+def shape_params(effect: Effect) -> list[Param]:
+    """Parameters that are searched: those in which its rows are not linear."""
+    return [
+        p
+        for p in effect.params
+        if not (p.linear and in_columns(effect))
+        and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
+    ]
+
+
+def needs_rounds(effect: Effect) -> bool:
+    """Whether the contribution depends on the friction parameters that are fitted with it."""
+    return effect.acts in FRICTIONAL and bool({"c", "f"} & symbols_of(effect))
+
+
+def symbols_of(effect: Effect) -> set[str]:
+    """Names in the effect's equation."""
+    return set(re.findall(r"[A-Za-z_]\w*", effect.equation))
+
+
+def admissible(effect: Effect, values: Values) -> bool:
+    """Whether every parameter lies within its bounds."""
+    return all(p.low <= values[p.name] <= p.high for p in effect.params)

@@ -1,0 +1,44 @@
+"""Residuals of an equation's rows: seen by the fit, on stretches left out, on logs left out."""
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.evidence import MECHANICAL, Rows, solve, stacked
+from identification.stage import Stage
+
+
+def residual(stage: Stage, equation: str, theta: Array, slowest: float) -> tuple[Array, Array]:
+    """Residual (r,) of the rows that count with these parameters, and their left side."""
+    rows = stacked(stage.parts[equation])
+    keep = rows.speed >= slowest
+    return (rows.b - rows.X @ theta)[keep], rows.b[keep]
+
+
+def left_out(rows: Rows, slowest: float) -> tuple[Array, Array]:
+    """As `residual`, each stretch of time with the sizes that all others give."""
+    keep = rows.speed >= slowest
+    r = np.zeros(len(rows.b))
+    for block in np.unique(rows.block):
+        out = rows.block == block
+        theta = solve(rows, keep & ~out).theta
+        r[out] = rows.b[out] - rows.X[out] @ theta
+    return r[keep], rows.b[keep]
+
+
+def left_out_error(stage: Stage, slowest: float) -> float:
+    """Root mean square of the mechanical equation [N] on each log, fitted on all others.
+
+    0 where there is one log only.
+    """
+    parts = stage.parts[MECHANICAL]
+    if len(parts) < 2:
+        return 0.0
+    rows = stacked(parts)
+    of_log = np.repeat(np.arange(len(parts)), [len(p.b) for p in parts])
+    keep = rows.speed >= slowest
+    r = np.zeros(len(rows.b))
+    for i in range(len(parts)):
+        out = of_log == i
+        theta = solve(rows, keep & ~out).theta
+        r[out] = rows.b[out] - rows.X[out] @ theta
+    return float(np.sqrt(np.mean(r[keep] ** 2)))

@@ -1,0 +1,117 @@
+"""The structure that is left when nothing more is found: on which signals it depends."""
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.choice import FAR, MATERIAL, Choice
+from identification.dependence import dependence
+from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL
+from identification.outcome import Outcome, rms, spread
+from identification.stage import Stage, one_way
+from identification.structure import Model, band
+from identification.trace_result import Dependence
+
+FEWEST_ROWS = 30
+SHARE_LEFT = 0.002  # of what was missing, that may be left with structure
+ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
+STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
+NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
+MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
+RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
+OWN = 0.02  # of the applied force, from which a residual is judged without it
+STRETCHES = 64  # of a log, every eighth of which is left out together
+LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
+
+
+def left_over(choice: Choice, after: Model) -> Dependence:
+    """The strongest structure that is left in any equation, if there is any."""
+    best = Dependence((), 0.0)
+    for equation, o in choice.base.items():
+        keep = judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
+        if equation == ACTUATOR and choice.end.play:
+            keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
+        if np.count_nonzero(keep) < FEWEST_ROWS or (o.robust and spread(o) < RESTLESS):
+            continue
+        signals = {k: v[keep] for k, v in signals_at(choice.end, equation).items()}
+        if equation == BREAKAWAY:  # force and command at breakaway are what is judged
+            signals = {k: v for k, v in signals.items() if k not in ("F", "u", "v", "reversal")}
+        if equation == MECHANICAL and rms(o.fit.residual * o.rows.sd) > OWN * rms(o.rows.b):
+            signals.pop("F", None)  # a large residual is itself a good part of F
+        if any(effect.acts == "bristle" for effect, _ in choice.end.chosen):
+            signals.pop("reversal", None)  # its rise is judged in the free run
+        r = o.fit.residual[keep]
+        if o.robust:
+            limit = 3.0 * np.sqrt(max(spread(o), 1.0))
+            r = np.clip(r, -limit, limit)
+        way = np.asarray(signals.get("v", r) >= 0)
+        n = len(r)  # fine stretches in turn, or no function of time could be judged
+        found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
+        left = found.explained * float(np.mean(r**2))
+        whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
+        rough = bool(choice.steps) and spread(o) > FAR
+        part = ROUGH_LEFT if rough else SHARE_LEFT
+        if not found.depends_on or left < STRUCTURED or left < part * whole:
+            continue
+        size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
+        if size < LEFT_LEAST.get(equation, 0.0) * _level(choice):
+            continue
+        if found.explained > best.explained:
+            best = found
+    return best
+
+
+def _excess(o: Outcome) -> float:
+    """Square in noise units beyond the noise itself."""
+    return max(spread(o) - 1.0, 0.0)
+
+
+def judged(o: Outcome, after: Model) -> BoolArray:
+    """Rows of sliding above the band that the free run shows (or the regression's, without one)."""
+    slowest = o.slowest if after.led else min(o.slowest, band(after))
+    return np.asarray(o.rows.speed >= slowest)
+
+
+def _level(choice: Choice) -> float:
+    """Coulomb level [N]."""
+    return 0.5 * float(np.sum(np.abs(choice.end.theta[1:3])))
+
+
+def too_much(choice: Choice, after: Model) -> bool:
+    """Whether far more than the sensors' noise is left, of whatever structure."""
+    o = choice.base[MECHANICAL]
+    r = o.fit.residual[judged(o, after) & (o.rows.speed >= o.slowest)]
+    return bool(len(r) and np.mean(r**2) > MUCH**2)
+
+
+def signals_at(stage: Stage, equation: str) -> dict[str, Array]:
+    """Signals that vary, at the middle of an equation's rows over all logs."""
+    out: dict[str, list[Array]] = {}
+    for i, one in enumerate(stage.logs):
+        if equation == MECHANICAL:
+            middle = one.sliding.middle
+        elif equation == ACTUATOR and one.whole is not None:
+            middle = one.whole.middle
+        elif equation == BREAKAWAY:
+            middle = stage.events[i].at
+        else:
+            middle = stage.at_rest[i].start
+        s = one.signals
+        own = {k: v[middle] for k, v in s.items() if k not in NOT_SIGNALS}
+        own["t"] = s["t"][middle] - s["t"][0]
+        own["reversal"] = since_reversal(s["d"], one.log.h)[middle]
+        if equation == ACTUATOR:
+            own["du"] = np.gradient(s["u"], one.log.h)[middle]
+        if equation == BREAKAWAY:
+            own["rest"] = stage.events[i].rested
+        for k, v in own.items():
+            out.setdefault(k, []).append(v)
+    joined = {k: np.concatenate(v) for k, v in out.items() if len(v) == len(stage.logs)}
+    return {k: v for k, v in joined.items() if len(v) and np.ptp(v) > 0}
+
+
+def since_reversal(d: Array, h: float) -> Array:
+    """Time since the direction last changed or the body stood still [s], (n,)."""
+    n = len(d)
+    changed = np.concatenate([[True], d[1:] != d[:-1]])
+    at = np.maximum.accumulate(np.where(changed, np.arange(n), 0))
+    return np.asarray((np.arange(n) - at) * h, dtype=np.float64)

@@ -1,0 +1,133 @@
+"""Rows of an equation solved for their sizes, and the criterion that compares structures."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.evidence import (
+    ACTUATOR,
+    BREAKAWAY,
+    EQUATIONS,
+    POSITIVE,
+    REST,
+    Fitted,
+    Rows,
+    non_negative,
+    solve,
+    stacked,
+)
+from identification.stage import Stage
+
+TRIM = 4.0  # what a row counts that is left out for its low speed
+TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that may be left out
+FEWEST_EVENTS = 6
+ROBUST = 9.0  # square from which a row of rest counts less
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """Rows, fit, criterion (in units of the scale) and lowest speed of one equation.
+
+    robust: rows far off count less.
+    """
+
+    rows: Rows
+    fit: Fitted
+    criterion: float
+    slowest: float
+    robust: bool = False
+
+
+def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
+    """Fit and criterion of an equation's rows.
+
+    Within the band the model's slip friction does not hold. Rows slower than a threshold count
+    TRIM each instead of their squared residual; the best threshold is taken.
+    """
+    scale = stage.scale(equation)
+    if equation == REST:
+        r = rows.b / rows.sd
+        return Outcome(
+            rows, Fitted(np.zeros(0), r, float(np.sum(r**2))), _robust(r, scale), 0.0, True
+        )
+    if equation == BREAKAWAY:
+        fit = _resistant(rows, scale)
+        return Outcome(rows, fit, _robust(fit.residual, scale), 0.0, True)
+    if not np.any(np.isfinite(rows.speed)):
+        fit = solve(rows)
+        return Outcome(rows, fit, fit.cost / scale, 0.0)
+    edges = np.quantile(rows.speed, TRIMS)
+    A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
+    size = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    whitened = A / size
+    bins = np.digitize(rows.speed, edges[1:])
+    grams = np.array([whitened[bins == i].T @ whitened[bins == i] for i in range(len(edges))])
+    own = np.flatnonzero([name in POSITIVE for name in rows.names])
+    tried = []
+    for i in range(len(edges)):
+        theta, left = _of_gram(grams[i:].sum(axis=0), own)
+        total = left * size[-1] ** 2 / scale + TRIM * np.count_nonzero(bins < i)
+        tried.append((total, i, theta))
+    total, best, theta = min(tried, key=lambda each: each[0])
+    theta = theta * size[-1] / size[:-1]
+    residual = A[:, -1] - A[:, :-1] @ theta
+    fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
+    return Outcome(rows, fit, float(total), float(edges[best]))
+
+
+def _resistant(rows: Rows, scale: float) -> Fitted:
+    """Least squares in which events far off count less (Cauchy's weights)."""
+    fit = solve(rows)
+    for _ in range(10):
+        weight = 1.0 / np.sqrt(1.0 + fit.residual**2 / (scale * ROBUST))
+        theta = solve(replace(rows, sd=rows.sd / np.maximum(weight, 1e-6))).theta
+        residual = (rows.b - rows.X @ theta) / rows.sd
+        fit = Fitted(theta, residual, float(np.sum(residual**2)))
+    return fit
+
+
+def _robust(r: Array, scale: float) -> float:
+    """Criterion of rows of which some are no rest at all: Cauchy's, near r^2 for small r."""
+    return float(np.sum(ROBUST * np.log1p(r**2 / (scale * ROBUST))))
+
+
+def _of_gram(G: Array, positive: IntArray) -> tuple[Array, float]:
+    """Least squares and the square sum it leaves, from the Gram matrix of [X b]."""
+
+    def least_squares(at: IntArray) -> Array:
+        return np.asarray(np.linalg.lstsq(G[np.ix_(at, at)], G[at, -1], rcond=1e-12)[0])
+
+    theta = non_negative(least_squares, len(G) - 1, positive)
+    left = G[-1, -1] - 2 * theta @ G[:-1, -1] + theta @ G[:-1, :-1] @ theta
+    return theta, float(max(left, 0.0))
+
+
+def told(stage: Stage, equation: str) -> bool:
+    """Whether the logs have enough rows of an equation."""
+    rows = sum(len(part.b) for part in stage.parts[equation])
+    least = FEWEST_EVENTS if equation == BREAKAWAY else 2 * (6 if equation == REST else 12)
+    finite = all(np.all(np.isfinite(part.sd)) for part in stage.parts[equation] if len(part.b))
+    return rows >= least and finite
+
+
+def base_outcomes(stage: Stage) -> dict[str, Outcome]:
+    """Every equation that the logs tell, with the structure found so far."""
+    return {
+        equation: outcome(stage, equation, stacked(stage.parts[equation]))
+        for equation in EQUATIONS
+        if (equation != ACTUATOR or stage.by_command) and told(stage, equation)
+    }
+
+
+def spread(o: Outcome) -> float:
+    """Mean square of the rows that count."""
+    kept = o.fit.residual[o.rows.speed >= o.slowest]
+    if o.robust:
+        return float(np.median(kept**2)) / 0.455  # of a chi-square with one degree
+    return float(np.mean(kept**2)) if len(kept) else 1.0
+
+
+def rms(r: Array) -> float:
+    """Root mean square; 0 of nothing."""
+    return float(np.sqrt(np.mean(r**2))) if len(r) else 0.0

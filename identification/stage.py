@@ -1,0 +1,229 @@
+"""Logs and the structure found so far, and an effect's rows beside it in every equation."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+
+from identification.along import contribution, elastic_displacement, elastic_share
+from identification.arrays import Array, BoolArray
+from identification.effects._base import Effect
+from identification.equations import Values, by_load, equations_of, split
+from identification.evidence import (
+    ACTUATOR,
+    EQUATIONS,
+    MECHANICAL,
+    REST,
+    Moving,
+    Rows,
+    actuator,
+    mechanical,
+)
+from identification.karnopp import Karnopp
+from identification.rest import (
+    Breakaways,
+    Rest,
+    breakaway_rows,
+    breakaways,
+    rest_rows,
+    rests,
+    stretches,
+)
+from identification.transforms import reached, shown_to_true
+
+BLURRED = 1e3  # times the noise, of a row that says nothing
+LOCKED = 0.1  # of the applied force, at least left to drive
+HOPELESS = 1e3  # times the force to be explained
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """Logs and the structure found so far.
+
+    logs: with sensor and command effects found already taken out; theta: m, F_cp, F_cn, F_vp,
+    F_vn; theta_a: k1, k2, offset; chosen: effects found so far whose sizes are fitted anew with
+    every candidate, at these values; taken: keys of those taken out of the logs; theta_f: in place
+    of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
+    speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
+    out, and when it is crossed is not seen;
+    scales: by equation, what its rows' squares are divided by.
+    """
+
+    logs: tuple[Moving, ...]
+    theta: Array
+    theta_a: Array
+    by_command: bool
+    chosen: tuple[tuple[Effect, Values], ...] = ()
+    taken: tuple[str, ...] = ()
+    theta_f: Array | None = None
+    band: float = 0.0
+    play: bool = False
+    scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+
+    @cached_property
+    def friction(self) -> Karnopp:
+        """The five parameters as a model, for the levels that effects ask for; no band."""
+        theta = self.theta if self.theta_f is None else self.theta_f
+        m, F_cp, F_cn, F_vp, F_vn = np.maximum(theta, 1e-9).tolist()
+        return Karnopp(m, F_cp, F_cn, F_vp, F_vn, 0.0, 0.0, F_cp, -F_cn)
+
+    @cached_property
+    def parts(self) -> Mapping[str, list[Rows]]:
+        """Rows of each log in each equation, with the columns of the effects chosen."""
+        out = {}
+        for equation in EQUATIONS:
+            if equation == ACTUATOR and not self.by_command:
+                continue
+            own = [plain(self, equation, i) for i in range(len(self.logs))]
+            for effect, values in self.chosen:
+                if equation in equations_of(effect, self.by_command):
+                    own = [
+                        joined(self, equation, effect, values, i, rows)
+                        for i, rows in enumerate(own)
+                    ]
+            out[equation] = own
+        return out
+
+    @cached_property
+    def at_rest(self) -> tuple[Rest, ...]:
+        """Rows of rest of each log."""
+        return tuple(rests(one) for one in self.logs)
+
+    @cached_property
+    def events(self) -> tuple[Breakaways, ...]:
+        """Breakaways of each log."""
+        return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
+
+    def scale(self, equation: str) -> float:
+        """What squares of rows are divided by, 1 where nothing but noise is left."""
+        return self.scales.get(equation, 1.0)
+
+
+def plain(
+    stage: Stage, equation: str, i: int, y: Array | None = None, u: Array | None = None
+) -> Rows:
+    """Rows of the model without effects, of log `i`; y, u (its integral): in place of the log's."""
+    one = stage.logs[i]
+    if equation == MECHANICAL:
+        return mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
+    if equation == ACTUATOR:
+        rows = actuator(one, stage.theta_a, y, u)
+        if stage.play:
+            rows = replace(rows, sd=np.where(one_way(one), rows.sd, BLURRED * rows.sd))
+        return rows
+    if equation == REST:
+        return rest_rows(one, stage.at_rest[i], None if y is None else one.log["y"] - y)
+    return breakaway_rows(one, stage.events[i])
+
+
+def one_way(one: Moving) -> BoolArray:
+    """Rows of the actuator equation without a reversal, in which a play may be crossed, (r,)."""
+    assert one.whole is not None
+    way = np.sign(one.signals["v"])
+    turns = np.concatenate([[0], np.cumsum((way[1:] != way[:-1]) | (one.signals["d"][1:] == 0))])
+    low, high = one.whole.start, one.whole.start + one.whole.length
+    return np.asarray(turns[high] == turns[low])
+
+
+def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, rows: Rows) -> Rows:
+    """`rows` of log `i` with the effect in them: columns, or transformed signals."""
+    one = stage.logs[i]
+    if effect.acts == "bristle":
+        if equation == REST:
+            bent = elastic_displacement(effect, shape, one.signals, one.log.h, stage.friction)
+            return replace(
+                rows,
+                b=rows.b - (plain(stage, REST, i).b - rest_rows(one, stage.at_rest[i], bent).b),
+            )
+        return _elastic(effect, shape, one, stage, rows)
+    if effect.acts == "sensor":
+        return _beside(
+            plain(stage, equation, i, y=shown_to_true(effect, shape, one, stage.friction)), rows
+        )
+    if effect.acts in ("command", "delay"):
+        return _beside(
+            plain(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
+        )
+    if split(effect):
+        shape = {**shape, "asymmetry": 0.0}
+    if by_load(effect):
+        return _implicit(effect, shape, one, stage, rows)
+    if effect.acts == "stiction":
+        own, fixed = _stiction(effect, shape, i, stage)
+    else:
+        own, fixed = columns(effect, shape, one, stage)
+    names = tuple(f"{effect.key}.{name}" for name in effect.linear)
+    if split(effect):
+        up: BoolArray = one.up if equation == MECHANICAL else stage.events[i].direction > 0
+        own, names = [own[0] * up, own[0] * ~up], (f"{names[0]}+", f"{names[0]}-")
+    b = rows.b - fixed if not names else rows.b
+    return replace(rows, b=b, X=np.column_stack([rows.X, *own]), names=(*rows.names, *names))
+
+
+def _beside(fresh: Rows, rows: Rows) -> Rows:
+    """Fresh plain columns, with the further columns that `rows` has."""
+    more = rows.X[:, fresh.X.shape[1] :]
+    return replace(fresh, X=np.column_stack([fresh.X, more]), names=rows.names)
+
+
+def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[list[Array], Array]:
+    """Columns (r,) of the linear parameters, and the contribution as it is where there are none."""
+    trials = [
+        {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
+    ] or [dict(shape)]
+    out = []
+    for values in trials:
+        raw = contribution(effect, values, one.signals, one.log.h, stage.friction)
+        if effect.acts == "actuator":
+            assert one.whole is not None
+            out.append(one.whole.mean @ raw)
+        elif effect.acts == "force":
+            out.append(-(one.sliding.mean @ raw))
+        else:
+            out.append(np.where(one.up, 1.0, -1.0) * (one.sliding.mean @ raw))
+    return (out, np.zeros(0)) if effect.linear else ([], out[0])
+
+
+def _implicit(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+    """Rows solved for the applied force: F - d added(F) = X theta, divided by 1 - d added'(F).
+
+    Without the division, friction that grows with F would explain F by itself.
+    """
+    s, h = one.signals, one.log.h
+    d = np.where(one.up, 1.0, -1.0)
+    step = 1e-4 * float(np.max(np.abs(s["F"])))
+    raw = contribution(effect, shape, s, h, stage.friction)
+    more = contribution(effect, shape, {**s, "F": s["F"] + step}, h, stage.friction)
+    steep = 1.0 - d * (one.sliding.mean @ ((more - raw) / step))
+    if np.any(steep < LOCKED):  # it would hold itself: no motion could be explained by it
+        return replace(rows, b=HOPELESS * rows.b)
+    b = (rows.b - d * (one.sliding.mean @ raw)) / steep
+    return replace(rows, b=b, X=rows.X / steep[:, np.newaxis])
+
+
+def _elastic(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+    """The two Coulomb columns replaced by an elastic force that builds up to them."""
+    level = elastic_share(effect, shape, one.signals, one.log.h, stage.friction)
+    X = rows.X.copy()
+    X[:, 1] = one.sliding.mean @ np.maximum(level, 0.0)
+    X[:, 2] = one.sliding.mean @ np.minimum(level, 0.0)
+    return replace(rows, X=X)
+
+
+def _stiction(effect: Effect, shape: Values, i: int, stage: Stage) -> tuple[list[Array], Array]:
+    """Columns (k,) of the linear parameters at the breakaways of log `i`, signed as the force."""
+    one, events = stage.logs[i], stage.events[i]
+    signals = dict(one.signals)
+    signals["d"] = np.ones(len(one.log))
+    for low, high in stretches(one, 2):
+        signals["d"][low:high] = 0.0
+    trials = [
+        {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
+    ] or [dict(shape)]
+    out = [
+        events.direction * contribution(effect, x, signals, one.log.h, stage.friction)[events.at]
+        for x in trials
+    ]
+    return (out, np.zeros(0)) if effect.linear else ([], out[0])

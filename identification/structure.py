@@ -1,0 +1,126 @@
+"""A structure with its numbers: from the regression's sizes to a plant refined on its free run."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.candidates import with_sizes
+from identification.choice import Step
+from identification.effects._base import Effect
+from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
+from identification.karnopp import Karnopp
+from identification.log import Rig
+from identification.outcome import Outcome
+from identification.plant import Actuator, Motor, Plant
+from identification.refit import refit
+from identification.result import Drive
+from identification.stage import Stage
+
+INERT = 2.0  # times what is left, below which inertia does not show
+OVERLAP = 2.5  # rows that share samples are worth one in so many
+SHAPE = 0.03  # relative trust in a searched parameter
+BEYOND = 1.3  # times the band, above which sliding friction is judged
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
+
+    led: the motion is imposed, so the plant has no free run to be refined on.
+    """
+
+    stage: Stage
+    outcomes: Mapping[str, Outcome]
+    plant: Plant
+    sd: Mapping[str, float]
+    led: bool
+
+
+def model_of(
+    stage: Stage, outcomes: Mapping[str, Outcome], steps: Sequence[Step], logs: Sequence[Moving],
+    drive: Drive, rig: Rig,
+) -> Model:  # fmt: skip
+    """The plant of a structure: the regression's numbers, refined on the free run."""
+    five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
+    prior: dict[str, float] = {}
+    sliding = outcomes[MECHANICAL]
+    deviation = deviations(sliding)
+    prior |= dict(zip(FIVE, deviation[:5].tolist(), strict=True))
+    stick_p, stick_n = 1.2 * five["F_cp"], -1.2 * five["F_cn"]
+    if BREAKAWAY in outcomes:
+        found = outcomes[BREAKAWAY].fit.theta
+        stick_p = float(found[0]) if found[0] > 0 else stick_p
+        stick_n = -float(found[1]) if found[1] > 0 else stick_n
+    slow = max(sliding.slowest, float(np.min([5.0 * one.v_noise for one in stage.logs])))
+    nine = Karnopp(**five, dv_p=slow, dv_n=-slow, F_sp=stick_p, F_sn=stick_n)
+    drives: Actuator | Motor | None = None
+    if ACTUATOR in outcomes:
+        k1, k2 = (float(x) for x in outcomes[ACTUATOR].fit.theta[:2])
+        drives = Actuator(max(k1, 1e-9), max(k2, 0.0))
+        prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
+    elif rig.kind == "motor" and rig.force_per_command is not None:
+        drives = Motor(rig.force_per_command)
+    acting = []
+    for step in steps:
+        effect = step.candidate.effect
+        values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
+        acting.append(effect.acting(values))
+        prior |= {f"{effect.key}.{k}": x for k, x in effect_sd(effect, values, outcomes).items()}
+    plant = Plant(nine, drives, tuple(acting))
+    if led(outcomes[MECHANICAL]):
+        return Model(stage, outcomes, plant, prior, True)
+    done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior)
+    return Model(stage, outcomes, done.plant, done.sd, False)
+
+
+def led(o: Outcome) -> bool:
+    """Whether the motion is imposed: inertia is of no account beside what the model leaves."""
+    keep = o.rows.speed >= o.slowest
+    inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
+    left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
+    return inertia < INERT * left
+
+
+def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
+    """The values, those out of bounds put at the bound."""
+    return {p.name: float(np.clip(values[p.name], p.low, p.high)) for p in effect.params}
+
+
+def deviations(o: Outcome) -> Array:
+    """Standard deviations of theta, (k,), widened by what the rows leave and their overlap."""
+    keep = o.rows.speed >= o.slowest
+    A = (o.rows.X / o.rows.sd[:, np.newaxis])[keep]
+    size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
+    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-12)
+    left = float(np.mean(o.fit.residual[keep] ** 2)) if np.any(keep) else 1.0
+    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0) * OVERLAP * max(left, 1.0)) / size)
+
+
+def effect_sd(
+    effect: Effect, values: Mapping[str, float], outcomes: Mapping[str, Outcome]
+) -> dict[str, float]:
+    """Standard deviations of an effect's parameters for the prior; 0 holds one at its value."""
+    out: dict[str, float] = {}
+    for p in effect.params:
+        if p.name == "asymmetry" and values[p.name] == 0.0:
+            out[p.name] = 0.0
+        else:
+            out[p.name] = SHAPE * abs(values[p.name]) if values[p.name] else 0.0
+    for o in outcomes.values():
+        spreads = dict(zip(o.rows.names, deviations(o).tolist(), strict=True))
+        for name in effect.linear:
+            full = f"{effect.key}.{name}"
+            if full in spreads:
+                out[name] = spreads[full]
+            elif f"{full}+" in spreads:
+                out[name] = 0.5 * float(np.hypot(spreads[f"{full}+"], spreads[f"{full}-"]))
+                out["asymmetry"] = out[name] / max(abs(values[name]), 1e-300)
+    return out
+
+
+def band(model: Model) -> float:
+    """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
+    p = model.plant.friction
+    return 0.0 if model.led else BEYOND * max(p.dv_p, -p.dv_n)
