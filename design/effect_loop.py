@@ -111,7 +111,7 @@ def effect_loop_kernel(
     for k in range(len(modes)):
         now, s = k * h, base[:, k] + gain * F
         if k == 0:
-            start_states(codes, addresses, q, s, z, plant, now, y, v, F, u)
+            start_states(codes, addresses, q, s, z, plant, now, y, v, F, u, False)
         shown = shown_position(h, codes, addresses, q, s, z, plant, now, y, v, F, u)
         measured = shown + noise_y[k]
         acts = k % ratio == 0

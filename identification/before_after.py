@@ -10,9 +10,9 @@ from identification.choice import Step, absorb
 from identification.evidence import ACTUATOR, MECHANICAL, OUT_OF_LOGS, Moving, stacked
 from identification.held_out import left_out, residual
 from identification.outcome import Outcome, rms
-from identification.refit import position_rms
 from identification.result import Drive
 from identification.stage import Stage
+from identification.starts import position_rms
 from identification.structure import Model
 from identification.trace_result import Errors
 

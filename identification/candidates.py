@@ -59,7 +59,7 @@ def trial(
 
 def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candidate | None:
     """The effect at its best beside what the stage holds; None where it cannot show or stand."""
-    told_in = [e for e in equations_of(effect, stage.by_command) if e in base]
+    told_in = [e for e in equations_of(effect, stage.by_command, stage.held) if e in base]
     if not told_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
         return None
     if effect.signals and not any(

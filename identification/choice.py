@@ -21,7 +21,7 @@ from identification.held_out import left_out_error
 from identification.library import Library
 from identification.outcome import Outcome, base_outcomes, outcome, spread
 from identification.stage import Stage
-from identification.transforms import reached, shown_to_true
+from identification.transforms import command, driven, reached, shown_to_true
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 MOST = 4  # effects in one machine
@@ -39,24 +39,30 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One effect taken: the candidate, its p-value, its rivals in order, stage and base before."""
+    """One effect taken: the candidate, its p-value, its rivals in order, stage and base before.
+
+    explained: share of what is missing that it accounts for in the free run, where that decided.
+    """
 
     candidate: Candidate
     p_value: float
     rivals: tuple[Candidate, ...]
     stage: Stage
     base: Mapping[str, Outcome]
+    explained: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Choice:
-    """The plain stage, the steps taken, and the stage with all effects in it."""
+    """The plain stage, the steps taken, and the stage with all effects in it; tried: what else was
+    tried beside them."""
 
     start: Stage
     first: Mapping[str, Outcome]
     steps: tuple[Step, ...]
     end: Stage
     base: Mapping[str, Outcome]
+    tried: tuple[Candidate, ...] = ()
 
 
 def settled(stage: Stage) -> tuple[Stage, dict[str, Outcome]]:
@@ -85,9 +91,11 @@ def choose(
     start, first: the plain model and what it leaves, as `first_stage` gives them.
     """
     stage, base, steps = start, first, list[Step]()
+    tried: Sequence[Candidate] = ()
     for turn in range(MOST):
         done = partial(_report, report, turn)
-        step = next_step(stage, base, library, rng, done)
+        tried = candidates(stage, base, library, done)
+        step = next_step(tried, stage, base, rng)
         if step is None:
             break
         steps.append(step)
@@ -96,7 +104,7 @@ def choose(
             stage, base, steps = polished(stage, base, steps)
     if steps and misfit(base):
         stage, base, steps = trusted(start, steps)
-    return Choice(start, first, tuple(steps), stage, base)
+    return Choice(start, first, tuple(steps), stage, base, tuple(tried))
 
 
 def misfit(base: Mapping[str, Outcome]) -> bool:
@@ -152,11 +160,10 @@ def polished(
     return stage, found, steps
 
 
-def next_step(
-    stage: Stage, base: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
-    report: Callable[[float], None],
-) -> Step | None:  # fmt: skip
-    """The effect that gains most, if it is material and no luck; None where there is none."""
+def candidates(
+    stage: Stage, base: Mapping[str, Outcome], library: Library, report: Callable[[float], None]
+) -> list[Candidate]:
+    """Every effect of the library that is not in the stage yet, at its best beside it."""
     taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
     keys = [k for k in library if k not in taken and k not in ABSORBED]
     found: list[Candidate] = []
@@ -165,6 +172,13 @@ def next_step(
         if candidate is not None:
             found.append(candidate)
         report((i + 1) / len(keys))
+    return found
+
+
+def next_step(
+    found: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome], rng: np.random.Generator
+) -> Step | None:
+    """The candidate that gains most, if it is material and no luck; None where there is none."""
     if not found:
         return None
     scales = scales_of(found, base)
@@ -261,7 +275,8 @@ def absorb(stage: Stage, candidate: Candidate) -> Stage:
             log = one.log.with_signals(y=shown_to_true(effect, values, one, stage.friction))
         else:
             whole = reached(effect, values, one, stage.friction)
-            log = one.log.with_signals(u=np.append(np.diff(whole), 0.0) / one.log.h)
+            more = {"F": driven(one, whole)} if one.held else {}
+            log = one.log.with_signals(u=command(one, whole), **more)
         logs.append(moving(log, held=one.held, by_command=one.whole is not None))
     play = stage.play or (effect.acts == "sensor" and effect.evolve is not None)
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

@@ -97,7 +97,7 @@ def effect_run_kernel(
             following = k + 1 if k + 1 < len(u) else k
             g = slope[k] + k2 * (y_m[following] - y_m[k]) / h
         if restart:
-            start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
+            start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k], k > 0)
         shown = shown_position(h, codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, F, shown
         state = effect_step(

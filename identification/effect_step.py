@@ -68,11 +68,10 @@ class EffectTable:
     addresses: IntArray
     p: Array
 
-    @property
-    def pieces_of(self) -> float:
-        """Longest sub-step [s]."""
+    def longest(self, bristle: float) -> float:
+        """Longest sub-step [s]; bristle: of a plant with one."""
         if np.any(self.codes == BRISTLE):
-            return LONGEST_BRISTLE
+            return bristle
         states = (self.addresses[:, EVOLVE] != 0) & (self.codes != SENSOR)
         return LONGEST_STATE if np.any(states) else LONGEST
 
@@ -106,9 +105,9 @@ def signal_table(acting: tuple[Acting, ...], log: Log) -> Array:
     return out
 
 
-def pieces(table: EffectTable, h: float) -> int:
-    """Number of sub-steps in a sample of `h` [s]."""
-    return max(1, math.ceil(h / table.pieces_of - 1e-9))
+def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> int:
+    """Number of sub-steps in a sample of `h` [s]; bristle: longest of a plant with one [s]."""
+    return max(1, math.ceil(h / table.longest(bristle) - 1e-9))
 
 
 @compiled_inline
@@ -203,9 +202,12 @@ def start_states(
     v: float,
     F: float,
     u: float,
+    again: bool,
 ) -> None:
-    """States at the start of a run or of one of its windows."""
+    """States at the start of a run or, again, of one of its windows: those with a memory go on."""
     for i in range(len(codes)):
+        if again and addresses[i, EVOLVE] != 0:
+            continue
         z[i] = 0.0
         if addresses[i, INITIAL] != 0:
             rest = v == 0.0

@@ -9,8 +9,10 @@ from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR
 Values = Mapping[str, float]
 
 
-def equations_of(effect: Effect, by_command: bool) -> tuple[str, ...]:
-    """The equations in which an effect shows."""
+def equations_of(effect: Effect, by_command: bool, held: bool = False) -> tuple[str, ...]:
+    """The equations in which an effect shows. held: the command gives the force itself (a motor)"""
+    if held and effect.acts in ("command", "delay"):
+        return (MECHANICAL,)
     if effect.acts in (*FRICTIONAL, "force"):
         return (MECHANICAL,)
     if effect.acts == "bristle":

@@ -8,7 +8,7 @@ Each row is divided by what the sensors' noise makes of it, so a complete model 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -105,10 +105,19 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     }  # fmt: skip
     whole = all_windows(len(log), length, h) if by_command else None
     noise_F = 0.0 if held else local_noise(log["F"], h)
-    return Moving(
+    one = Moving(
         log, signals, sliding, d[sliding.middle] > 0, np.min(view[sliding.start], axis=1), whole,
         min(motion.noise, local_noise(log["y"], h)), noise_F, held, motion.v_noise,
     )  # fmt: skip
+    return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
+
+
+def _unexplained(one: Moving) -> float:
+    """Noise of the force [N] but for what the command makes of it: a controller passes noise on."""
+    k1, k2, _ = solve(actuator(one, np.array([1.0, 0.0, 0.0]))).theta
+    h = one.log.h
+    force = one.log["F"] - k1 * integral(one.log["u"], h) + k2 * one.signals["smooth"]
+    return local_noise(force, h)
 
 
 def mechanical(one: Moving, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:

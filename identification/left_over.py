@@ -1,14 +1,19 @@
 """The structure that is left when nothing more is found: on which signals it depends."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.choice import FAR, MATERIAL, Choice
 from identification.dependence import dependence
-from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL
+from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
 from identification.outcome import Outcome, rms, spread
+from identification.result import Drive
 from identification.stage import Stage, one_way
-from identification.structure import Model, band
+from identification.starts import freed, starts
+from identification.starts import left as left_in_run
+from identification.structure import COMPLETE, Model, band
 from identification.trace_result import Dependence
 
 FEWEST_ROWS = 30
@@ -18,13 +23,18 @@ STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
+ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found
+THINNED = 10  # samples of a free run of which one is judged
 OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
 
 
-def left_over(choice: Choice, after: Model) -> Dependence:
-    """The strongest structure that is left in any equation, if there is any."""
+def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Dependence:
+    """The strongest structure that is left in any equation, if there is any.
+
+    any_size: however little of what was missing it is.
+    """
     best = Dependence((), 0.0)
     for equation, o in choice.base.items():
         keep = judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
@@ -50,7 +60,9 @@ def left_over(choice: Choice, after: Model) -> Dependence:
         whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
         rough = bool(choice.steps) and spread(o) > FAR
         part = ROUGH_LEFT if rough else SHARE_LEFT
-        if not found.depends_on or left < STRUCTURED or left < part * whole:
+        if not found.depends_on or left < STRUCTURED:
+            continue
+        if not any_size and left < part * whole:
             continue
         size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
         if size < LEFT_LEAST.get(equation, 0.0) * _level(choice):
@@ -77,10 +89,50 @@ def _level(choice: Choice) -> float:
 
 
 def too_much(choice: Choice, after: Model) -> bool:
-    """Whether far more than the sensors' noise is left, of whatever structure."""
-    o = choice.base[MECHANICAL]
-    r = o.fit.residual[judged(o, after) & (o.rows.speed >= o.slowest)]
-    return bool(len(r) and np.mean(r**2) > MUCH**2)
+    """Whether far more than the sensors' noise is left, of whatever structure.
+
+    Beside effects that were found it is too much only where it is a good part of what was missing.
+    """
+    if after.misfit <= COMPLETE:
+        return False
+    for equation in (MECHANICAL, ACTUATOR):
+        if equation not in choice.base:
+            continue
+        o = choice.base[equation]
+        keep = o.rows.speed >= o.slowest
+        if equation == MECHANICAL:
+            keep = keep & judged(o, after)
+        r = o.fit.residual[keep]
+        left = float(np.mean(r**2)) if len(r) else 0.0
+        missing = ROUGH_LEFT * _excess(choice.first[equation]) if choice.steps else 0.0
+        if left > MUCH**2 and left - 1.0 > missing and not (after.led and choice.steps):
+            return True
+    return not choice.steps and not after.led and after.misfit > ASTRAY
+
+
+def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
+    """Signals on which the free run's position error depends."""
+    parts: list[Array] = []
+    found: dict[str, list[Array]] = {}
+    for one in logs:
+        free = freed(after.plant, one, drive, starts(one, drive))
+        r = left_in_run(after.plant, one, drive, free)
+        if r is None:
+            return Dependence((), 0.0)
+        at = np.arange(0, len(one.log), THINNED)
+        s = one.signals
+        own = {k: v[at] for k, v in s.items() if k not in NOT_SIGNALS}
+        own["t"] = s["t"][at] - s["t"][0]
+        own["reversal"] = since_reversal(s["d"], one.log.h)[at]
+        parts.append(np.clip(r[0][at], -FAR, FAR))
+        for k, v in own.items():
+            found.setdefault(k, []).append(v)
+    r = np.concatenate(parts)
+    signals = {k: np.concatenate(v) for k, v in found.items() if len(v) == len(logs)}
+    signals = {k: v for k, v in signals.items() if np.ptp(v) > 0}
+    n = len(r)
+    block = np.arange(n) * STRETCHES // n % BLOCKS
+    return dependence(r, signals, np.asarray(signals["v"] >= 0), block)
 
 
 def signals_at(stage: Stage, equation: str) -> dict[str, Array]:

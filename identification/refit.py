@@ -9,85 +9,44 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Literal
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
-from identification.errors import BadModel
+from identification.arrays import Array
 from identification.evidence import Moving
-from identification.karnopp import NAMES, Karnopp
+from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
-from identification.simulate import FreeRun, free_run
+from identification.starts import SECONDS, WHOLE, freed, left, starts
 
-SECONDS = 2.0  # of a window
+FIRST = 1.0  # s, of the windows in which the search begins
+STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
+LONG = 8.0  # s, of those in which a motor is followed in the end
+NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
+LOST = 1e6  # error of a run that cannot be followed
 ROBUST = 3.0  # residual in noise units from which it counts less
-WHOLE = np.inf  # seconds of a window that is the whole log
 FOLLOWED = 2.0  # robust square up to which a whole run is followed
+FAR = 300.0  # the same, at most, while much is far off
+MOST, HALF = 0.9, 0.5  # share of the residuals that then count in full
+NARROW = 0.03  # of its value, that the mass keeps at least in a search
+WIDE = 3.0  # factor within which a search keeps what an effect is not linear in
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
 STEP = 1e-4
 TRIES = 6  # of the damping in one step
 ENOUGH = 1e-5  # share of the cost below which a step is the last
 BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
+CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The plant refined, standard deviations by name (effects as key.name), and chi-square."""
+    """The plant refined, standard deviations by name (effects as key.name), and its misfit."""
 
     plant: Plant
     sd: dict[str, float]
-    chi_square: float
-
-
-def restarts(one: Moving, seconds: float = SECONDS) -> tuple[IntArray, Array, Array]:
-    """Samples, positions and velocities from which windows start, at rest where one is near."""
-    n, h = len(one.log), one.log.h
-    step = max(2, round(min(seconds / h, 2.0 * n)))
-    y, v, d = one.log["y"], one.signals["v"], one.signals["d"]
-    reach = max(2, round(0.25 * step))
-    at = [0]
-    for wanted in range(step, n - step // 2, step):
-        low, high = wanted - reach, min(wanted + reach, n)
-        still = low + np.flatnonzero(d[low:high] == 0)
-        at.append(int(still[np.argmin(np.abs(still - wanted))]) if len(still) else wanted)
-    index = np.array(at, dtype=np.int64)
-    width = 3
-    level = np.array([float(np.mean(y[max(k - width, 0) : k + width + 1])) for k in at])
-    moving = d[index] != 0
-    return (
-        index,
-        np.where(moving, one.signals["smooth"][index], level),
-        np.where(moving, v[index], 0.0),
-    )
-
-
-def window_run(plant: Plant, one: Moving, drive: Drive, seconds: float = SECONDS) -> FreeRun | None:
-    """Free run in windows from measured states; None where the model cannot be followed."""
-    at, y, v = restarts(one, seconds)
-    F = float(one.log["F"][0])
-    try:
-        run = free_run(plant, one.log, (float(y[0]), float(v[0]), F), drive, restarts=(at, y, v))
-        if any(acting.effect.acts == "sensor" for acting in plant.effects):
-            body = y - (run.shown[at] - run.y[at])  # the measured start is what the sensor shows
-            run = free_run(
-                plant, one.log, (float(body[0]), float(v[0]), F), drive, restarts=(at, body, v)
-            )
-        return run
-    except BadModel:
-        return None
-
-
-def position_rms(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float | None:
-    """Root mean square of the shown position's error in windows [m], over all logs."""
-    squares: list[Array] = []
-    for one in logs:
-        run = window_run(plant, one, drive)
-        if run is None:
-            return None
-        squares.append((run.shown - one.log["y"]) ** 2)
-    return float(np.sqrt(np.mean(np.concatenate(squares))))
+    misfit: float
 
 
 def names_of(plant: Plant, drive: Drive) -> list[str]:
@@ -115,36 +74,44 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
     every = dict(zip(names, x.tolist(), strict=True))
     nine = [every.get(name, getattr(plant.friction, name)) for name in NAMES]
     for i, name in enumerate(NAMES):
-        nine[i] = min(nine[i], -1e-9) if name in ("dv_n", "F_sn") else max(nine[i], 1e-9)
+        size = abs(getattr(plant.friction, name))
+        # A mass next to nothing would take a run next to for ever.
+        least = max(1e-9, NARROW * size) if name == "m" else 1e-9
+        nine[i] = min(nine[i], -least) if name in NEGATIVE else max(nine[i], least)
     actuator: Actuator | Motor | None = plant.actuator
     if isinstance(actuator, Actuator) and "k1" in every:
         actuator = Actuator(max(every["k1"], 1e-9), max(every["k2"], 0.0))
     effects = []
     for acting in plant.effects:
-        own = {
-            p.name: float(
-                np.clip(every.get(f"{acting.key}.{p.name}", acting.values[p.name]), p.low, p.high)
-            )
-            for p in acting.effect.params
-        }
+        own = {}
+        for p in acting.effect.params:
+            here = acting.values[p.name]
+            low, high = p.low, p.high
+            if not p.linear and here > 0:  # a period far beyond the travel is another effect
+                low, high = max(low, here / WIDE), min(high, here * WIDE)
+            own[p.name] = float(np.clip(every.get(f"{acting.key}.{p.name}", here), low, high))
         effects.append(acting.effect.acting(own))
     return Plant(Karnopp(*nine), actuator, tuple(effects))
 
 
-def residuals(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float = SECONDS
-) -> Array:
-    """Position (and, by command, force) errors in units of the sensors' noise, all logs."""
-    parts: list[Array] = []
-    for one in logs:
-        run = window_run(plant, one, drive, seconds)
-        if run is None:
-            parts.append(np.full(len(one.log) * (2 if drive == "command" else 1), 1e6))
-            continue
-        parts.append((run.shown - one.log["y"]) / one.noise_y)
-        if drive == "command" and not one.held:
-            parts.append((run.F - one.log["F"]) / max(one.noise_F, 1e-12))
-    return np.concatenate(parts)
+Effort = Literal["quick", "near", "whole"]
+Judge = Callable[[Plant], Array]
+
+
+def judge(plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float) -> Judge:
+    """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
+    force) over all logs, less what the windows' unsure states account for."""
+    free = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
+    sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
+
+    def errors_of(tried: Plant) -> Array:
+        parts = []
+        for one, own, size in zip(logs, free, sizes, strict=True):
+            r = left(tried, one, drive, own)
+            parts.append(np.full(size, LOST) if r is None else r.ravel())
+        return np.concatenate(parts)
+
+    return errors_of
 
 
 def loss(r: Array) -> float:
@@ -153,29 +120,46 @@ def loss(r: Array) -> float:
 
 
 def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) -> Plant:
-    """The plant at the best of a few band widths and stick limits."""
+    """The plant at the best of a few band widths and stick limits, then of either direction."""
     p = plant.friction
-    tried = []
-    for width, more in product(BANDS, STICKS):
-        nine = replace(
-            p, dv_p=width * band, dv_n=-width * band, F_sp=more * p.F_sp, F_sn=more * p.F_sn
-        )
-        tried.append(replace(plant, friction=nine))
+    tried = [
+        replace(p, dv_p=width * band, dv_n=-width * band, F_sp=more * p.F_sp, F_sn=more * p.F_sn)
+        for width, more in product(BANDS, STICKS)
+    ]
+    errors_of = judge(plant, logs, drive, FIRST)
+    best = _best_of(plant, tried, errors_of)
+    for _ in range(2):
+        p = best.friction
+        up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(CLOSER, CLOSER)]
+        best = _best_of(plant, up, errors_of)
+        p = best.friction
+        down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(CLOSER, CLOSER)]
+        best = _best_of(plant, down, errors_of)
+    return best
+
+
+def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
+    """The plant with the friction that leaves least."""
+    plants = [replace(plant, friction=nine) for nine in tried]
     with ThreadPoolExecutor(2) as pool:
-        costs = list(pool.map(lambda one: loss(residuals(one, logs, drive)), tried))
-    return tried[int(np.argmin(costs))]
+        costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
+    return plants[int(np.argmin(costs))]
 
 
 def refit(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, *, band: float, prior: dict[str, float],
-    evaluations: int = 12,
+    plant: Plant, logs: Sequence[Moving], drive: Drive, *, prior: dict[str, float],
+    band: float = 0.0, effort: Effort = "whole",
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
-    deviations from the regression by name (others are free).
+    deviations from the regression by name (others are free); effort: "quick" takes a few
+    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first.
     """
-    plant = start_band(plant, logs, drive, band)
+    quick = effort == "quick"
+    if effort == "whole":
+        plant = start_band(plant, logs, drive, band)
+    evaluations = FEW if quick else STEPS
     names = names_of(plant, drive)
     x0 = values_of(plant, names)
     unit = np.where(x0 != 0, np.abs(x0), 1.0)
@@ -190,29 +174,67 @@ def refit(
         out[open_] = x * unit[open_]
         return out
 
-    def left(x: Array, seconds: float) -> Array:
-        r = residuals(plant_with(plant, names, full(x)), logs, drive, seconds)
-        return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / ROBUST) ** 2)) * ROBUST)
-
-    def in_windows(x: Array) -> Array:
+    def bent(x: Array, errors_of: Judge, tie: bool, far: float) -> Array:
+        r = errors_of(plant_with(plant, names, full(x)))
+        r = np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
-        return np.concatenate([left(x, SECONDS), pull])
+        return np.concatenate([r, pull]) if tie else np.asarray(r)
+
+    def refined(
+        x: Array, seconds: float, tie: bool, part: float = 0.0
+    ) -> tuple[Array, Array, float]:
+        now = plant_with(plant, names, full(x))
+        errors_of = judge(now, logs, drive, seconds)
+        # While most is far off, what is far off must still pull.
+        far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
+        return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
 
     slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
-    x, J, cost = gauss_newton(in_windows, x0[open_] / unit[open_], evaluations)
-    if drive == "command" and isinstance(plant.actuator, Actuator) and not slow:
-        # F + k2 y follows the command, so a whole run does not drift: no window's start errs in it.
-        again = gauss_newton(lambda at: left(at, WHOLE), x, evaluations)
+    x = x0[open_] / unit[open_]
+    if effort == "whole":
+        x, J, cost = refined(x, FIRST, True, MOST)
+    x, J, cost = refined(x, SECONDS, True, HALF)
+    # Free of the regression, and over a whole run, in which no window's start errs: where the model
+    # follows. Elsewhere what it lacks would bend what the equations tell.
+    rounds = [] if quick else [SECONDS]
+    if drive == "command" and not slow and not quick:
+        rounds.append(LONG if plant_is_motor(plant) else WHOLE)
+    for seconds in rounds:
+        again = refined(x, seconds, False)
         if again[2] / len(again[1]) < FOLLOWED:
             x, J, cost = again
     best = plant_with(plant, names, full(x))
-    r = residuals(best, logs, drive)
-    chi = float(np.mean(np.minimum(r**2, 1e6)))
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * cost / len(J))
+    found = misfit(best, logs, drive)
+    if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
+        spread = spread * np.sqrt(SECONDS / logs[0].log.h)
     sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
-    return Refit(best, sd, chi)
+    if found > FOLLOWED:
+        sd |= {name: max(sd[name], prior.get(name, 0.0)) for name in sd}
+    return Refit(best, sd, found)
+
+
+def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
+    """What the free run leaves of that signal of that log which it follows worst.
+
+    Robust mean square in units of the sensors' noise: 1 where noise alone is left.
+    """
+    worst = 0.0
+    for one in logs:
+        least = LOST  # a short window may begin badly, a long one lose a stop
+        for seconds in (SECONDS, WHOLE) if drive == "command" else (SECONDS,):
+            r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive, seconds)))
+            if r is not None:
+                least = min(least, max(loss(own) / len(own) / NOISE_LOSS for own in r))
+        worst = max(worst, least)
+    return worst
+
+
+def plant_is_motor(plant: Plant) -> bool:
+    """Whether a motor drives it, whose position nothing brings back."""
+    return isinstance(plant.actuator, Motor)
 
 
 def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[Array, Array, float]:
@@ -223,7 +245,7 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[A
     r = fun(x)
     cost, damping = float(r @ r), 1e-3
     for _ in range(steps):
-        J = jacobian(fun, x)
+        J = jacobian(fun, x, r)
         A, g = J.T @ J, J.T @ r
         size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
         for _ in range(TRIES):
@@ -241,14 +263,14 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[A
     return x, jacobian(fun, x), cost
 
 
-def jacobian(fun: Callable[[Array], Array], x: Array) -> Array:
-    """Derivatives of `fun` (n, k) by central differences, on two cores."""
+def jacobian(fun: Callable[[Array], Array], x: Array, r: Array | None = None) -> Array:
+    """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
 
     def column(i: int) -> Array:
         up, down = x.copy(), x.copy()
         up[i] += STEP
         down[i] -= STEP
-        return (fun(up) - fun(down)) / (2 * STEP)
+        return (fun(up) - r) / STEP if r is not None else (fun(up) - fun(down)) / (2 * STEP)
 
     with ThreadPoolExecutor(2) as pool:
         return np.column_stack(list(pool.map(column, range(len(x)))))

@@ -7,7 +7,7 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
 from identification.effect_run import effect_run_kernel
-from identification.effect_step import effect_table, pieces, signal_table
+from identification.effect_step import LONGEST_BRISTLE, effect_table, pieces, signal_table
 from identification.errors import BadModel
 from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
@@ -113,12 +113,16 @@ def free_run(
     *,
     stiffness: float = 0.0,
     restarts: tuple[IntArray, Array, Array] | None = None,
+    forces: Array | None = None,
+    bristle_step: float = LONGEST_BRISTLE,
 ) -> FreeRun:
     """Response of `plant` to the log's command or force; it sees the measured position only where
     it restarts and, for `stiffness` > 0, through stiffness * (y_m - y) added to the force.
 
     start: position [m], velocity [m/s], force [N] at the first sample; restarts: samples (k,),
-    positions and velocities from which the run starts anew. The log must have an even clock.
+    positions and velocities from which the run starts anew; forces: (k,) [N] there (the log's
+    where they are not given); bristle_step: longest sub-step of a plant with a bristle [s]. The
+    log must have an even clock.
     Raises BadModel where drive is "command" and the plant has no actuator.
     """
     if drive == "command" and not isinstance(plant.actuator, Actuator | Motor):
@@ -137,6 +141,8 @@ def free_run(
     keep = at > 0
     at = np.concatenate([[0], at[keep]]).astype(np.int64)
     at_f = log["F"][at] if "F" in log else force[at]
+    if forces is not None:
+        at_f = np.concatenate([at_f[:1], forces[keep]])
     at_f = np.concatenate([[start[2]], at_f[1:]])
     out = np.zeros((4, len(log)))
     modes = np.zeros(len(log), dtype=np.int64)
@@ -157,7 +163,7 @@ def free_run(
         table = effect_table(plant.effects)
         by_command = isinstance(plant.actuator, Motor) and drive == "command"
         effect_run_kernel(
-            p, log.h, pieces(table, log.h), table.codes, table.addresses, table.p,
+            p, log.h, pieces(table, log.h, bristle_step), table.codes, table.addresses, table.p,
             signal_table(plant.effects, log), held, k_a if by_command else 0.0, log["t"], *common,
         )  # fmt: skip
     else:

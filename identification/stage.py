@@ -22,6 +22,7 @@ from identification.evidence import (
     mechanical,
 )
 from identification.karnopp import Karnopp
+from identification.limits import breakaway_limits
 from identification.rest import (
     Breakaways,
     Rest,
@@ -31,7 +32,7 @@ from identification.rest import (
     rests,
     stretches,
 )
-from identification.transforms import reached, shown_to_true
+from identification.transforms import driven, reached, shown_to_true
 
 BLURRED = 1e3  # times the noise, of a row that says nothing
 LOCKED = 0.1  # of the applied force, at least left to drive
@@ -48,6 +49,7 @@ class Stage:
     of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
     speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
     out, and when it is crossed is not seen;
+    sliding: friction with its band, once known, by which breakaways are told exactly;
     scales: by equation, what its rows' squares are divided by.
     """
 
@@ -60,6 +62,7 @@ class Stage:
     theta_f: Array | None = None
     band: float = 0.0
     play: bool = False
+    sliding: Karnopp | None = None
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     @cached_property
@@ -78,7 +81,7 @@ class Stage:
                 continue
             own = [plain(self, equation, i) for i in range(len(self.logs))]
             for effect, values in self.chosen:
-                if equation in equations_of(effect, self.by_command):
+                if equation in equations_of(effect, self.by_command, self.held):
                     own = [
                         joined(self, equation, effect, values, i, rows)
                         for i, rows in enumerate(own)
@@ -94,7 +97,14 @@ class Stage:
     @cached_property
     def events(self) -> tuple[Breakaways, ...]:
         """Breakaways of each log."""
+        if self.sliding is not None:
+            return tuple(breakaway_limits(one, self.sliding) for one in self.logs)
         return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
+
+    @property
+    def held(self) -> bool:
+        """Whether the force is a motor's, that of its command."""
+        return self.logs[0].held
 
     def scale(self, equation: str) -> float:
         """What squares of rows are divided by, 1 where nothing but noise is left."""
@@ -107,7 +117,8 @@ def plain(
     """Rows of the model without effects, of log `i`; y, u (its integral): in place of the log's."""
     one = stage.logs[i]
     if equation == MECHANICAL:
-        return mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
+        rows = mechanical(one, stage.theta, y, stage.theta_a[0] if stage.by_command else 0.0)
+        return rows if u is None else replace(rows, b=one.sliding.held @ driven(one, u))
     if equation == ACTUATOR:
         rows = actuator(one, stage.theta_a, y, u)
         if stage.play:

@@ -21,6 +21,7 @@ from identification.stage import Stage
 INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
+COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -28,7 +29,8 @@ BEYOND = 1.3  # times the band, above which sliding friction is judged
 class Model:
     """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
 
-    led: the motion is imposed, so the plant has no free run to be refined on.
+    led: the motion is imposed, so the plant has no free run to be refined on; misfit: of the free
+    run, 1 where it leaves the sensors' noise.
     """
 
     stage: Stage
@@ -36,6 +38,7 @@ class Model:
     plant: Plant
     sd: Mapping[str, float]
     led: bool
+    misfit: float = np.inf
 
 
 def model_of(
@@ -69,10 +72,10 @@ def model_of(
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in effect_sd(effect, values, outcomes).items()}
     plant = Plant(nine, drives, tuple(acting))
-    if led(outcomes[MECHANICAL]):
+    if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior, True)
     done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior)
-    return Model(stage, outcomes, done.plant, done.sd, False)
+    return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 
 def led(o: Outcome) -> bool:

@@ -16,16 +16,17 @@ from identification.choice import Choice, Step, choose, first_stage, merit, shar
 from identification.drift import drift
 from identification.errors import NotIdentifiable
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
+from identification.forward import SHORT, Setting, judged_forward
 from identification.held_out import left_out
 from identification.karnopp import NAMES
-from identification.left_over import FEWEST_ROWS, left_over, signals_at, too_much
+from identification.left_over import FEWEST_ROWS, in_run, left_over, signals_at, too_much
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.outcome import Outcome, rms
+from identification.outcome import Outcome, base_outcomes, rms
 from identification.plant import Actuator, units_of
 from identification.result import Drive, Estimate
 from identification.stage import Stage
-from identification.structure import Model, band, model_of
+from identification.structure import COMPLETE, Model, band, model_of
 from identification.trace_result import (
     Change,
     Dependence,
@@ -74,19 +75,29 @@ def trace(
     drive: Drive = "command" if by_command or held else "force"
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig)
-    start = replace(start, band=band(before))
+    if not before.led:
+        start = replace(start, band=band(before), sliding=before.plant.friction)
+        first = base_outcomes(start)
+    if before.misfit <= COMPLETE:  # the plain plant's run leaves nothing but noise
+        library = {}
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
     after = before
     if choice.steps:
         after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig)
     report("judging", 0.0)
+    short = [moving(cut(log, SHORT), held=held, by_command=by_command) for log in train]
+    setting = Setting(logs, short, drive, library, start, first, before)
+    choice, after = judged_forward(choice, after, setting, report)
     seen = [moving(log, held=held, by_command=by_command) for log in test]
-    left = left_over(choice, after)
+    left = Dependence((), 0.0) if after.misfit <= COMPLETE else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
     verdict = _verdict(choice, left, changed)
-    if verdict == "none" and too_much(choice, after):
+    if verdict in ("none", "effect", "inseparable") and too_much(choice, after):
         verdict = "unknown"
+        left = left_over(choice, after, any_size=True)
+        if not left.depends_on and not after.led:
+            left = in_run(after, logs, drive)
     slowest = choice.base[MECHANICAL].slowest
     if after.led:
         remarks.append("the motion is imposed (inertia is of no account): no free run is judged")
@@ -111,6 +122,12 @@ def trace(
         residuals=_residuals(choice.start, choice.first, choice.end, choice.base),
         remarks=tuple(remarks),
     )
+
+
+def cut(log: Log, seconds: float) -> Log:
+    """The first seconds of a log."""
+    n = min(len(log), max(2, round(seconds / log.h)))
+    return Log(log.name, {key: x[:n] for key, x in log.signals.items()})
 
 
 def _by_command(train: Sequence[Log], rig: Rig, remarks: list[str]) -> bool:
@@ -162,7 +179,10 @@ def _found(step: Step, after: Model, choice: Choice) -> FoundEffect:
         p.name: _estimate(acting.values[p.name], p.unit, after.sd.get(f"{effect.key}.{p.name}"))
         for p in effect.params
     }
-    return FoundEffect(effect, params, share(step.candidate, step.base), step.p_value)
+    explained = step.explained
+    if explained is None:
+        explained = share(step.candidate, step.base)
+    return FoundEffect(effect, params, explained, step.p_value)
 
 
 def _estimate(value: float, unit: str, sd: float | None) -> Estimate:

@@ -27,6 +27,18 @@ def shown_to_true(effect: Effect, values: Values, one: Moving, friction: Karnopp
     return true
 
 
+def driven(one: Moving, reached: Array) -> Array:
+    """Force of a motor [N], (n,), by the integral of the command that reaches it [V s]."""
+    u = np.asarray(one.log["u"])
+    k_a = float(u @ one.log["F"]) / max(float(u @ u), 1e-300)
+    return np.asarray(k_a * command(one, reached))
+
+
+def command(one: Moving, reached: Array) -> Array:
+    """Command [V], (n,), by its integral."""
+    return np.append(np.diff(reached), 0.0) / one.log.h
+
+
 def _last_direction(d: Array) -> Array:
     """d (n,) with every 0 replaced by the last direction before it."""
     at = np.maximum.accumulate(np.where(d != 0, np.arange(len(d)), 0))

@@ -15,8 +15,8 @@ def value(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) ->
 
 
 def initial(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
-    """The elastic friction that holds the applied force, as far as it can."""
-    return min(max(F, -c), c)
+    """At rest the elastic friction that holds the applied force, in motion the whole level."""
+    return d * c if v != 0.0 else min(max(F, -c), c)
 
 
 EFFECT = Effect(

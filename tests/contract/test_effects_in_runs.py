@@ -115,8 +115,8 @@ def test_half_the_sub_step_gives_the_same(effect: Effect, monkeypatch: pytest.Mo
     log, acting = log_of(40.0), typical(effect)
     found = run(HYDRAULIC, log, acting)
 
-    def halved(table: EffectTable, h: float) -> int:
-        return 2 * pieces(table, h)
+    def halved(table: EffectTable, h: float, bristle: float) -> int:
+        return 2 * pieces(table, h, bristle)
 
     monkeypatch.setattr(simulate, "pieces", halved)
     assert np.max(np.abs(run(HYDRAULIC, log, acting).y - found.y)) < 1e-5

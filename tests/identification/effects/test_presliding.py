@@ -116,8 +116,8 @@ def test_half_the_sub_step_gives_the_same_from_breakaway_on(
     runs = []
     for parts in (1, 4):
 
-        def finer(table: EffectTable, h: float, parts: int = parts) -> int:
-            return parts * pieces(table, h)
+        def finer(table: EffectTable, h: float, bristle: float, parts: int = parts) -> int:
+            return parts * pieces(table, h, bristle)
 
         monkeypatch.setattr(simulate, "pieces", finer)
         runs.append(driven(u, 1e5, replace(NINE, dv_p=0.005, dv_n=-0.005)))

@@ -1,0 +1,328 @@
+"""Effects judged in the forward run, where the equations do not show them or take one for another.
+
+Play, delay, elastic micro-motion, stiction that grows, friction by load: they change where and when
+the body starts and stops more than any mean over a window of sliding. Each is tried in the free
+run, beside what was found and in its place; it is taken only if the run then leaves next to
+nothing but noise, so a term that merely helps is never taken here.
+"""
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.stats import chi2
+
+from identification.arrays import Array
+from identification.candidates import Candidate, trial
+from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
+from identification.effects._base import MAX_SIGNALS, Acting, Effect, Param
+from identification.equations import by_load, equations_of
+from identification.errors import UserError
+from identification.evidence import Moving
+from identification.grids import shape_grid
+from identification.karnopp import Karnopp
+from identification.library import Library
+from identification.outcome import Outcome
+from identification.plant import Plant
+from identification.refit import Refit, judge, loss, refit, start_band
+from identification.rest import stretches
+from identification.result import Drive
+from identification.stage import LOCKED, Stage
+from identification.starts import SECONDS, starts
+from identification.structure import COMPLETE, Model, inside
+
+DECISIVE = 1.5  # misfit up to which a structure found here is taken
+HALF = 0.5  # of the excess misfit before, at most
+NEAR, ALONE = 8.0, 0.15  # misfit, and share of any rival's excess, up to which it is taken too
+ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
+UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
+NEEDLESS = 1.02  # relative misfit without an effect that is not needed
+SHORT = 15.0  # s of each log in which all are tried first
+SHOWN = 3  # rivals of an effect taken that are tried in its place
+PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
+FINALISTS = 2  # refined on the whole logs
+FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist
+MOST_TRIED = 40  # starts of one effect
+LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
+GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
+REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
+IN_RUN = ("sensor", "command", "delay", "bristle", "stiction")  # seen in the run above all
+Report = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect to try beside the effects of `steps`, with values to begin from."""
+
+    steps: tuple[Step, ...]
+    base: Plant
+    effect: Effect
+    values: list[dict[str, float]]
+
+
+@dataclass(frozen=True, eq=False)
+class Contender:
+    """A structure in the free run: its steps but the last, the last effect, plant and misfit."""
+
+    steps: tuple[Step, ...]
+    effect: Effect
+    plant: Plant
+    misfit: float
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """What every trial needs: logs whole and cut short, how they are driven, and the library."""
+
+    logs: Sequence[Moving]
+    short: Sequence[Moving]
+    drive: Drive
+    library: Library
+    start: Stage
+    first: Mapping[str, Outcome]
+    plain: Model
+
+
+def judged_forward(
+    choice: Choice, model: Model, setting: Setting, report: Report
+) -> tuple[Choice, Model]:
+    """The choice and its model, with what the free run adds, exchanges or finds needless."""
+    if model.led:
+        return choice, model
+    if model.misfit > max(DECISIVE, 1.0 + ENOUGH * (setting.plain.misfit - 1.0)):
+        found = contest(choice, model, setting, report)
+        if found is not None:
+            choice, model = found
+    return pruned(choice, model, setting)
+
+
+def contest(
+    choice: Choice, model: Model, setting: Setting, report: Report
+) -> tuple[Choice, Model] | None:
+    """The best structure of one effect more, or of another in an effect's place, if decisive."""
+    tried = list(_structures(choice, model, setting))
+    screened = []
+    for i, one in enumerate(tried):
+        contender = _screened(one, setting)
+        if contender is not None:
+            screened.append(contender)
+        report("judging", (i + 1) / len(tried))
+    screened.sort(key=lambda one: one.misfit)
+    if not screened or screened[0].misfit > max(NEAR, PROMISING * model.misfit):
+        return None
+    best: tuple[Refit, Contender] | None = None
+    for finalist in screened[:FINALISTS]:
+        if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
+            break
+        done = _whole(finalist, setting)
+        if best is None or done.misfit < best[0].misfit:
+            best = done, finalist
+        if done.misfit <= COMPLETE:
+            break
+    if best is None:
+        return None
+    done, winner = best
+    if done.misfit > decisive(
+        model.misfit, [one for one in screened if one.effect.key != winner.effect.key]
+    ):
+        return None
+    rivals = [one for one in screened if one.effect.key != winner.effect.key]
+    found = _taken(winner, done, rivals, setting, model.misfit)
+    return found if found[0].steps[-1].p_value <= LEVEL else None
+
+
+def decisive(before: float, others: Sequence[Contender]) -> float:
+    """Misfit that a structure may leave to be taken: next to nothing, or far less than any other.
+
+    before: misfit without it; others: what was tried besides.
+    """
+    rival = min((one.misfit for one in others), default=before)
+    least = min(before, rival)
+    return max(min(DECISIVE, 1.0 + HALF * (before - 1.0)), min(NEAR, 1.0 + ALONE * (least - 1.0)))
+
+
+def _structures(choice: Choice, model: Model, setting: Setting) -> Iterator[Trial]:
+    """One effect more, and another in the place of each."""
+    yield from _beside(choice.steps, model.plant, choice.tried, setting, False)
+    for i, step in enumerate(choice.steps):
+        stay = (*choice.steps[:i], *choice.steps[i + 1 :])
+        yield from _beside(stay, without(model, stay, setting), step.rivals, setting, True)
+
+
+def without(model: Model, stay: Sequence[Step], setting: Setting) -> Plant:
+    """The model's plant with the effects of these steps only."""
+    keys = {step.candidate.effect.key for step in stay}
+    effects = tuple(a for a in model.plant.effects if a.key in keys)
+    friction = model.plant.friction if stay else setting.plain.plant.friction
+    return Plant(friction, model.plant.actuator, effects)
+
+
+def _beside(
+    steps: tuple[Step, ...],
+    base: Plant,
+    tried: Sequence[Candidate],
+    setting: Setting,
+    instead: bool,
+) -> Iterator[Trial]:
+    """Effects not in `steps` that the run may show better than the equations do, with values to
+    begin from; instead: of an effect taken, so the best of its rivals too."""
+    keys = {step.candidate.effect.key for step in steps}
+    regressed = {one.effect.key: one.values for one in tried}
+    ranked = sorted(tried, key=lambda one: -one.gain)
+    shown = {one.effect.key for one in ranked[: SHOWN if instead else 0]}
+    for key, effect in setting.library.items():
+        if key in keys or key in ABSORBED:
+            continue
+        if key in shown or effect.acts in IN_RUN or by_load(effect):
+            values = [inside(effect, regressed[key])] if key in regressed else []
+            if values and effect.acts == "stiction":  # breakaways show less of it than there is
+                values = [
+                    inside(effect, {**values[0], **{k: a * values[0][k] for k in effect.linear}})
+                    for a in GROWN
+                ]
+            values += grid(effect, base, setting.short)
+            if values:
+                yield Trial(steps, base, effect, values)
+
+
+def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
+    """Values from which an effect that the equations hardly show is tried."""
+    if effect.acts not in IN_RUN and not by_load(effect):
+        return []
+    if effect.signals and not all(any(k in one.log for k in effect.signals) for one in logs):
+        return []
+    each = [_starts_of(effect, p, base, logs) for p in effect.params]
+    names = effect.names
+    every = [dict(zip(names, map(float, x), strict=True)) for x in product(*each)]
+    return [inside(effect, x) for x in every[:MOST_TRIED]]
+
+
+def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) -> Array:
+    """Values of one parameter to begin from."""
+    if p.unit in ("N", "N m"):
+        return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(LEVELS)
+    if effect.acts == "stiction" and p.unit == "s":
+        rests = [(high - low) * one.log.h for one in logs for low, high in stretches(one, 2)]
+        return float(np.median(rests) if rests else p.typical) * np.array(REST_SHARES)
+    return shape_grid(effect, p, logs)
+
+
+def _screened(trial: Trial, setting: Setting) -> Contender | None:
+    """The effect at the best of its starts, refined a little on the short logs."""
+    plants = []
+    for values in trial.values:
+        try:
+            acting = trial.effect.acting(values)
+            base = less_load(trial.base, acting) if by_load(trial.effect) else trial.base
+            plants.append(replace(base, effects=(*base.effects, acting)))
+        except UserError:
+            continue
+    if not plants:
+        return None
+    errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
+    try:
+        with ThreadPoolExecutor(2) as pool:
+            costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
+        best = plants[int(np.argmin(costs))]
+        if trial.effect.acts in ("bristle", "stiction"):  # the plain stick limits stood for it
+            p = best.friction
+            band = max(p.dv_p, -p.dv_n)
+            best = start_band(best, setting.short, setting.drive, band)
+        found = refit(best, setting.short, setting.drive, prior=even(best), effort="quick")
+    except UserError:  # two effects of a kind that a plant takes one of
+        return None
+    return Contender(trial.steps, trial.effect, found.plant, found.misfit)
+
+
+def less_load(base: Plant, acting: Acting) -> Plant:
+    """The plant with what friction by load takes of the force taken off its own parameters."""
+    p = base.friction
+    none = np.zeros(MAX_SIGNALS)
+    share = 1.0 - acting.effect.value(
+        0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, p.F_cp, p.F_cp, none, acting.array
+    )
+    array = p.array * max(share, LOCKED)
+    array[5:7] = p.array[5:7]
+    return replace(base, friction=Karnopp.from_array(array))
+
+
+def even(plant: Plant) -> dict[str, float]:
+    """A prior that holds every asymmetry that is 0, and nothing else."""
+    return {
+        f"{a.key}.{name}": 0.0
+        for a in plant.effects
+        for name, value in a.values.items()
+        if name == "asymmetry" and value == 0.0
+    }
+
+
+def _whole(one: Contender, setting: Setting) -> Refit:
+    """The contender refined on the whole logs; its asymmetries free where it falls short."""
+    found = refit(one.plant, setting.logs, setting.drive, prior=even(one.plant), effort="near")
+    if COMPLETE < found.misfit < UNEVEN and even(found.plant):
+        again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
+        found = again if again.misfit < found.misfit else found
+    return found
+
+
+def _taken(
+    winner: Contender, done: Refit, rivals: Sequence[Contender], setting: Setting, before: float
+) -> tuple[Choice, Model]:
+    """The choice with the winner as its last step, and the model."""
+    stage, base = _with_steps(winner.steps, setting)
+    values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
+    count = sum(len(starts(one, setting.drive).at) for one in setting.logs)
+    scaled = [_as_candidate(one, stage, base, count * (before - one.misfit)) for one in rivals]
+    mine = _as_candidate(
+        replace(winner, plant=done.plant), stage, base, count * (before - done.misfit)
+    )
+    explained = 1.0 - max(done.misfit - 1.0, 0.0) / max(before - 1.0, 1e-300)
+    p_value = luck(mine, len(setting.library))
+    step = Step(
+        replace(mine, values=values), p_value, tuple(sorted(scaled, key=lambda c: -c.gain)),
+        stage, base, explained,
+    )  # fmt: skip
+    end, last = settled(replace(absorb(stage, step.candidate), scales={}))
+    choice = Choice(setting.start, setting.first, (*winner.steps, step), end, last, ())
+    return choice, Model(end, last, done.plant, done.sd, False, done.misfit)
+
+
+def luck(candidate: Candidate, tried: int) -> float:
+    """Chance that any of so many effects gains as much, every window counted as one sample."""
+    free = len(candidate.effect.params)
+    return float(min(1.0, tried * chi2.sf(max(candidate.gain, 0.0), free)))
+
+
+def _as_candidate(
+    one: Contender, stage: Stage, base: Mapping[str, Outcome], gain: float
+) -> Candidate:
+    """A contender as the equations see it."""
+    values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
+    told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
+    return Candidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
+
+
+def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
+    """Without the effects that a run which is followed does as well without."""
+    for step in choice.steps:
+        if len(choice.steps) < 2 or model.misfit > NEAR:
+            break
+        stay = tuple(one for one in choice.steps if one is not step)
+        base = without(model, stay, setting)
+        found = refit(base, setting.logs, setting.drive, prior=even(base), effort="near")
+        if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
+            continue
+        end, outcomes = _with_steps(stay, setting)
+        choice = Choice(setting.start, setting.first, stay, end, outcomes, choice.tried)
+        model = Model(end, outcomes, found.plant, found.sd, False, found.misfit)
+    return choice, model
+
+
+def _with_steps(steps: Sequence[Step], setting: Setting) -> tuple[Stage, Mapping[str, Outcome]]:
+    """The stage with these effects in it, and what it leaves."""
+    stage, outcomes = setting.start, setting.first
+    for step in steps:
+        stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
+    return stage, outcomes

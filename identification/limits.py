@@ -1,0 +1,92 @@
+"""Stick limit at each breakaway: that with which a simulated body starts when the real one did.
+
+The motion after a breakaway tells its instant within a fraction of a sample, and with it the force
+at which the body let go: from sliding friction and band, found before, and one number a breakaway.
+"""
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.evidence import Moving
+from identification.karnopp import Karnopp
+from identification.log import Log
+from identification.plant import Motor, Plant
+from identification.rest import LEAST, MEAN, Breakaways, stretches
+from identification.result import Drive
+from identification.simulate import free_run
+
+BEFORE, AFTER = 30, 25  # samples of rest and of motion that are compared
+GRID = 25  # limits tried between the smallest and the largest force around the breakaway
+NARROWED = 2  # times that the grid is drawn around its best
+MOVED = 20.0  # times the position's noise that a body goes on to move, or it was no breakaway
+FITS = 9.0  # mean square in noise units up to which an event counts as understood
+
+
+@lru_cache(maxsize=16)
+def breakaway_limits(one: Moving, friction: Karnopp) -> Breakaways:
+    """Breakaways of a log: a rest of at least 24 samples, then motion; `force` is the stick limit.
+
+    friction: sliding and band as the model without effects has them.
+    """
+    found = []
+    for low, high in stretches(one, 3 * MEAN):
+        event = _event(one, friction, low, high)
+        if event is not None:
+            found.append(event)
+    k = np.array(found).reshape(-1, 5)
+    for way in (1.0, -1.0):  # a body that is pushed on at the start of a log has not broken away
+        own = k[:, 1] == way
+        if np.any(own):
+            k = k[~own | (way * k[:, 3] > LEAST * np.median(way * k[own, 3]))]
+    return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
+
+
+def _event(
+    one: Moving, friction: Karnopp, low: int, high: int
+) -> tuple[float, float, float, float, float] | None:
+    """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
+    y, F, h = one.log["y"], one.log["F"], one.log.h
+    first, last = max(low + MEAN, high - BEFORE), high + AFTER
+    if last >= len(y) or first + MEAN >= high:
+        return None
+    way = float(np.sign(one.signals["d"][high]))
+    level = float(np.mean(y[first : first + MEAN]))
+    if way * (y[last - 1] - level) < MOVED * one.noise_y:
+        return None
+    part = Log(one.log.name, {key: one.log[key][first:last] for key in ("t", "y", "F")})
+    part = part.with_signals(u=part["F"])  # of a motor that gives 1 N/V
+    pushed = way * F[first : high + MEAN // 2]
+    lowest, highest = float(np.min(pushed)), float(np.max(pushed))
+    if highest <= max(lowest, 0.0):
+        return None
+    lowest = max(lowest, 0.0)
+    best, left, span = 0.0, np.inf, highest - lowest
+    tried = np.linspace(lowest, highest, GRID)
+    for _ in range(NARROWED + 1):
+        costs = [_cost(one, friction, part, level, way, float(limit)) for limit in tried]
+        left = float(np.min(costs))
+        best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # a held force jumps
+        span = 2.0 * span / (GRID - 1)
+        tried = np.linspace(max(best - span, 0.0), best + span, GRID)
+    if left > FITS or best >= highest:
+        return None
+    risen = np.flatnonzero(pushed >= best)
+    at = first + max(int(risen[0]) - 1, 0) if len(risen) else high
+    rate = way * float(F[at + 1] - F[max(at - 4, 0)]) / (5 * h)
+    return float(at), way, (at - low + 1) * h, way * best, rate
+
+
+def _cost(
+    one: Moving, friction: Karnopp, part: Log, level: float, way: float, limit: float
+) -> float:
+    """Mean square of the position's error in noise units from rest on with this stick limit [N]."""
+    side = {"F_sp": limit} if way > 0 else {"F_sn": -limit}
+    nine = replace(friction, **side)
+    drive: Drive = "command" if one.held else "force"
+    plant = Plant(nine, Motor(1.0) if one.held else None)
+    run = free_run(plant, part, (level, 0.0, float(part["F"][0])), drive)
+    r: Array = (run.y - part["y"]) / one.noise_y
+    return float(np.mean(np.minimum(r**2, 1e4)))

@@ -1,0 +1,243 @@
+"""Free runs in windows from measured states, and errors freed of what those states are unsure of.
+
+A window begins at a sure rest where one is near: the state is known there. In motion position and
+velocity are known within the sensors' noise only, and a small error of either moves the whole
+window. So the states are unknowns with that uncertainty, and the least that they leave is judged:
+r'(I + B P B')^-1 r for residuals r, B their change with the states and P the states' covariance.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.errors import BadModel
+from identification.evidence import Moving
+from identification.log import Log
+from identification.plant import Plant
+from identification.rest import stretches
+from identification.result import Drive
+from identification.simulate import FreeRun, free_run
+
+SECONDS = 2.0  # of a window
+REACH = 0.45  # of a window, within which a rest is looked for
+LATER = 2.0  # windows by which a start is put off until there is a rest
+COARSE = 2e-4  # s, sub-step of a bristle: enough for a search
+LEAST_REST = 24  # samples
+SURE = 3.0  # deviations of the velocity from which a body creeps
+WIDEST = 50  # samples on either side by which a creep is seen
+AROUND = 8  # samples of a rest whose mean is the position
+WHOLE = np.inf  # seconds of a window that is the whole log
+WALKS = 6  # runs by which the walk of a measured force's noise is seen
+RETURNS = 2  # runs until the body's place behind a transducer has settled
+STEP = 0.3  # of a state's deviation, by which the change with it is taken
+
+
+@dataclass(frozen=True, eq=False)
+class Starts:
+    """Samples (k,) at which the windows of a log begin, states there, and their deviations.
+
+    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known.
+    """
+
+    at: IntArray
+    y: Array
+    v: Array
+    F: Array
+    sd: Array
+
+
+def starts(one: Moving, drive: Drive, seconds: float = SECONDS) -> Starts:
+    """Windows of about so many seconds, begun at rest where the body rests near by."""
+    n, h = len(one.log), one.log.h
+    step = max(2, round(min(seconds / h, 2.0 * n)))
+    y = np.asarray(one.log["y"])
+    rests = _rests(one)
+    at = [0]
+    while at[-1] + step < n - step // 2:
+        at.append(_next(one, at[-1] + step, step, rests))
+    index = np.array(at, dtype=np.int64)
+    rest = np.isin(index, rests)
+    level = np.array([float(np.mean(y[max(k - AROUND // 2, 0) : k + AROUND // 2 + 1])) for k in at])
+    sd_F = 0.0 if one.held or drive == "force" else one.noise_F
+    sd = np.array(
+        [
+            np.where(rest, one.noise_y / np.sqrt(AROUND), one.noise_y),
+            np.where(rest, 0.0, one.v_noise),
+            np.full(len(at), sd_F),
+        ]
+    )
+    return Starts(
+        index,
+        np.where(rest, level, one.signals["smooth"][index]),
+        np.where(rest, 0.0, one.signals["v"][index]),
+        np.asarray(one.log["F"])[index],
+        sd,
+    )
+
+
+def window_run(
+    plant: Plant, one: Moving, drive: Drive, begun: Starts, shift: Array | None = None,
+    log: Log | None = None,
+) -> FreeRun | None:  # fmt: skip
+    """Free run in windows; None where the model cannot be followed.
+
+    shift: (3, k) on y, v, F; log: driven by this one in place of its own.
+    """
+    driven = one.log if log is None else log
+    more = np.zeros((3, len(begun.at))) if shift is None else shift
+    y, v, F = begun.y + more[0], begun.v + more[1], begun.F + more[2]
+
+    def run_from(y: Array) -> FreeRun:
+        start = (float(y[0]), float(v[0]), float(F[0]))
+        return free_run(
+            plant, driven, start, drive, restarts=(begun.at, y, v), forces=F, bristle_step=COARSE
+        )
+
+    sensors = [acting.effect for acting in plant.effects if acting.effect.acts == "sensor"]
+    # A play is as wide open as the motion before has left it.
+    at = begun.at - (1 if any(one.evolve is not None for one in sensors) else 0)
+    try:
+        run = run_from(y)
+        for _ in range(RETURNS if sensors else 0):  # what was measured is what is shown
+            run = run_from(y - (run.shown - run.y)[np.maximum(at, 0)])
+        return run
+    except BadModel:
+        return None
+
+
+def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
+    """Position (and, by command, force) errors in units of the sensors' noise, (k, n)."""
+    out = [(run.shown - one.log["y"]) / one.noise_y]
+    if drive == "command" and not one.held:
+        out.append((run.F - one.log["F"]) / max(one.noise_F, 1e-12))
+    return np.array(out)
+
+
+def _next(one: Moving, wanted: int, step: int, rests: IntArray) -> int:
+    """Sample near `wanted` from which a run may start anew: at rest, else in the calmest motion."""
+    reach = int(REACH * step)
+    near = rests[np.abs(rests - wanted) <= reach]
+    if len(near):
+        return int(near[np.argmin(np.abs(near - wanted))])
+    later = rests[(rests > wanted) & (rests <= wanted + LATER * step)]
+    if len(later):
+        return int(later[0])
+    span = np.arange(wanted - reach, min(wanted + reach, len(one.log) - 1))
+    pace = np.where(one.signals["d"][span] != 0, np.abs(one.signals["a"][span]), np.inf)
+    return int(span[np.argmin(pace)])
+
+
+def _rests(one: Moving) -> IntArray:
+    """Samples in the middle of every sure rest, and the first where the log begins with one."""
+    found = []
+    for low, high in stretches(one, LEAST_REST):
+        v, sd = _creep(one, low, high)
+        if abs(v) < SURE * sd:
+            found += [0, (low + high) // 2] if low == 0 else [(low + high) // 2]
+    return np.array(found, dtype=np.int64)
+
+
+def _creep(one: Moving, low: int, high: int) -> tuple[float, float]:
+    """Mean velocity and its deviation [m/s] in the middle of samples low to high."""
+    middle, half = (low + high) // 2, min((high - low) // 2, WIDEST)
+    x = one.log.h * (np.arange(-half, half) + 0.5)
+    square = float(x @ x)
+    y = np.asarray(one.log["y"])[middle - half : middle + half]
+    return float(x @ y) / square, one.noise_y / float(np.sqrt(square))
+
+
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """What takes the part of residuals away that the windows' states account for.
+
+    window (n,) of every sample; weight (k, n): less than 1 where the run itself is unsure; B (3, k,
+    n): change of the weighted errors with each state in units of its deviation; inverse (windows,
+    3, 3) of I + B'B.
+    """
+
+    begun: Starts
+    window: IntArray
+    weight: Array
+    B: Array
+    inverse: Array
+
+    def __call__(self, r: Array) -> Array:
+        """Errors (k, n), weighted, less their states' part."""
+        r = r * self.weight
+        return np.asarray(r - np.einsum("skn,sn->kn", self.B, self.states(r)[:, self.window]))
+
+    def states(self, r: Array) -> Array:
+        """States' most likely errors by weighted errors, in units of their deviations, (3, k)."""
+        products = np.einsum("skn,kn->sn", self.B, r)
+        b = np.array([np.bincount(self.window, p, len(self.begun.at)) for p in products])
+        return np.asarray(np.einsum("wij,jw->iw", self.inverse, b))
+
+
+def freed(
+    plant: Plant, one: Moving, drive: Drive, begun: Starts, *, even: bool = False
+) -> Freed | None:
+    """The states' part of errors of this plant; None where it cannot be followed.
+
+    even: every error counts the same, however unsure the run is of itself there.
+    """
+    base = window_run(plant, one, drive, begun)
+    if base is None:
+        return None
+    window = np.searchsorted(begun.at, np.arange(len(one.log)), side="right") - 1
+    r = errors(base, one, drive)
+    weight = np.ones(r.shape) if even else _sureness(plant, one, drive, begun, base, r)
+    B = np.zeros((3, *r.shape))
+    for i in range(3):
+        if not np.any(begun.sd[i]):
+            continue
+        shift = np.zeros((3, len(begun.at)))
+        shift[i] = STEP * begun.sd[i]
+        moved = window_run(plant, one, drive, begun, shift)
+        if moved is not None:
+            B[i] = weight * (errors(moved, one, drive) - r) / STEP
+    gram = np.einsum("ikn,jkn->ijn", B, B)
+    count = len(begun.at)
+    sums = [[np.bincount(window, gram[i, j], count) for j in range(3)] for i in range(3)]
+    inverse = np.linalg.inv(np.eye(3) + np.moveaxis(np.array(sums), 2, 0))
+    return Freed(begun, window.astype(np.int64), weight, B, inverse)
+
+
+def _sureness(
+    plant: Plant, one: Moving, drive: Drive, begun: Starts, base: FreeRun, r: Array
+) -> Array:
+    """Weights (k, n) of the errors: a run by a measured force walks with the force's noise.
+
+    By a few runs with as much noise once more (of fixed seeds: a quadrature, nothing random).
+    """
+    square = np.zeros(r.shape)
+    if drive == "command" or one.held or one.noise_F == 0.0:
+        return np.ones(r.shape)
+    for seed in range(WALKS):
+        noise = one.noise_F * np.random.default_rng(seed).standard_normal(len(one.log))
+        log = one.log.with_signals(F=one.log["F"] + noise)
+        run = window_run(plant, one, drive, begun, log=log)
+        if run is not None:
+            square[0] += ((run.shown - base.shown) / one.noise_y) ** 2 / WALKS
+    return np.asarray(1.0 / np.sqrt(1.0 + square))
+
+
+def left(plant: Plant, one: Moving, drive: Drive, found: Freed | None) -> Array | None:
+    """Errors of a plant in windows less their states' part, (k, n); None: not to be followed."""
+    if found is None:
+        return None
+    run = window_run(plant, one, drive, found.begun)
+    return None if run is None else found(errors(run, one, drive))
+
+
+def position_rms(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float | None:
+    """Root mean square of the shown position's error in windows [m], over all logs."""
+    squares: list[Array] = []
+    for one in logs:
+        free = freed(plant, one, drive, starts(one, drive), even=True)
+        r = left(plant, one, drive, free)
+        if r is None:
+            return None
+        squares.append((r[0] * one.noise_y) ** 2)
+    return float(np.sqrt(np.mean(np.concatenate(squares))))

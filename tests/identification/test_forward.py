@@ -1,0 +1,117 @@
+"""The forward run as judge: what the equations do not show is named, and nothing else is."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.candidates import Candidate
+from identification.choice import choose, first_stage
+from identification.forward import (
+    Contender,
+    Setting,
+    decisive,
+    even,
+    grid,
+    judged_forward,
+    less_load,
+    luck,
+)
+from identification.library import built_in
+from identification.log import Rig
+from identification.structure import COMPLETE, Model, model_of
+from identification.trace import trace
+from tests.identification.motor_logs import K_A, made, plant, seen
+
+MOTOR = Rig("motor", force_per_command=K_A)
+
+
+def setting_of(seed: int, width: float) -> tuple[Setting, Model]:
+    """What the contest needs of a log with that play in its transducer."""
+    one = seen(made(seed, {"backlash": {"width": width}}))
+    start, first = first_stage([one], False)
+    plain = model_of(start, first, (), [one], "command", MOTOR)
+    return Setting([one], [one], "command", built_in(), start, first, plain), plain
+
+
+def test_play_shows_in_the_run_alone_and_is_named() -> None:
+    setting, plain = setting_of(4, 4e-4)
+    assert plain.misfit > 5.0
+    rng = np.random.default_rng(0)
+    choice = choose(setting.start, setting.first, {}, rng, lambda _s, _p: None)
+    found, model = judged_forward(choice, plain, setting, lambda _s, _p: None)
+    (step,) = found.steps
+    assert step.candidate.effect.key == "backlash"
+    assert step.candidate.values["width"] == pytest.approx(4e-4, rel=0.02)
+    assert model.misfit <= COMPLETE
+    assert step.p_value < 1e-6 and step.explained is not None and step.explained > 0.97
+    assert step.rivals and all(c.gain < step.candidate.gain for c in step.rivals)
+
+
+def test_an_effect_taken_out_of_the_library_is_not_replaced_by_a_helper() -> None:
+    setting, plain = setting_of(4, 4e-4)
+    library = {k: e for k, e in built_in().items() if k != "backlash"}
+    rng = np.random.default_rng(0)
+    choice = choose(setting.start, setting.first, {}, rng, lambda _s, _p: None)
+    found, model = judged_forward(
+        choice, plain, replace(setting, library=library), lambda _s, _p: None
+    )
+    assert not found.steps and model is plain
+
+
+def test_a_late_command_of_a_motor_is_named() -> None:
+    effects = {"input_delay": {"tau": 0.006}}
+    found = trace(
+        [made(6, effects)], [made(7, effects)], MOTOR, built_in(), np.random.default_rng(0)
+    )
+    assert found.verdict == "effect"
+    assert [e.effect.key for e in found.effects] == ["input_delay"]
+    assert found.effects[0].params["tau"].value == pytest.approx(0.006, rel=0.02)
+
+
+def test_a_complete_run_of_a_motor_has_nothing_missing() -> None:
+    found = trace([made(8)], [made(9)], MOTOR, built_in(), np.random.default_rng(0))
+    assert found.verdict == "none" and not found.effects and not found.unknown.depends_on
+    assert found.after["train"].position_rms == pytest.approx(1e-5, rel=0.05)
+
+
+def test_what_is_decisive() -> None:
+    def others(*misfits: float) -> list[Contender]:
+        effect = built_in()["spring"]
+        return [Contender((), effect, plant(), m) for m in misfits]
+
+    assert decisive(100.0, others(90.0)) == pytest.approx(8.0)  # far less than any other
+    assert decisive(20.0, others(3.0)) == pytest.approx(1.5)  # another does nearly as well
+    assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
+
+
+def test_luck_grows_with_what_was_tried() -> None:
+    spring = Candidate(built_in()["spring"], {"k": 1.0}, {}, 12.0)
+    assert luck(spring, 1) == pytest.approx(5.3e-4, rel=0.02)  # chi-square of one, at 12
+    assert luck(spring, 18) == pytest.approx(18 * luck(spring, 1))
+    assert luck(replace(spring, gain=-3.0), 18) == 1.0
+
+
+def test_values_to_begin_from_lie_within_bounds() -> None:
+    one = seen(made(1))
+    for key in ("backlash", "presliding", "rising_stiction", "load_dependent_friction"):
+        effect = built_in()[key]
+        values = grid(effect, plant(), [one])
+        assert values
+        for v in values:
+            effect.acting(v)
+    assert grid(built_in()["spring"], plant(), [one]) == []
+
+
+def test_friction_by_load_takes_its_share_of_the_plain() -> None:
+    acting = built_in()["load_dependent_friction"].acting({"mu": 0.2})
+    less = less_load(plant(), acting).friction
+    assert less.F_cp == pytest.approx(0.8 * plant().friction.F_cp)
+    assert less.m == pytest.approx(0.8 * plant().friction.m)
+    assert less.dv_p == plant().friction.dv_p
+
+
+def test_asymmetries_of_zero_are_held() -> None:
+    held = even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1}, "spring": {"k": 1.0}}))
+    assert held == {"stribeck.asymmetry": 0.0}
+    assert even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1, "asymmetry": 0.1}})) == {}

@@ -1,0 +1,30 @@
+"""Stick limits by simulation: the limit of every breakaway, and what it grows with."""
+
+import numpy as np
+
+from identification.limits import breakaway_limits
+from tests.identification.motor_logs import NINE, made, seen
+
+
+def test_every_breakaway_gives_the_limit() -> None:
+    found = breakaway_limits(seen(made(1)), NINE)
+    assert len(found.at) > 10
+    limit = np.where(found.direction > 0, NINE.F_sp, -NINE.F_sn)
+    off = found.force * found.direction - limit
+    assert abs(np.median(off)) < 0.1
+    assert np.quantile(np.abs(off), 0.8) < 0.3
+
+
+def test_a_limit_that_grows_with_the_rest_is_seen_to_grow() -> None:
+    effects = {"rising_stiction": {"F_r": 5.0, "tau": 0.4}}
+    found = breakaway_limits(seen(made(1, effects)), NINE)
+    limit = np.where(found.direction > 0, NINE.F_sp, -NINE.F_sn)
+    grown = found.force * found.direction - limit
+    assert np.corrcoef(grown, found.rested)[0, 1] > 0.6
+    assert np.median(grown) > 0.5
+
+
+def test_a_body_that_never_moves_breaks_nowhere() -> None:
+    log = made(1)
+    still = np.random.default_rng(0).standard_normal(len(log)) * 1e-5
+    assert len(breakaway_limits(seen(log.with_signals(y=still)), NINE).at) == 0

@@ -1,0 +1,70 @@
+"""Refinement on the free run: from a rough start to the parameters, without bending the good."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.karnopp import Karnopp
+from identification.plant import Plant
+from identification.refit import gauss_newton, plant_with, refit
+from tests.identification.motor_logs import NINE, made, plant, seen
+
+ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
+
+
+def test_a_rough_start_comes_to_the_true_parameters() -> None:
+    one = seen(made(2))
+    found = refit(replace(plant(), friction=ROUGH), [one], "command", prior={}, band=0.012)
+    assert found.misfit < 1.05
+    for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "dv_p", "dv_n"):
+        assert getattr(found.plant.friction, name) == pytest.approx(
+            getattr(NINE, name), rel=0.02 if name.startswith("dv") else 2e-3
+        )
+
+
+def test_effects_are_refined_with_the_nine() -> None:
+    effects = {"spring": {"k": 60.0}}
+    one = seen(made(3, effects))
+    rough = replace(plant({"spring": {"k": 50.0}}), friction=ROUGH)
+    found = refit(rough, [one], "command", prior={}, band=0.012)
+    assert found.misfit < 1.1
+    assert found.plant.effects[0].values["k"] == pytest.approx(60.0, rel=0.01)
+    assert 0 < found.sd["spring.k"] < 1.0
+
+
+def test_where_the_model_lacks_something_the_regression_holds() -> None:
+    one = seen(made(3, {"cogging": {"a": 4.0, "b": 0.0, "period": 0.02}}))
+    tight = {
+        name: 1e-4 * abs(getattr(NINE, name)) for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn")
+    }
+    found = refit(plant(), [one], "command", prior=tight, band=0.01)
+    assert found.misfit > 3.0
+    loose = refit(plant(), [one], "command", prior={}, band=0.01)
+    off = {
+        name: [
+            abs(getattr(f.plant.friction, name) / getattr(NINE, name) - 1) for f in (found, loose)
+        ]
+        for name in tight
+    }
+    assert all(held < 0.05 for held, _ in off.values())
+    assert sum(held for held, _ in off.values()) < sum(free for _, free in off.values())
+    assert all(found.sd[name] >= tight[name] for name in tight)
+
+
+def test_a_search_never_makes_the_mass_vanish() -> None:
+    started = Plant(NINE)
+    names = ["m", "F_sn", "dv_p"]
+    far = plant_with(started, names, np.array([-5.0, 3.0, -1.0]))
+    assert far.friction.m > 0.01 * NINE.m
+    assert far.friction.F_sn < 0 < far.friction.dv_p
+
+
+def test_least_squares_of_a_curved_valley() -> None:
+    def rosenbrock(x: Array) -> Array:
+        return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
+
+    x, J, cost = gauss_newton(rosenbrock, np.array([-1.2, 1.0]), 100)
+    assert x == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert J.shape == (2, 2) and cost < 1e-8

@@ -1,0 +1,74 @@
+"""Windows of a free run: begun at sure rests, and judged for what their states do not explain."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification import starts as module
+from identification.log import Log
+from identification.refit import judge, misfit
+from identification.starts import SECONDS, WHOLE, errors, position_rms, starts, window_run
+from tests.identification.motor_logs import NOISE, H, made, plant, seen
+
+
+def test_windows_begin_at_rest_where_the_body_rests() -> None:
+    one = seen(made(1))
+    begun = starts(one, "command")
+    assert len(begun.at) > 6 and begun.at[0] == 0
+    assert np.all(np.diff(begun.at) > 0)
+    still = begun.sd[1] == 0.0
+    assert np.mean(still) > 0.8
+    assert np.all(begun.v[still] == 0.0)
+    true = one.signals["smooth"][begun.at]
+    assert np.max(np.abs(begun.y - true)[still]) < 3 * NOISE
+
+
+def test_a_body_that_creeps_does_not_rest() -> None:
+    n = 5000
+    t = H * np.arange(n, dtype=np.float64)
+    rng = np.random.default_rng(3)
+    y = 1e-3 * t + NOISE * rng.standard_normal(n)  # slower than its sign is sure sample by sample
+    none = np.zeros(n)
+    one = seen(Log("creep", {"t": t, "y": y, "u": none, "F": none}))
+    begun = starts(one, "command")
+    assert not np.any(begun.sd[1] == 0.0)
+    assert np.all(begun.v != 0.0)
+
+
+def test_the_true_plant_leaves_noise_alone_in_windows_and_over_all() -> None:
+    one = seen(made(2))
+    for seconds in (0.5, SECONDS, WHOLE):
+        r = judge(plant(), [one], "command", seconds)(plant())
+        assert abs(np.mean(r**2) - 1.0) < 0.1, seconds
+    assert abs(misfit(plant(), [one], "command") - 1.0) < 0.05
+    rms = position_rms(plant(), [one], "command")
+    assert rms is not None and abs(rms / NOISE - 1.0) < 0.05
+
+
+def test_what_unsure_states_make_of_it_is_taken_away() -> None:
+    one = seen(made(2))
+    begun = starts(one, "command", 0.3)
+    assert np.any(begun.sd[1] > 0)  # some begin in motion
+    run = window_run(plant(), one, "command", begun)
+    free = module.freed(plant(), one, "command", begun)
+    assert run is not None and free is not None
+    raw = errors(run, one, "command")
+    assert np.mean(raw**2) > 2.0 * np.mean(free(raw) ** 2)
+
+
+def test_a_play_is_where_the_motion_left_it() -> None:
+    effects = {"backlash": {"width": 4e-4}}
+    one = seen(made(4, effects))
+    assert misfit(plant(effects), [one], "command") < 1.1
+    assert misfit(plant(), [one], "command") > 5.0
+
+
+def test_a_run_by_a_noisy_force_is_judged_less_where_it_walks() -> None:
+    log = made(5)
+    noisy = log["F"] + 0.5 * np.random.default_rng(0).standard_normal(len(log))
+    by_force = replace(seen(log.with_signals(F=noisy)), held=False, noise_F=0.5)
+    free = module.freed(plant(), by_force, "force", starts(by_force, "force"))
+    assert free is not None
+    assert np.min(free.weight) < 0.5 < np.max(free.weight) <= 1.0
+    even = module.freed(plant(), by_force, "force", starts(by_force, "force"), even=True)
+    assert even is not None and np.all(even.weight == 1.0)
