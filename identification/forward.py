@@ -26,17 +26,18 @@ from identification.karnopp import Karnopp
 from identification.library import Library
 from identification.outcome import Outcome
 from identification.plant import Plant
-from identification.refit import Refit, judge, loss, refit, start_band
+from identification.refit import COMPLETE, Refit, judge, loss, refit, start_band
 from identification.rest import stretches
 from identification.result import Drive
 from identification.stage import LOCKED, Stage
 from identification.starts import SECONDS, starts
-from identification.structure import COMPLETE, Model, inside
+from identification.structure import Model, inside
 
 DECISIVE = 1.5  # misfit up to which a structure found here is taken
 HALF = 0.5  # of the excess misfit before, at most
 NEAR, ALONE = 8.0, 0.15  # misfit, and share of any rival's excess, up to which it is taken too
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
+WALKED = 3.0  # misfit that the noise of a measured force may leave
 UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 SHORT = 15.0  # s of each log in which all are tried first
@@ -91,7 +92,8 @@ def judged_forward(
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
     if model.led:
         return choice, model
-    if model.misfit > max(DECISIVE, 1.0 + ENOUGH * (setting.plain.misfit - 1.0)):
+    least = DECISIVE if setting.drive == "command" else WALKED
+    if model.misfit > max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0)):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found

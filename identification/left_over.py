@@ -9,11 +9,12 @@ from identification.choice import FAR, MATERIAL, Choice
 from identification.dependence import dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
 from identification.outcome import Outcome, rms, spread
+from identification.refit import COMPLETE
 from identification.result import Drive
 from identification.stage import Stage, one_way
-from identification.starts import freed, starts
+from identification.starts import freed, position_rms, starts
 from identification.starts import left as left_in_run
-from identification.structure import COMPLETE, Model, band
+from identification.structure import Model, band
 from identification.trace_result import Dependence
 
 FEWEST_ROWS = 30
@@ -23,7 +24,8 @@ STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
-ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found
+ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
+OFF = 1e-3  # if its error is this share of the position's spread
 THINNED = 10  # samples of a free run of which one is judged
 OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
@@ -107,7 +109,17 @@ def too_much(choice: Choice, after: Model) -> bool:
         missing = ROUGH_LEFT * _excess(choice.first[equation]) if choice.steps else 0.0
         if left > MUCH**2 and left - 1.0 > missing and not (after.led and choice.steps):
             return True
-    return not choice.steps and not after.led and after.misfit > ASTRAY
+    return not choice.steps and not after.led and after.misfit > ASTRAY and _off(after) > OFF
+
+
+def _off(after: Model) -> float:
+    """Position error of the free run over the spread of the position."""
+    drive: Drive = "force" if after.plant.actuator is None else "command"
+    logs = after.stage.logs
+    rms_y = position_rms(after.plant, logs, drive)
+    positions = [np.asarray(one.log["y"]) for one in logs]
+    spread_y = rms(np.concatenate([y - np.mean(y) for y in positions]))
+    return np.inf if rms_y is None else rms_y / max(spread_y, 1e-300)
 
 
 def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:

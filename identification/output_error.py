@@ -22,7 +22,7 @@ from identification.imposed import fit_imposed, is_imposed
 from identification.karnopp import NAMES
 from identification.log import Log, Rig
 from identification.objective import START_V, START_Y
-from identification.plant import Actuator
+from identification.plant import Actuator, Plant
 from identification.problem import ADEQUATE, Problem, plant_of, pose, simulated, start_of
 from identification.refine import Optimum, refine
 from identification.result import Drive, KarnoppFit, LogFit
@@ -89,6 +89,25 @@ def fit_karnopp(
         why = f"no free run follows this log (chi-square {solution.chi_square:.3g})"
         return fit_imposed(problem, rng, rig, why, remarks)
     return _result(problem, solution, actuator, rig, remarks)
+
+
+def searched_plant(
+    logs: Sequence[Log], rng: np.random.Generator, *, rig: Rig, drive: Drive
+) -> Plant:
+    """The plant of one search for the nine parameters, without intervals; raises as `fit_karnopp`.
+
+    drive: "command" (of a motor too) or "force".
+    """
+
+    def quiet(_stage: str, _share: float) -> None:
+        pass
+
+    problem = pose(logs, rig, None if rig.kind == "motor" else drive)
+    if problem.hold:
+        found = climb(_opened(problem), rng, quiet, CLIMBS[:FIRST_CLIMBS]).optimum
+    else:
+        found, _ = _search(problem, rng, POPULATION, 0, quiet)
+    return plant_of(problem, found)
 
 
 def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:

@@ -21,6 +21,11 @@ from identification.result import Drive
 from identification.starts import SECONDS, WHOLE, freed, left, starts
 
 FIRST = 1.0  # s, of the windows in which the search begins
+RESCUES = 3  # searches beside, of a run that leaves more than noise
+SAME = 0.95  # of the misfit, above which another search is of no use
+WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
+LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
+COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
 LONG = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
@@ -138,6 +143,17 @@ def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) 
     return best
 
 
+def by_side(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Plant:
+    """The plant with the best band and stick limit of either direction on a wide grid."""
+    errors_of = judge(plant, logs, drive, FIRST)
+    p = plant.friction
+    up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(WIDTHS, LIMITS)]
+    best = _best_of(plant, up, errors_of)
+    p = best.friction
+    down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(WIDTHS, LIMITS)]
+    return _best_of(best, down, errors_of)
+
+
 def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
     """The plant with the friction that leaves least."""
     plants = [replace(plant, friction=nine) for nine in tried]
@@ -205,9 +221,23 @@ def refit(
         again = refined(x, seconds, False)
         if again[2] / len(again[1]) < FOLLOWED:
             x, J, cost = again
+    found = misfit(plant_with(plant, names, full(x)), logs, drive)
+    for _ in range(RESCUES if effort == "whole" and not slow else 0):
+        if found <= COMPLETE:
+            break
+        # Band and stick limits have narrow minima, and many: another one of either direction.
+        other = by_side(plant_with(plant, names, full(x)), logs, drive)
+        at = values_of(other, names)[open_] / unit[open_]
+        trial = refined(at, SECONDS, False)
+        if drive == "command":
+            longer = refined(trial[0], LONG if plant_is_motor(plant) else WHOLE, False)
+            trial = longer if longer[2] / len(longer[1]) < FOLLOWED else trial
+        better = misfit(plant_with(plant, names, full(trial[0])), logs, drive)
+        if better > SAME * found:
+            break
+        (x, J, cost), found = trial, better
     best = plant_with(plant, names, full(x))
     spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * cost / len(J))
-    found = misfit(best, logs, drive)
     if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
         spread = spread * np.sqrt(SECONDS / logs[0].log.h)
     sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}

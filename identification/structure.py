@@ -21,7 +21,7 @@ from identification.stage import Stage
 INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
-COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
+MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -126,4 +126,9 @@ def effect_sd(
 def band(model: Model) -> float:
     """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
     p = model.plant.friction
-    return 0.0 if model.led else BEYOND * max(p.dv_p, -p.dv_n)
+    pace = np.concatenate(
+        [np.abs(one.signals["v"][one.signals["d"] != 0]) for one in model.stage.logs]
+    )
+    # A run that is not followed may have any band: most of the sliding is to be judged all the same.
+    widest = MOSTLY * float(np.median(pace)) if len(pace) else np.inf
+    return 0.0 if model.led else min(BEYOND * max(p.dv_p, -p.dv_n), widest)

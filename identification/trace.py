@@ -14,7 +14,7 @@ from identification.before_after import errors_of, noise_of
 from identification.candidates import Candidate
 from identification.choice import Choice, Step, choose, first_stage, merit, share
 from identification.drift import drift
-from identification.errors import NotIdentifiable
+from identification.errors import NotIdentifiable, UserError
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
 from identification.forward import SHORT, Setting, judged_forward
 from identification.held_out import left_out
@@ -23,10 +23,12 @@ from identification.left_over import FEWEST_ROWS, in_run, left_over, signals_at,
 from identification.library import Library
 from identification.log import Log, Rig
 from identification.outcome import Outcome, base_outcomes, rms
+from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
+from identification.refit import COMPLETE, refit
 from identification.result import Drive, Estimate
 from identification.stage import Stage
-from identification.structure import COMPLETE, Model, band, model_of
+from identification.structure import Model, band, model_of
 from identification.trace_result import (
     Change,
     Dependence,
@@ -75,6 +77,8 @@ def trace(
     drive: Drive = "command" if by_command or held else "force"
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig)
+    if not before.led and before.misfit > COMPLETE:
+        before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
         start = replace(start, band=band(before), sliding=before.plant.friction)
         first = base_outcomes(start)
@@ -122,6 +126,21 @@ def trace(
         residuals=_residuals(choice.start, choice.first, choice.end, choice.base),
         remarks=tuple(remarks),
     )
+
+
+def searched(
+    model: Model, train: Sequence[Log], logs: Sequence[Moving], drive: Drive, rig: Rig,
+    rng: np.random.Generator,
+) -> Model:  # fmt: skip
+    """The plain model from a global search, where that follows the logs better."""
+    try:
+        plant = searched_plant(train, rng.spawn(1)[0], rig=rig, drive=drive)
+    except UserError:
+        return model
+    found = refit(plant, logs, drive, prior={}, effort="near")
+    if found.misfit >= model.misfit:
+        return model
+    return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
 
 
 def cut(log: Log, seconds: float) -> Log:

@@ -19,7 +19,8 @@ from identification.forward import (
 )
 from identification.library import built_in
 from identification.log import Rig
-from identification.structure import COMPLETE, Model, model_of
+from identification.refit import COMPLETE
+from identification.structure import Model, model_of
 from identification.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
 
