@@ -126,9 +126,8 @@ def effect_sd(
 def band(model: Model) -> float:
     """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
     p = model.plant.friction
-    pace = np.concatenate(
-        [np.abs(one.signals["v"][one.signals["d"] != 0]) for one in model.stage.logs]
-    )
+    signals = [one.signals for one in model.stage.logs]
+    pace = np.concatenate([np.abs(s["v"][s["d"] != 0]) for s in signals])
     # A run that is not followed may have any band: most of the sliding is to be judged all the same.
     widest = MOSTLY * float(np.median(pace)) if len(pace) else np.inf
     return 0.0 if model.led else min(BEYOND * max(p.dv_p, -p.dv_n), widest)
