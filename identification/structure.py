@@ -128,6 +128,6 @@ def band(model: Model) -> float:
     p = model.plant.friction
     signals = [one.signals for one in model.stage.logs]
     pace = np.concatenate([np.abs(s["v"][s["d"] != 0]) for s in signals])
-    # A run that is not followed may have any band: most of the sliding is to be judged all the same.
+    # A run that is not followed may have any band; most of the sliding is judged all the same.
     widest = MOSTLY * float(np.median(pace)) if len(pace) else np.inf
     return 0.0 if model.led else min(BEYOND * max(p.dv_p, -p.dv_n), widest)
