@@ -133,14 +133,11 @@ def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) 
     ]
     errors_of = judge(plant, logs, drive, FIRST)
     best = _best_of(plant, tried, errors_of)
-    for _ in range(2):
-        p = best.friction
-        up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(CLOSER, CLOSER)]
-        best = _best_of(plant, up, errors_of)
-        p = best.friction
-        down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(CLOSER, CLOSER)]
-        best = _best_of(plant, down, errors_of)
-    return best
+    p = best.friction
+    up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(CLOSER, CLOSER)]
+    p = _best_of(plant, up, errors_of).friction
+    down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(CLOSER, CLOSER)]
+    return _best_of(plant, down, errors_of)
 
 
 def by_side(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Plant:
