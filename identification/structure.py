@@ -22,6 +22,7 @@ INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
+UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -69,13 +70,22 @@ def model_of(
     for step in steps:
         effect = step.candidate.effect
         values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
+        spreads = effect_sd(effect, values, outcomes)
+        for p in effect.params:  # a signal that is not there tells nothing of its parameter
+            if untold(spreads.get(p.name), values[p.name], p.typical):
+                values[p.name] = float(np.clip(0.0, p.low, p.high))
         acting.append(effect.acting(values))
-        prior |= {f"{effect.key}.{k}": x for k, x in effect_sd(effect, values, outcomes).items()}
+        prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
     plant = Plant(nine, drives, tuple(acting))
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior, True)
     done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior)
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
+
+
+def untold(sd: float | None, value: float, typical: float) -> bool:
+    """Whether a deviation is so far beyond its parameter that the logs say nothing of it."""
+    return sd is not None and not sd < UNTOLD * max(abs(value), abs(typical))
 
 
 def led(o: Outcome) -> bool:

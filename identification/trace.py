@@ -14,6 +14,7 @@ from identification.before_after import errors_of, noise_of
 from identification.candidates import Candidate
 from identification.choice import Choice, Step, choose, first_stage, merit, misfit, share
 from identification.drift import drift
+from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
 from identification.forward import SHORT, Setting, judged_forward
@@ -28,7 +29,7 @@ from identification.plant import Actuator, units_of
 from identification.refit import COMPLETE, refit
 from identification.result import Drive, Estimate
 from identification.stage import Stage
-from identification.structure import Model, band, model_of
+from identification.structure import Model, band, model_of, untold
 from identification.trace_result import (
     Change,
     Dependence,
@@ -195,13 +196,19 @@ def _found(step: Step, after: Model, choice: Choice) -> FoundEffect:
     effect = step.candidate.effect
     acting = next(a for a in after.plant.effects if a.key == effect.key)
     params = {
-        p.name: _estimate(acting.values[p.name], p.unit, after.sd.get(f"{effect.key}.{p.name}"))
+        p.name: _of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
         for p in effect.params
     }
     explained = step.explained
     if explained is None:
         explained = share(step.candidate, step.base)
     return FoundEffect(effect, params, explained, step.p_value)
+
+
+def _of_effect(p: Param, value: float, sd: float | None) -> Estimate:
+    if untold(sd, value, p.typical):
+        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
+    return _estimate(value, p.unit, sd)
 
 
 def _estimate(value: float, unit: str, sd: float | None) -> Estimate:
