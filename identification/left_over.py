@@ -18,7 +18,7 @@ from identification.structure import Model, band
 from identification.trace_result import Dependence
 
 FEWEST_ROWS = 30
-SHARE_LEFT = 0.002  # of what was missing, that may be left with structure
+SHARE_LEFT = 0.01  # of what was missing, that may be left with structure
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
 STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
@@ -80,8 +80,9 @@ def _excess(o: Outcome) -> float:
 
 
 def judged(o: Outcome, after: Model) -> BoolArray:
-    """Rows of sliding above the band that the free run shows (or the regression's, without one)."""
-    slowest = o.slowest if after.led else min(o.slowest, band(after))
+    """Rows of sliding above the band of a free run that is followed, or else the regression's."""
+    followed = not after.led and after.misfit <= ASTRAY
+    slowest = min(o.slowest, band(after)) if followed else o.slowest
     return np.asarray(o.rows.speed >= slowest)
 
 

@@ -1,7 +1,7 @@
 """A structure with its numbers: from the regression's sizes to a plant refined on its free run."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from identification.karnopp import Karnopp
 from identification.log import Rig
 from identification.outcome import Outcome
 from identification.plant import Actuator, Motor, Plant
-from identification.refit import refit
+from identification.refit import COMPLETE, refit
 from identification.result import Drive
 from identification.stage import Stage
 
@@ -44,9 +44,12 @@ class Model:
 
 def model_of(
     stage: Stage, outcomes: Mapping[str, Outcome], steps: Sequence[Step], logs: Sequence[Moving],
-    drive: Drive, rig: Rig,
+    drive: Drive, rig: Rig, *, near: Karnopp | None = None,
 ) -> Model:  # fmt: skip
-    """The plant of a structure: the regression's numbers, refined on the free run."""
+    """The plant of a structure: the regression's numbers, refined on the free run.
+
+    near: band and stick limits to begin from too, where those of the regression lead nowhere.
+    """
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     prior: dict[str, float] = {}
     sliding = outcomes[MECHANICAL]
@@ -80,6 +83,11 @@ def model_of(
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior, True)
     done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior)
+    if near is not None and done.misfit > COMPLETE:
+        same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
+        beside = replace(plant, friction=replace(nine, **same))
+        other = refit(beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior)
+        done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 

@@ -89,7 +89,8 @@ def trace(
     report("refitting", 0.5)
     after = before
     if choice.steps:
-        after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig)
+        near = None if before.led else before.plant.friction
+        after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig, near=near)
     report("judging", 0.0)
     short = [moving(cut(log, SHORT), held=held, by_command=by_command) for log in train]
     setting = Setting(logs, short, drive, library, start, first, before)
