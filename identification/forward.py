@@ -45,6 +45,7 @@ SHOWN = 3  # rivals of an effect taken that are tried in its place
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 FINALISTS = 2  # refined on the whole logs
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist
+LARGER = 3  # starts of a play, from the best up
 MOST_TRIED = 40  # starts of one effect
 LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
 GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
@@ -227,15 +228,23 @@ def _screened(trial: Trial, setting: Setting) -> Contender | None:
     try:
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        best = plants[int(np.argmin(costs))]
-        if trial.effect.acts in ("bristle", "stiction"):  # the plain stick limits stood for it
-            p = best.friction
-            band = max(p.dv_p, -p.dv_n)
-            best = start_band(best, setting.short, setting.drive, band)
-        found = refit(best, setting.short, setting.drive, prior=even(best), effort="quick")
+        at = int(np.argmin(costs))
+        # The plain parameters are bent to do without it: a larger size may be the better start.
+        more = LARGER if trial.effect.acts == "sensor" and len(trial.effect.params) == 1 else 1
+        tries = [_near(one, trial.effect, setting) for one in plants[at : at + more]]
     except UserError:  # two effects of a kind that a plant takes one of
         return None
+    found = min(tries, key=lambda one: one.misfit)
     return Contender(trial.steps, trial.effect, found.plant, found.misfit)
+
+
+def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
+    """The plant refined a little on the short logs."""
+    if effect.acts in ("bristle", "stiction", "sensor"):  # the plain band and limits stood for it
+        p = plant.friction
+        band = max(p.dv_p, -p.dv_n)
+        plant = start_band(plant, setting.short, setting.drive, band)
+    return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 
 def less_load(base: Plant, acting: Acting) -> Plant:

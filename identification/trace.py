@@ -99,7 +99,7 @@ def trace(
     left = Dependence((), 0.0) if after.misfit <= COMPLETE else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
     verdict = _verdict(choice, left, changed)
-    if verdict in ("none", "effect", "inseparable") and too_much(choice, after):
+    if verdict != "unknown" and too_much(choice, after):
         verdict = "unknown"
         left = left_over(choice, after, any_size=True)
         if not left.depends_on and not after.led:
