@@ -102,12 +102,12 @@ def choose(
         stage, base = settled(replace(absorb(step.stage, step.candidate), scales={}))
         if len(stage.chosen) > 1:
             stage, base, steps = polished(stage, base, steps)
-    if steps and misfit(base):
+    if steps and rough(base):
         stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
 
 
-def misfit(base: Mapping[str, Outcome]) -> bool:
+def rough(base: Mapping[str, Outcome]) -> bool:
     """Whether far more than the sensors' noise is left when nothing more is found."""
     return any(spread(base[e]) > FAR for e in (MECHANICAL, ACTUATOR) if e in base)
 

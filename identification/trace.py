@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.before_after import errors_of, noise_of
 from identification.candidates import Candidate
-from identification.choice import Choice, Step, choose, first_stage, merit, misfit, share
+from identification.choice import Choice, Step, choose, first_stage, merit, rough, share
 from identification.drift import drift
 from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
@@ -78,7 +78,7 @@ def trace(
     drive: Drive = "command" if by_command or held else "force"
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig)
-    if not before.led and before.misfit > COMPLETE and not misfit(first):
+    if not before.led and before.misfit > COMPLETE and not rough(first):
         before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
         start = replace(start, band=band(before), sliding=before.plant.friction)
