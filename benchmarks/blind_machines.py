@@ -18,8 +18,9 @@ from typing import cast
 
 import numpy as np
 
-from design.effect_loop import OfForce, simulate_effect_loop
+from design.effect_loop import simulate_effect_loop
 from design.loop import ForcePI, LoopNoise, LoopRun
+from design.loop_signals import OfForce
 from design.pid import pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
@@ -235,10 +236,7 @@ def chambers(one: Machine, n: int, rng: np.random.Generator) -> dict[str, OfForc
     level = MEAN * (1.0 + SWAY * wave)
     half, offset = 1.0 / (AREA_P + AREA_N), (AREA_P - AREA_N) * (level - SUPPLY)
     at_rest = {"p_p": level - half * offset, "p_n": level + half * offset}
-    # OfForce is declared for a number at rest; its sums hold for a signal (n,) as well.
-    return {
-        key: OfForce(cast(float, x), half if key == "p_p" else -half) for key, x in at_rest.items()
-    }
+    return {key: OfForce(x, half if key == "p_p" else -half) for key, x in at_rest.items()}
 
 
 def simulated(

@@ -166,25 +166,32 @@ def applied_force(log: Log, rig: Rig) -> Array | None:
     return S_p * log["p_p"] - S_n * log["p_n"] - (S_p - S_n) * (rig.supply_pressure or 0.0)
 
 
-def velocity(y: Array, h: float, N_d: int = 5) -> Array:
-    """Least-squares slope over the last `N_d` positions [m/s], shape of `y`.
-
-    y: position [m], shape (n,), filtered by A; h: sampling period [s]. Before the log the body is
-    taken to rest at y[0]. Causal: it lags by (N_d - 1)/2 samples. Source: paper, eq. (5).
-    """
-    if N_d < 2 or h <= 0:
-        raise BadSpecification(f"velocity: N_d = {N_d}, h = {h:g} s; need N_d >= 2, h > 0")
-    j = np.arange(N_d) - 0.5 * (N_d - 1)
-    slope = Filter(tuple(float(w) for w in j[::-1] / (h * np.sum(j**2))))
-    return apply_filter(slope, y)
-
-
 @dataclass(frozen=True)
 class Filter:
     """Discrete filter b(z^-1)/a(z^-1), a[0] = 1."""
 
     b: tuple[float, ...]
     a: tuple[float, ...] = (1.0,)
+
+
+def velocity(y: Array, h: float, N_d: int = 5) -> Array:
+    """Least-squares slope over the last `N_d` positions [m/s], shape of `y`.
+
+    y: position [m], shape (n,), filtered by A; h: sampling period [s]. Before the log the body is
+    taken to rest at y[0]. Causal: it lags by (N_d - 1)/2 samples. Source: paper, eq. (5).
+    """
+    return apply_filter(slope_filter(h, N_d), y)
+
+
+def slope_filter(h: float, N_d: int = 5) -> Filter:
+    """The velocity (5) as a filter: least-squares slope over the last `N_d` positions, h [s].
+
+    Raises BadSpecification where N_d < 2 or h is not positive. Source: paper, eq. (5).
+    """
+    if N_d < 2 or h <= 0:
+        raise BadSpecification(f"velocity: N_d = {N_d}, h = {h:g} s; need N_d >= 2, h > 0")
+    j = np.arange(N_d) - 0.5 * (N_d - 1)
+    return Filter(tuple(float(w) for w in j[::-1] / (h * np.sum(j**2))))
 
 
 RIG_A = Filter((0.5,), (1.0, -0.5))

@@ -4,8 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.effect_loop import OfForce, pressures, simulate_effect_loop
+from design.effect_loop import simulate_effect_loop
 from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop_signals import OfForce, pressures
 from design.rst import RST
 from design.tracking import rate_limited
 from design.two_rate import simulate_two_rate

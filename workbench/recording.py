@@ -5,8 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from design.effect_loop import OfForce, pressures, simulate_effect_loop
+from design.effect_loop import simulate_effect_loop
 from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array

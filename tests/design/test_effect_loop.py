@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.effect_loop import OfForce, pressures, simulate_effect_loop
+from design.effect_loop import simulate_effect_loop
 from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
@@ -157,4 +158,4 @@ def test_a_run_without_bound_is_refused() -> None:
 
 
 def test_a_signal_of_the_force() -> None:
-    assert OfForce(2.0, 3.0)(4.0) == 14.0
+    assert OfForce(2.0, 3.0)(np.array([4.0])).tolist() == [14.0]

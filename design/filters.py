@@ -1,0 +1,77 @@
+"""Filters A, B, C and the velocity (5) around the compensator, in the paper's two versions.
+
+A smooths the position of which the velocity is taken, B that of the position error, C what the
+compensator gives. The paper says of the rig that a filter of order 40 delays the velocity by
+0.21 s, and names it B, while its text takes the velocity behind A: `rig_filters` has both readings.
+"""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.clean import RIG_A, RIG_C, Filter, fir_lowpass
+from identification.compiled import compiled_inline
+from identification.errors import BadSpecification
+
+N_D = 5  # positions of the slope (5)
+CUTOFF, RIG_CUTOFF = 5.0, 10.0  # Hz
+PASS = Filter((1.0,))
+
+
+@dataclass(frozen=True)
+class CompensatorFilters:
+    """velocity: of the position before its slope (5); error: of the position in r - y; force: C."""
+
+    velocity: Filter = PASS
+    error: Filter = PASS
+    force: Filter = PASS
+    N_d: int = N_D
+
+
+def simulation_filters(h: float) -> CompensatorFilters:
+    """A, B, C: FIR of order 40, 5 Hz, sampled at h [s]. Source: paper, section 3.2."""
+    low = fir_lowpass(CUTOFF, h)
+    return CompensatorFilters(low, low, low)
+
+
+def rig_filters(h: float, *, as_lettered: bool = False) -> CompensatorFilters:
+    """0.5/(1 - 0.5 z^-1), FIR of order 40 at 10 Hz, C = 0.2/(1 - 0.8 z^-1). Source: section 3.3.2.
+
+    The FIR smooths the velocity's position, as the delay that the paper states asks for;
+    as_lettered: the error's, as its letters A and B ask for.
+    """
+    low = fir_lowpass(RIG_CUTOFF, h)
+    velocity, error = (RIG_A, low) if as_lettered else (low, RIG_A)
+    return CompensatorFilters(velocity, error, RIG_C)
+
+
+class Sampled(NamedTuple):
+    """A filter as the kernels take it: b, a of one length, a[0] = 1."""
+
+    b: Array
+    a: Array
+
+
+def sampled(one: Filter, slope: Filter | None = None) -> Sampled:
+    """The filter, in series with `slope`, for the kernels.
+
+    Raises BadSpecification where a[0] is not 1, or the filter has no gain at rest.
+    """
+    b, a = np.array(one.b), np.array(one.a)
+    if slope is not None:
+        b, a = np.convolve(b, slope.b), np.convolve(a, slope.a)
+    if a[0] != 1.0 or not (np.all(np.isfinite(b)) and np.all(np.isfinite(a))) or a.sum() == 0.0:
+        raise BadSpecification(f"filter b = {one.b}, a = {one.a}: need a[0] = 1, a(1) not 0")
+    size = max(b.size, a.size)
+    return Sampled(np.pad(b, (0, size - b.size)), np.pad(a, (0, size - a.size)))
+
+
+@compiled_inline
+def filtered(b: Array, a: Array, z: Array, x: float) -> float:
+    """Next value of the filter at input x; z (n,), last entry 0, is its state."""
+    out = b[0] * x + z[0]
+    for j in range(len(z) - 1):
+        z[j] = z[j + 1] + b[j + 1] * x - a[j + 1] * out
+    return float(out)

@@ -1,0 +1,216 @@
+"""The whole servo in simulation: position law, friction countermeasure, force loop, plant.
+
+Figures 2, 4, 5 and 10 of the paper; figure 1 with a motor. The plant may have effects.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from design.compensator import Compensator
+from design.filters import PASS, CompensatorFilters, sampled
+from design.loop import ForcePI, LoopNoise, LoopRun, prepared_loop
+from design.loop_signals import Signals, command_delay, effect_signals
+from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
+from design.rst import RST
+from design.servo_kernels import (
+    COMPENSATOR,
+    DISTURBANCE,
+    KALMAN,
+    NOTHING,
+    PID_LAW,
+    RST_LAW,
+    Law,
+    Memory,
+    friction_force,
+)
+from design.servo_loop import SERVO_ROWS, servo_kernel
+from identification.arrays import Array, frozen
+from identification.clean import slope_filter
+from identification.effect_step import ACTUATOR, effect_table, pieces
+from identification.errors import BadModel
+from identification.plant import Motor, Plant
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """The compensator with its filters A, B, C and the velocity (5)."""
+
+    compensator: Compensator
+    filters: CompensatorFilters
+
+
+Countermeasure = Compensation | DisturbanceObserver | FrictionObserver
+
+
+@dataclass(frozen=True)
+class Servo:
+    """What stands between the sensors and the valve.
+
+    position: gives the force reference [N], with a motor the command [V]. force: None with a
+    motor. friction: what adds a force to the force reference (with a motor: that force over k_a to
+    the command). dither: added to the command. control_limit: of |u| [V]; force_limit: of the
+    force reference [N]. anti_windup: the position controller is told of a clipped command.
+    """
+
+    position: RST | IntegralPID
+    force: ForcePI | None
+    friction: Countermeasure | None = None
+    dither: Dither | None = None
+    control_limit: float | None = None
+    force_limit: float | None = None
+    anti_windup: bool = True
+
+    @property
+    def linear(self) -> RST:
+        """The position controller without the rule of its integral."""
+        return self.position if isinstance(self.position, RST) else self.position.linear
+
+
+@dataclass(frozen=True, eq=False)
+class ServoRun(LoopRun):
+    """A `LoopRun` with what the servo computed, (n,).
+
+    force_reference [N] of the position controller alone (with a motor its command [V]),
+    compensation [N] before filter C and compensation_filtered [N] behind it, and the velocity
+    [m/s] that the countermeasure works with.
+    """
+
+    force_reference: Array
+    compensation: Array
+    compensation_filtered: Array
+    velocity: Array
+
+
+class FrictionCompensator:
+    """A countermeasure as a sampled object: `step` once every h [s].
+
+    y_0 [m]: the position at which the machine stands before the first step, F_0 [N] its force.
+    """
+
+    def __init__(self, what: Countermeasure, h: float, y_0: float = 0.0, F_0: float = 0.0) -> None:
+        self._law = friction_law(what, h)
+        self._memory = friction_memory(self._law, y_0, F_0)
+
+    def step(self, r: float, y: float, F: float) -> float:
+        """F_compf [N] to add to the force reference, at r, position y [m] and force F [N]."""
+        return friction_force(self._law, self._memory, r, y, F)
+
+    @property
+    def velocity(self) -> float:
+        """The velocity of the last step [m/s]."""
+        return float(self._memory.last[3])
+
+    @property
+    def unfiltered(self) -> float:
+        """F_comp of the last step [N], before filter C."""
+        return float(self._memory.last[1])
+
+
+def simulate_servo(
+    plant: Plant,
+    servo: Servo,
+    reference: ArrayLike,
+    h: float,
+    *,
+    noise: LoopNoise | None = None,
+    start: tuple[float, float, float] = (0.0, 0.0, 0.0),
+    signals: Signals | None = None,
+) -> ServoRun:
+    """One run along the reference r [m], (n,); the force loop runs every h [s]; see `Servo`.
+
+    start: y [m], v [m/s], F [N] at the first sample, before which the servo stood at y. signals:
+    those that the plant's effects use, by name, each (n,) or `OfForce`, of the plant's own force at
+    the sample's start (`pressures`). The run's y is the body's position, y_measured what the
+    transducer shows of it plus noise. Time counts from the start; before it no command was given.
+    Raises BadModel where the parts do not fit together, a needed signal is missing or the run
+    cannot be followed.
+    """
+    ratio = max(1, round(servo.linear.h / h))
+    loop, p = prepared_loop(
+        [plant], servo.linear, servo.force, reference, h, noise, servo.control_limit, start, ratio
+    )
+    n, table = len(loop.reference), effect_table(plant.effects)
+    codes = np.where(table.codes == ACTUATOR, -1, table.codes) if loop.motor else table.codes
+    base, gain = effect_signals(plant.effects, signals or {}, n)
+    late = command_delay(plant.effects) / h
+    t = h * np.arange(n, dtype=np.float64)
+    law = _law(servo, loop.R, loop.S, ratio * h)
+    shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
+    k_a = plant.actuator.k_a if isinstance(plant.actuator, Motor) else 0.0
+    limits = (loop.limit, math.inf if servo.force_limit is None else servo.force_limit)
+    out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
+    y_noise, f_noise = (np.ascontiguousarray(one[:, 0]) for one in (loop.noise.y, loop.noise.F))
+    servo_kernel(
+        p, h, ratio, pieces(table, h), codes, table.addresses, table.p, base, gain,
+        np.zeros(n + math.ceil(late) + 1), late, law,
+        _memory(law, loop.x.copy(), loop.start),
+        loop.reference, loop.feed, loop.pi, shake, limits, k_a, not servo.anti_windup,
+        y_noise, f_noise, loop.start, out, modes,
+    )  # fmt: skip
+    y, v, F, u, measured, *inside = out
+    if not np.all(np.isfinite(y)):
+        raise BadModel(
+            f"the loop cannot be followed beyond t = {h * int(np.argmin(np.isfinite(y))):g} s;"
+            " check the controller's gains and the effects' parameters"
+        )
+    return ServoRun(t, loop.reference, y, v, F, measured, F + f_noise, u, modes, *inside)
+
+
+def friction_law(what: Countermeasure | None, h: float) -> Law:
+    """The countermeasure as the kernels take it, with no position controller; h [s]."""
+    none, pass_ = np.zeros(1), sampled(PASS)
+    kind, law, kalman = NOTHING, none, none
+    first = second = third = pass_
+    match what:
+        case Compensation(compensator, filters):
+            kind, law = COMPENSATOR, compensator.law
+            first = sampled(filters.velocity, slope_filter(h, filters.N_d))
+            second, third = sampled(filters.error), sampled(filters.force)
+        case DisturbanceObserver():
+            kind = DISTURBANCE
+            first, second = (sampled(one) for one in what.filters(h))
+        case FrictionObserver(m, F_vp, F_vn, q_v, q_F, r_y):
+            kind, kalman = KALMAN, np.array([m, F_vp, F_vn, q_v, q_F, r_y])
+    return Law(
+        RST_LAW, none, none, none, kind, law,
+        first.b, first.a, second.b, second.a, third.b, third.a, kalman, h,
+    )  # fmt: skip
+
+
+def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
+    """The state of a countermeasure that has stood at y_0 [m] under F_0 [N]."""
+    kalman = np.zeros(12)
+    if law.friction == KALMAN:
+        variance = law.kalman[5] ** 2
+        kalman[:3] = y_0, 0.0, F_0
+        kalman[3:] = np.diag([variance, 1e-6, 1e2]).reshape(9)
+    first = F_0 if law.friction == DISTURBANCE else y_0
+    return Memory(
+        np.zeros(1), np.zeros(3),
+        settled(law.b_v, law.a_v, first), settled(law.b_e, law.a_e, y_0),
+        settled(law.b_c, law.a_c, 0.0), kalman, np.zeros(4),
+    )  # fmt: skip
+
+
+def settled(b: Array, a: Array, x: float) -> Array:
+    """The state of the filter b/a, same length, last entry 0, that a past of `x` leaves."""
+    out = x * float(b.sum() / a.sum())
+    return np.append(np.cumsum((b * x - a * out)[:0:-1])[::-1], 0.0)
+
+
+def _law(servo: Servo, R: Array, S: Array, h: float) -> Law:
+    law = friction_law(servo.friction, h)
+    if isinstance(servo.position, RST):
+        return law._replace(R=frozen(R).copy(), S=frozen(S).copy())
+    pid = servo.position
+    per_difference, pole = pid.T_d / pid.eps, math.exp(-h / pid.eps)
+    rule = float(RULES.index(pid.rule))
+    constants = np.array([pid.k_R, h / pid.T_i, per_difference, pole, pid.zone, rule])
+    return law._replace(position=PID_LAW, pid=constants)
+
+
+def _memory(law: Law, x: Array, start: tuple[float, float, float]) -> Memory:
+    return friction_memory(law, start[0], start[2])._replace(x=x)

@@ -1,0 +1,176 @@
+"""What a servo computes in one sample, compiled: position law, friction force, force loop.
+
+The same functions run inside the simulation (`design.servo`) and behind `step` of the sampled
+objects. Values that do not change are in `Law`, the rest in `Memory`.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from design.compensator import compensation_force
+from design.filters import filtered
+from design.loop_kernels import force_command, shift
+from identification.arrays import Array
+from identification.compiled import compiled
+
+RST_LAW, PID_LAW = range(2)
+NOTHING, COMPENSATOR, DISTURBANCE, KALMAN = range(4)
+PLAIN, DEAD_ZONE, RESET = range(3)
+# A PID's constants, and its memory.
+K_R, PER_SUM, PER_DIFFERENCE, POLE, ZONE, RULE = range(6)
+SUM, SLOPE, ERROR = range(3)
+# Constants of the Kalman filter, and its memory: y, v, F_f, then the covariance by rows.
+K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
+# What one sample leaves besides the command.
+WANTED, RAW, ADDED, SPEED = range(4)
+
+
+class Law(NamedTuple):
+    """A servo's constants.
+
+    position: RST_LAW with R, S, or PID_LAW with pid (6,). friction: NOTHING, COMPENSATOR with law
+    (13,), DISTURBANCE or KALMAN with kalman (6,), period h [s]; b_v ... a_c: the filters of
+    velocity (of the force, DISTURBANCE), error (of the position, DISTURBANCE) and C.
+    """
+
+    position: int
+    R: Array
+    S: Array
+    pid: Array
+    friction: int
+    law: Array
+    b_v: Array
+    a_v: Array
+    b_e: Array
+    a_e: Array
+    b_c: Array
+    a_c: Array
+    kalman: Array
+    h: float
+
+
+class Memory(NamedTuple):
+    """A servo's state: controller, PID (3,), filters, Kalman filter (12,), last friction (4,)."""
+
+    x: Array
+    pid: Array
+    z_v: Array
+    z_e: Array
+    z_c: Array
+    kalman: Array
+    last: Array
+
+
+@compiled
+def kalman_step(c: Array, s: Array, h: float, y: float, F: float) -> None:
+    """One sample of the friction observer `c` (6,), its memory s (12,): predict by F, correct by y.
+
+    The velocity is stepped exactly under a held force: v+ = e v + (1 - e)/F_v (F - F_f).
+    """
+    f = c[K_FVP] if s[1] >= 0.0 else c[K_FVN]
+    e = np.exp(-f * h / c[K_M])
+    gain = (1.0 - e) / f if f * h > 1e-9 * c[K_M] else h / c[K_M]
+    s[0], s[1] = s[0] + h * s[1], e * s[1] + gain * (F - s[2])
+    A = np.array([[1.0, h, 0.0], [0.0, e, -gain], [0.0, 0.0, 1.0]])
+    P = A @ s[3:].reshape(3, 3) @ A.T
+    P[1, 1] += c[K_QV] ** 2 * h
+    P[2, 2] += c[K_QF] ** 2 * h
+    k = P[:, 0].copy() / (P[0, 0] + c[K_R_Y] ** 2)
+    off = y - s[0]
+    for i in range(3):
+        s[i] += k[i] * off
+    P -= np.outer(k, P[0].copy())
+    s[3:] = 0.5 * (P + P.T).reshape(9)
+
+
+@compiled
+def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
+    """F_compf [N]: what is added to the force reference at reference r, position y [m], force F."""
+    last = s.last
+    if c.friction == COMPENSATOR:
+        last[SPEED] = filtered(c.b_v, c.a_v, s.z_v, y)
+        e_y = r - filtered(c.b_e, c.a_e, s.z_e, y)
+        last[RAW] = compensation_force(c.law, last[SPEED], e_y, F)
+        last[ADDED] = filtered(c.b_c, c.a_c, s.z_c, last[RAW])
+    elif c.friction == DISTURBANCE:
+        force = filtered(c.b_v, c.a_v, s.z_v, F)
+        last[RAW] = force - filtered(c.b_e, c.a_e, s.z_e, y)
+        last[ADDED] = last[RAW]
+    elif c.friction == KALMAN:
+        kalman_step(c.kalman, s.kalman, c.h, y, F)
+        last[SPEED], last[RAW], last[ADDED] = s.kalman[1], s.kalman[2], s.kalman[2]
+    return float(last[ADDED])
+
+
+@compiled
+def position_force(c: Law, s: Memory, r: float, fed: float, y: float) -> float:
+    """What the position controller asks for at reference r, T r = fed and position y [m]."""
+    if c.position == RST_LAW:
+        return float(fed - c.R[0] * y + s.x[0])
+    e = r - y
+    s.pid[SLOPE] = c.pid[POLE] * s.pid[SLOPE] + c.pid[PER_DIFFERENCE] * (e - s.pid[ERROR])
+    if c.pid[RULE] == RESET and e * s.pid[ERROR] < 0.0:
+        s.pid[SUM] = 0.0
+    s.pid[ERROR] = e
+    return float(c.pid[K_R] * (e + s.pid[SUM] + s.pid[SLOPE]))
+
+
+@compiled
+def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> None:
+    """The position controller's next state, after `taken` of the `asked` was carried out."""
+    if c.position == RST_LAW:
+        shift(s.x, c.R, c.S, y, taken)
+        return
+    e = s.pid[ERROR]
+    outward = (asked - taken) * e * c.pid[K_R] > 0.0
+    inside = c.pid[RULE] == DEAD_ZONE and abs(e) <= c.pid[ZONE]
+    if not (outward or inside):
+        s.pid[SUM] += c.pid[PER_SUM] * e
+
+
+@compiled
+def servo_sample(
+    c: Law,
+    s: Memory,
+    acts: bool,
+    r: float,
+    fed: float,
+    y: float,
+    F: float,
+    wanted: float,
+    integral: float,
+    pi: tuple[float, float],
+    shake: float,
+    limits: tuple[float, float],
+    k_a: float,
+    windup: bool,
+) -> tuple[float, float, float]:
+    """Command [V], what the position controller wants, and the force loop's integral.
+
+    acts: whether the position controller has its turn; k_a: of a motor, whose controller wants
+    volts, or 0; shake: the dither [V]; limits: of the command [V] and of the force reference [N].
+    windup: the position controller is not told of a clipped command. Where it is, it goes on from
+    the force reference that gives the clipped command (the conditioning technique of Hanus).
+    """
+    limit, most = limits
+    asked = position_force(c, s, r, fed, y) if acts else wanted
+    added = friction_force(c, s, r, y, F) if acts else float(s.last[ADDED])
+    if k_a != 0.0:
+        free = asked + added / k_a
+        held = min(max(free, -limit), limit)
+        u = min(max(held + shake, -limit), limit)
+        wanted, taken = asked, (asked if windup else asked + held - free)
+    else:
+        wanted = min(max(asked + added, -most), most) - added
+        before = integral
+        u, integral = force_command(wanted + added, F, integral, pi[0], pi[1], limit)
+        taken = wanted
+        free = pi[0] * (wanted + added - F) + before
+        if not windup and free != u and pi[0] > 0.0:
+            taken = F + (u - before) / pi[0] - added
+        u = min(max(u + shake, -limit), limit)
+    if acts:
+        position_moved(c, s, y, asked, taken)
+    s.last[WANTED] = wanted
+    return u, wanted, integral

@@ -1,0 +1,89 @@
+"""One plant in its servo, sample by sample (compiled)."""
+
+import numpy as np
+
+from design.servo_kernels import ADDED, RAW, SPEED, WANTED, Law, Memory, servo_sample
+from identification.arrays import Array, IntArray
+from identification.compiled import compiled
+from identification.effect_run import place_of
+from identification.effect_step import (
+    BRISTLE,
+    acting_command,
+    delayed,
+    effect_step,
+    shown_position,
+    start_states,
+)
+from identification.stepping import K1, STUCK, parameters, settled_mode
+
+SERVO_ROWS = 9
+
+
+@compiled
+def servo_kernel(
+    p: Array,
+    h: float,
+    ratio: int,
+    count: int,
+    codes: IntArray,
+    addresses: IntArray,
+    q: Array,
+    base: Array,
+    gain: Array,
+    history: Array,
+    late: float,
+    law: Law,
+    memory: Memory,
+    reference: Array,
+    feed: Array,
+    pi: tuple[float, float],
+    shake: Array,
+    limits: tuple[float, float],
+    k_a: float,
+    windup: bool,
+    noise_y: Array,
+    noise_f: Array,
+    start: tuple[float, float, float],
+    out: Array,
+    modes: IntArray,
+) -> None:
+    """One plant p (1, 11) with effects in its servo; out (9, n), modes (n,).
+
+    Rows of out: y, v, F, u, position measured, then the position controller's force reference,
+    F_comp, F_compf and its velocity. codes (k,), addresses (k, 3), q (k, P): the effects; signals
+    base (k, n, S) + gain (k, S) F; history: the command after the dead zone, preceded by what it
+    was before the start; late: delay in samples; ratio: samples of the force loop in one of the
+    position controller, feed (ceil(n/ratio),); the rest as in `servo_sample`.
+    """
+    plant = parameters(p, 0)
+    y, v, F = start
+    z, past = np.zeros(len(codes)), len(history) - len(modes)
+    bristle = place_of(codes, BRISTLE)
+    motor = k_a != 0.0
+    mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
+    a, u, integral, wanted = 0.0, 0.0, 0.0, 0.0
+    for k in range(len(modes)):
+        now, s = k * h, base[:, k] + gain * F
+        if k == 0:
+            start_states(codes, addresses, q, s, z, plant, now, y, v, F, u, False)
+        shown = shown_position(h, codes, addresses, q, s, z, plant, now, y, v, F, u)
+        measured, felt = shown + noise_y[k], F + noise_f[k]
+        acts = k % ratio == 0
+        u, wanted, integral = servo_sample(
+            law, memory, acts, reference[k], feed[k // ratio], measured, felt, wanted, integral, pi,
+            shake[k], limits, k_a, windup,
+        )  # fmt: skip
+        history[past + k] = acting_command(codes, addresses, q, s, z, now, u)
+        g = plant[K1] * delayed(history, past + k, late)
+        if motor:
+            F, g = g, 0.0
+            s = base[:, k] + gain * F
+        out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = y, v, F, u, measured
+        out[5, k], out[6, k] = memory.last[WANTED], memory.last[RAW]
+        out[7, k], out[8, k] = memory.last[ADDED], memory.last[SPEED]
+        state = effect_step(
+            plant, count, codes, addresses, q, s, z, bristle, now, (y, v, F, mode, a), u, g, h
+        )
+        # A body at rest that the new force moves has left at once.
+        modes[k] = mode if v == 0.0 or mode != STUCK else state[3]
+        y, v, F, mode, a = state

@@ -1,0 +1,206 @@
+"""The servo: its parts against written equations, the sampled object, saturation, rivals."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from design.compensator import Compensator
+from design.filters import CompensatorFilters, rig_filters, simulation_filters
+from design.loop import ForcePI, LoopNoise, simulate_loop
+from design.pid import pd_to_rst, pid_to_rst
+from design.rivals import (
+    DisturbanceObserver,
+    Dither,
+    FrictionObserver,
+    IntegralPID,
+)
+from design.servo import (
+    Compensation,
+    Countermeasure,
+    FrictionCompensator,
+    Servo,
+    ServoRun,
+    simulate_servo,
+)
+from identification.arrays import Array
+from identification.clean import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
+from identification.errors import BadModel, BadSpecification
+from identification.plant import Motor, Plant
+from tests.identification.plants import ACTUATOR, table
+
+H, N = 1e-3, 6000
+PLANT = Plant(table(1), ACTUATOR)
+PI = ForcePI(0.02, 0.05)
+PD = pd_to_rst(200.0, 0.1, 0.2, H)
+PID = pid_to_rst(1754.0, 0.072, 0.018, 0.2, H)
+OWN = Compensator(table(1), 2.0, 0.003)
+FOUR = Compensation(OWN, simulation_filters(H))
+OBSERVER = DisturbanceObserver(1.0, 250.0, 40.0)
+KALMAN = FrictionObserver(1.0, 300.0, 200.0, 0.05, 200.0, 1e-5)
+
+
+def step(height: float = 0.05, n: int = N) -> Array:
+    """A step at 0.2 s [m]."""
+    return np.where(np.arange(n) < 200, 0.0, height)
+
+
+def run(servo: Servo, plant: Plant = PLANT, n: int = N) -> ServoRun:
+    """The step with the paper's noise."""
+    noise = LoopNoise.draw(n, 1e-5, 1e-2, np.random.default_rng(1))
+    return simulate_servo(plant, servo, step(n=n), H, noise=noise)
+
+
+def rest(one: ServoRun) -> float:
+    """Largest error of the last second [m]."""
+    return float(np.max(np.abs(one.r - one.y)[-1000:]))
+
+
+@pytest.mark.parametrize("what", [FOUR, OBSERVER, KALMAN])
+def test_the_sampled_object_gives_what_the_simulation_had(what: Countermeasure) -> None:
+    found = run(Servo(PD, PI, what))
+    alone = FrictionCompensator(what, H)
+    made = [
+        alone.step(*sample)
+        for sample in zip(
+            found.r.tolist(), found.y_measured.tolist(), found.F_measured.tolist(), strict=True
+        )
+    ]
+    assert np.max(np.abs(np.array(made) - found.compensation_filtered)) < 1e-9
+    assert np.ptp(made) > 10.0
+
+
+def test_filters_velocity_and_law_are_the_written_ones() -> None:
+    found = run(Servo(PD, PI, FOUR))
+    low = fir_lowpass(5.0, H)
+    y_f = apply_filter(low, np.concatenate([np.zeros(100), found.y_measured]))
+    assert np.allclose(velocity(y_f, H)[100:], found.velocity, atol=1e-9)
+    e = found.r - y_f[100:]
+    parts = zip(found.velocity.tolist(), e.tolist(), found.F_measured.tolist(), strict=True)
+    F_comp = np.array([OWN.force(*part) for part in parts])
+    # At the edge of a band the last digit of the velocity decides.
+    assert np.mean(np.abs(F_comp - found.compensation) > 1e-6) < 1e-3
+    F_compf = apply_filter(low, np.concatenate([np.zeros(100), found.compensation]))[100:]
+    assert np.allclose(F_compf, found.compensation_filtered, atol=1e-9)
+
+
+def test_the_force_loop_is_asked_for_both_forces() -> None:
+    found = run(Servo(PD, PI, FOUR))
+    error = found.force_reference + found.compensation_filtered - found.F_measured
+    u = 0.02 * (error + np.concatenate([[0.0], np.cumsum(error)[:-1]]) * H / 0.05)
+    assert np.allclose(u, found.u, atol=1e-9)
+
+
+def test_without_a_countermeasure_it_is_the_plain_loop() -> None:
+    plain = simulate_loop(
+        PLANT, PID, PI, step(), H, noise=LoopNoise.draw(N, 1e-5, 1e-2, np.random.default_rng(1))
+    )
+    assert np.max(np.abs(run(Servo(PID, PI)).y - plain.y)) < 1e-10
+
+
+def test_an_integral_pid_without_rule_is_its_linear_form() -> None:
+    pid = IntegralPID(1754.0, 0.072, 0.018, 0.2, H)
+    assert np.max(np.abs(run(Servo(pid, PI)).y - run(Servo(PID, PI)).y)) < 1e-9
+
+
+def test_a_reset_integral_starts_anew_where_the_error_changes_sign() -> None:
+    pid = IntegralPID(1754.0, 0.072, 0.0, 0.2, H, "reset")
+    found = run(Servo(pid, PI))
+    e = found.r - found.y_measured
+    total = found.force_reference / 1754.0 - e
+    crossed = e[1:] * e[:-1] < 0.0
+    assert np.all(np.abs(total[1:][crossed]) < 1e-12)
+    assert np.count_nonzero(crossed) > 3
+    assert np.max(np.abs(total)) > 0.05
+
+
+def test_inside_its_dead_zone_the_integral_rests() -> None:
+    pid = IntegralPID(1754.0, 0.072, 0.0, 0.2, H, "dead-zone", 0.002)
+    found = run(Servo(pid, PI))
+    e = found.r - found.y_measured
+    total = found.force_reference / 1754.0 - e
+    moved = np.abs(np.diff(total)) > 1e-12
+    assert np.array_equal(moved, (np.abs(e) > 0.002)[:-1])
+    assert 100 < np.count_nonzero(moved) < N - 1000
+
+
+def test_figure_6_the_zero_velocity_term_takes_the_error_away() -> None:
+    none = rest(run(Servo(PD, PI), n=12000))
+    without = rest(
+        run(Servo(PD, PI, replace(FOUR, compensator=replace(OWN, inner="none"))), n=12000)
+    )
+    whole = rest(run(Servo(PD, PI, FOUR), n=12000))
+    assert none > 0.04
+    assert without > 5.0 * whole
+    assert whole < 0.003  # e_T
+
+
+@pytest.mark.parametrize("what", [OBSERVER, KALMAN])
+def test_the_observers_find_the_friction(what: Countermeasure) -> None:
+    found = run(Servo(PD, PI, what))
+    # Sliding: Coulomb friction of table 1 (the observer's viscous part is not the plant's).
+    fast = (found.v > 0.03) & (np.arange(N) > 300)
+    slack = 0.0 if isinstance(what, FrictionObserver) else 50.0 * float(np.max(found.v[fast]))
+    estimate = float(np.median(found.compensation[fast]))
+    assert 8.0 < estimate < 16.0 + slack
+    assert rest(found) < 0.1 * rest(run(Servo(PD, PI)))
+
+
+def test_dither_shakes_the_command() -> None:
+    shaken = run(Servo(PD, PI, dither=Dither(0.2, 50.0)))
+    plain = run(Servo(PD, PI))
+    assert np.std(shaken.u[-1000:]) > 10.0 * np.std(plain.u[-1000:])
+
+
+def test_a_clipped_command_winds_nothing_up() -> None:
+    """A valve of 0.1 V limits the speed to 0.19 m/s: a step is late, and overshoots no more."""
+    over = {}
+    for told in (True, False):
+        servo = Servo(PID, PI, control_limit=0.1, anti_windup=told)
+        found = simulate_servo(PLANT, servo, step(0.3, 8000), H)
+        assert np.max(np.abs(found.u)) <= 0.1
+        over[told] = float(np.max(found.y)) / 0.3 - 1.0
+    free = simulate_servo(PLANT, Servo(PID, PI), step(0.3, 8000), H)
+    assert over[True] < float(np.max(free.y)) / 0.3 - 1.0 + 0.02
+    assert over[False] > over[True] + 0.05
+
+
+def test_the_force_reference_keeps_its_limit() -> None:
+    found = run(Servo(PID, PI, FOUR, force_limit=30.0))
+    assert np.max(np.abs(found.force_reference + found.compensation_filtered)) <= 30.0 + 1e-9
+
+
+def test_figure_1_a_motor_takes_the_compensation_as_a_command() -> None:
+    plant = Plant(table(1), Motor(35.15))
+    pd = pd_to_rst(200.0 / 35.15, 0.1, 0.2, H)
+    filters = CompensatorFilters(RIG_A, RIG_A, RIG_C)
+    with_, without = (
+        run(Servo(pd, None, what), plant) for what in (Compensation(OWN, filters), None)
+    )
+    assert rest(without) > 0.04
+    assert rest(with_) < 0.003
+    u = with_.force_reference + with_.compensation_filtered / 35.15
+    assert np.allclose(u, with_.u, atol=1e-12)
+
+
+def test_both_readings_of_the_rigs_filters() -> None:
+    by_delay, by_letter = rig_filters(0.01), rig_filters(0.01, as_lettered=True)
+    assert (by_delay.velocity, by_delay.error) == (by_letter.error, by_letter.velocity)
+    assert by_delay.error == RIG_A
+    assert len(by_delay.velocity.b) == 41
+    assert by_delay.force == RIG_C
+
+
+def test_parts_that_do_not_fit_are_refused() -> None:
+    with pytest.raises(BadModel, match="force controller"):
+        run(Servo(PD, None, FOUR))
+    with pytest.raises(BadSpecification, match="zone"):
+        IntegralPID(1.0, 1.0, 0.0, 0.1, H, "dead-zone", -1.0)
+    with pytest.raises(BadSpecification, match="plain, dead-zone, reset"):
+        IntegralPID(1.0, 1.0, 0.0, 0.1, H, "other")  # type: ignore[arg-type]
+    with pytest.raises(BadSpecification, match="dither"):
+        Dither(0.0, 50.0)
+    with pytest.raises(BadSpecification, match="rad/s"):
+        DisturbanceObserver(1.0, 1.0, 0.0)
+    with pytest.raises(BadSpecification, match="must be > 0"):
+        FrictionObserver(1.0, 1.0, 1.0, 0.0, 1.0, 1.0)
