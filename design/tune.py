@@ -14,7 +14,7 @@ import numpy as np
 
 from design.margins import Margins, margins
 from design.pid import PID, design_pid, pid_gains
-from design.polynomial import ComplexArray, frequency_and_damping, roots
+from design.polynomial import ComplexArray, frequency_and_damping, roots, trim
 from design.rst import RST, design_rst
 from design.specification import normalised_plant, pole_pair
 from design.tracking import (
@@ -34,7 +34,10 @@ SLOWEST, FASTEST = 0.005, 0.6  # w_n h [rad]
 DAMPINGS = (1.0, 0.8)
 RATIOS = (3.0, 6.0, 1.5)  # auxiliary poles, in units of w_n
 KEPT = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
+DAMPED, LEAST_DAMPED = 0.5, 0.3  # damping from which it may; the second beside slow zeros
 LAGGARD = 0.5  # decay of the slowest pole, in units of the dominant ones', below which they are not
+SLOWEST_ZERO = 0.9995  # a plant zero nearer to 1 would never decay
+NEAR = 1e-4  # between a pole and the zero it was placed on
 PLAIN = Demand()
 
 
@@ -117,7 +120,13 @@ def tune_rst(
     others = _auxiliary(A, h, max(free, 0))
     plants = ((A, B), *corners)
     found = _best(plants, h, asked, goals, design, others)
-    poles = np.append(found.auxiliary, pole_pair(*found.dominant, h))
+    slow = _slow_zeros(B)[:free]
+    if found.missed and slow and asked.auxiliary is None:
+        beside = _auxiliary(A, h, free, slow)
+        again = _best(plants, h, asked, goals, design, beside, slow)
+        found = found if again.missed else again
+    moving = [z for z in found.auxiliary if z not in slow]  # y/r has no pole at a plant zero
+    poles = np.append(np.array(moving, dtype=np.complex128), pole_pair(*found.dominant, h))
     candidates = rst_candidates(A, B, found.rst, poles, len(poles))
     return _following(plants, found, candidates, demand)
 
@@ -179,24 +188,38 @@ def _following(plants: Plants, found: Placed, candidates: Iterable[Array], deman
     )
 
 
-def _auxiliary(A: Array, h: float, count: int) -> Callable[[float], tuple[complex, ...]]:
-    """Auxiliary poles for a given speed [rad/s]: kept plant poles, then equal real ones."""
-    kept = _kept(roots(A), h)[:count]
+def _slow_zeros(B: Array) -> tuple[complex, ...]:
+    """Real plant zeros between KEPT and 1, the slowest first: a slow loop inside the plant.
+
+    Beside such a zero lies a plant pole as slow, which a fast closed loop would have to move by
+    brute force. Kept as closed-loop poles, they leave y/r alone and decay after a disturbance.
+    """
+    real = [z.real for z in roots(trim(B[np.flatnonzero(B)[0] :])) if abs(z.imag) < 1e-9]
+    return tuple(complex(z) for z in sorted(real, reverse=True) if KEPT < z < SLOWEST_ZERO)
+
+
+def _auxiliary(
+    A: Array, h: float, count: int, first: tuple[complex, ...] = ()
+) -> Callable[[float], tuple[complex, ...]]:
+    """Auxiliary poles for a given speed [rad/s]: `first`, kept plant poles, equal real ones."""
+    count -= len(first)
+    kept = _kept(roots(A), h, LEAST_DAMPED if first else DAMPED)[:count]
     kept = kept[:-1] if len(kept) and kept[-1].imag > 0 else kept
 
     def poles(speed: float) -> tuple[complex, ...]:
         real = complex(math.exp(-speed * h))
-        return (*(complex(z) for z in kept), *[real] * (count - len(kept)))
+        return (*first, *(complex(z) for z in kept), *[real] * (count - len(kept)))
 
     return poles
 
 
-def _kept(poles: ComplexArray, h: float) -> ComplexArray:
+def _kept(poles: ComplexArray, h: float, damped: float) -> ComplexArray:
     """Plant poles that may stay: fast and damped; conjugates side by side, positive one first."""
     fit = [
         complex(z)
         for z in poles
-        if 1e-6 < abs(z) <= KEPT and (z.real > 0 and frequency_and_damping(complex(z), h)[1] > 0.5)
+        if 1e-6 < abs(z) <= KEPT
+        and (z.real > 0 and frequency_and_damping(complex(z), h)[1] > damped)
     ]
     return np.array(sorted(fit, key=lambda z: (abs(z), z.real, -z.imag)), dtype=np.complex128)
 
@@ -208,7 +231,9 @@ def _best(
     goals: Goals,
     design: Design,
     auxiliary: Callable[[float], tuple[complex, ...]],
+    slow: tuple[complex, ...] = (),
 ) -> Placed:
+    """The fastest that keeps every goal, or what comes nearest; slow: poles left where they are."""
     A, B = plants[0]
     refusal: BadSpecification | None = None
     found: list[Placed] = []
@@ -222,7 +247,7 @@ def _best(
                 continue
             missed = goals_missed(margin, goals, integrates(A, controller))
             if asked.auxiliary is None:
-                missed = (*missed, *_laggards(margin, dominant))
+                missed = (*missed, *_laggards(margin, dominant, slow))
             worst = margin.modulus if missed else worst_modulus(plants, controller)
             missed = missed or _worst_missed(worst, goals)
             if not controller.stable:
@@ -254,9 +279,12 @@ def _worst_missed(worst: float | None, goals: Goals) -> tuple[str, ...]:
     return ()
 
 
-def _laggards(found: Margins, dominant: tuple[float, float]) -> tuple[str, ...]:
+def _laggards(
+    found: Margins, dominant: tuple[float, float], slow: tuple[complex, ...]
+) -> tuple[str, ...]:
     """Whether a pole is so slow that the dominant ones do not dominate, in words."""
-    slowest = -math.log(max(abs(complex(found.poles[0])), 1e-12)) / found.h
+    moving = [abs(z) for z in found.poles.tolist() if all(abs(z - one) > NEAR for one in slow)]
+    slowest = -math.log(max(*moving, 1e-12)) / found.h
     asked = -math.log(float(np.abs(pole_pair(*dominant, found.h)).max())) / found.h
     if slowest >= LAGGARD * asked:
         return ()

@@ -21,6 +21,7 @@ COMMANDS = {
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",
     "simulate": "Make the log of a recipe, its truth beside it.",
+    "paper": "Run the paper in simulation, its figures and numbers beside ours.",
 }
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141

@@ -129,14 +129,14 @@ def held(model: Model) -> str:
     )
 
 
-def table(head: Sequence[str], rows: Iterable[Row]) -> "Table":
-    """A plain table for a terminal."""
+def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Table":
+    """A plain table for a terminal; right: the columns of numbers."""
     from rich.box import SIMPLE_HEAD
     from rich.table import Table
 
     out = Table(box=SIMPLE_HEAD, pad_edge=False)
     for number, name in enumerate(head):
-        out.add_column(name, justify="right" if number == 1 else "left", overflow="fold")
+        out.add_column(name, justify="right" if number in right else "left", overflow="fold")
     for row in rows:
         out.add_row(*row)
     return out
