@@ -215,8 +215,8 @@ def _beyond(found: Study) -> Iterator[Claim]:
     )
     yield Claim(
         "beyond: control energy",
-        f"{ours.paper.figures.energy:.3g} V^2 s",
-        f"{ours.ours.figures.energy:.3g} V^2 s",
+        f"{ours.paper.figures.energy:.3g} V² s",
+        f"{ours.ours.figures.energy:.3g} V² s",
         "beaten" if ours.ours.figures.energy <= ours.paper.figures.energy else "short",
     )
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 CLAIMS = ("where", "paper", "here", "")
-FIGURES = ("servo", "squared error [m^2]", "standstill [mm]", "limit cycle", "energy [V^2 s]")
+FIGURES = ("servo", "squared error [m²]", "standstill [mm]", "limit cycle", "energy [V² s]")
 
 
 def paper_document(found: Study) -> dict[str, Any]:

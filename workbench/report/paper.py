@@ -69,6 +69,7 @@ def _figure_6(found: Study) -> Section:
         drawn = figure(9.0, 3.6)
         axes = drawn.subplots(1, 1)
         _positions(axes, {name: cases[name] for name in names})
+        drawn.legend(loc="outside upper right", ncols=4)
         svg = inline(drawn, "figure-6", "steps under PD with and without compensator")
     caption = "PD on the plant of table 1, compensator on the paper's estimates of it."
     rows = _table(FIGURES, case_rows(cases))
@@ -193,7 +194,6 @@ def _wrong(maps: Sensitivity) -> Section:
         axes = drawn.subplots(1, 1)
         for (name, errors), colour in zip(maps.wrong.items(), COLOURS, strict=False):
             axes.plot(maps.factors, errors, color=colour, marker="o", ms=3, label=name)
-        axes.set_yscale("log")
         axes.legend(ncols=3)
         label(axes, "parameter over its true value", "squared error over that with all true")
         svg = inline(drawn, "wrong", "squared error against one wrong parameter")
@@ -210,7 +210,7 @@ def _beyond(found: Study) -> Section:
         axes = drawn.subplots(1, 1)
         for (name, run), colour in zip(runs.items(), COLOURS, strict=False):
             line(axes, run.t, 1e3 * (run.r - run.y), color=colour, label=name)
-        axes.legend(ncols=3, loc="upper right")
+        drawn.legend(loc="outside upper right", ncols=3)
         label(axes, "time [s]", "error [mm]")
         svg = inline(drawn, "beyond", "error of the paper's design and of ours")
     caption = (
@@ -226,5 +226,4 @@ def _positions(axes: "Axes", cases: Mapping[str, Case]) -> None:
     line(axes, first.t, 1e3 * first.r, color=MEASURED, ls=":", label="reference")
     for (name, case), colour in zip(cases.items(), COLOURS[1:], strict=False):
         line(axes, case.run.t, 1e3 * case.run.y, color=colour, label=name)
-    axes.legend(ncols=4, loc="upper right")
     label(axes, "time [s]", "position [mm]")
