@@ -30,7 +30,7 @@ def simulate_effect_loop(
     controller.h may be a multiple of h. Raises BadModel where the parts do not fit together, or a
     needed signal is missing.
     """
-    motor = force_controller is None
     # In `simulate_loop` a motor's controller is told of a clipped command, another's is not.
-    servo = Servo(controller, force_controller, control_limit=control_limit, anti_windup=motor)
+    told = 0.0 if force_controller is None else None
+    servo = Servo(controller, force_controller, control_limit=control_limit, anti_windup=told)
     return simulate_servo(plant, servo, reference, h, noise=noise, start=start, signals=signals)

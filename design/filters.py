@@ -17,6 +17,7 @@ from identification.errors import BadSpecification
 
 N_D = 5  # positions of the slope (5)
 CUTOFF, RIG_CUTOFF = 5.0, 10.0  # Hz
+RIG_PERIOD = 10e-3  # s
 PASS = Filter((1.0,))
 
 
@@ -45,6 +46,21 @@ def rig_filters(h: float, *, as_lettered: bool = False) -> CompensatorFilters:
     low = fir_lowpass(RIG_CUTOFF, h)
     velocity, error = (RIG_A, low) if as_lettered else (low, RIG_A)
     return CompensatorFilters(velocity, error, RIG_C)
+
+
+def filters_at(h: float) -> CompensatorFilters:
+    """The rig's A (velocity and error) and C with their time constants, sampled at any h [s].
+
+    At 10 ms they are the paper's 0.5/(1 - 0.5 z^-1) and 0.2/(1 - 0.8 z^-1).
+    """
+    if not h > 0:
+        raise BadSpecification(f"sampling period {h:g} s, must be > 0")
+    first, last = (_first_order((-one.a[1]) ** (h / RIG_PERIOD)) for one in (RIG_A, RIG_C))
+    return CompensatorFilters(first, first, last)
+
+
+def _first_order(pole: float) -> Filter:
+    return Filter((1.0 - pole,), (1.0, -pole))
 
 
 class Sampled(NamedTuple):

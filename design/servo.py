@@ -13,6 +13,8 @@ from design.compensator import Compensator
 from design.filters import PASS, CompensatorFilters, sampled
 from design.loop import ForcePI, LoopNoise, LoopRun, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
+from design.pid import INTEGRATOR
+from design.polynomial import divide, trim
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST
 from design.servo_kernels import (
@@ -27,7 +29,7 @@ from design.servo_kernels import (
     friction_force,
 )
 from design.servo_loop import SERVO_ROWS, servo_kernel
-from identification.arrays import Array, frozen
+from identification.arrays import Array
 from identification.clean import slope_filter
 from identification.effect_step import ACTUATOR, effect_table, pieces
 from identification.errors import BadModel
@@ -52,7 +54,11 @@ class Servo:
     position: gives the force reference [N], with a motor the command [V]. force: None with a
     motor. friction: what adds a force to the force reference (with a motor: that force over k_a to
     the command). dither: added to the command. control_limit: of |u| [V]; force_limit: of the
-    force reference [N]. anti_windup: the position controller is told of a clipped command.
+    force reference [N]. anti_windup [s]: in which time an RST's integrator forgets what a clipped
+    command did not carry out; 0: the whole controller forgets it at once; None: never. A PID stops
+    its sum while it would drive the command further out.
+
+    Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
 
     position: RST | IntegralPID
@@ -61,7 +67,7 @@ class Servo:
     dither: Dither | None = None
     control_limit: float | None = None
     force_limit: float | None = None
-    anti_windup: bool = True
+    anti_windup: float | None = None
 
     @property
     def linear(self) -> RST:
@@ -147,7 +153,7 @@ def simulate_servo(
         p, h, ratio, pieces(table, h), codes, table.addresses, table.p, base, gain,
         np.zeros(n + math.ceil(late) + 1), late, law,
         _memory(law, loop.x.copy(), loop.start),
-        loop.reference, loop.feed, loop.pi, shake, limits, k_a, not servo.anti_windup,
+        loop.reference, loop.feed, loop.pi, shake, limits, k_a,
         y_noise, f_noise, loop.start, out, modes,
     )  # fmt: skip
     y, v, F, u, measured, *inside = out
@@ -175,7 +181,7 @@ def friction_law(what: Countermeasure | None, h: float) -> Law:
         case FrictionObserver(m, F_vp, F_vn, q_v, q_F, r_y):
             kind, kalman = KALMAN, np.array([m, F_vp, F_vn, q_v, q_F, r_y])
     return Law(
-        RST_LAW, none, none, none, kind, law,
+        RST_LAW, none, none, none, none, kind, law,
         first.b, first.a, second.b, second.a, third.b, third.a, kalman, h,
     )  # fmt: skip
 
@@ -204,12 +210,26 @@ def settled(b: Array, a: Array, x: float) -> Array:
 def _law(servo: Servo, R: Array, S: Array, h: float) -> Law:
     law = friction_law(servo.friction, h)
     if isinstance(servo.position, RST):
-        return law._replace(R=frozen(R).copy(), S=frozen(S).copy())
+        return law._replace(R=R, S=S, W=_forgetting(S, servo.anti_windup, h))
     pid = servo.position
     per_difference, pole = pid.T_d / pid.eps, math.exp(-h / pid.eps)
     rule = float(RULES.index(pid.rule))
     constants = np.array([pid.k_R, h / pid.T_i, per_difference, pole, pid.zone, rule])
     return law._replace(position=PID_LAW, pid=constants)
+
+
+def _forgetting(S: Array, time: float | None, h: float) -> Array:
+    """S (n,) with its integrators, poles at z = 1, replaced by poles that decay in `time` [s]."""
+    if time is None:
+        return S
+    if time == 0.0:
+        return np.where(np.arange(len(S)) == 0, 1.0, 0.0)
+    left, kept = trim(S), np.ones(1)
+    while left.size > 1 and abs(left.sum()) < 1e-9 * np.abs(left).sum():
+        left = divide(left, INTEGRATOR)[0]
+        kept = np.convolve(kept, [1.0, -math.exp(-h / time)])
+    W = np.convolve(left, kept)
+    return np.pad(W, (0, len(S) - len(W)))
 
 
 def _memory(law: Law, x: Array, start: tuple[float, float, float]) -> Memory:

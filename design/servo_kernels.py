@@ -29,14 +29,17 @@ WANTED, RAW, ADDED, SPEED = range(4)
 class Law(NamedTuple):
     """A servo's constants.
 
-    position: RST_LAW with R, S, or PID_LAW with pid (6,). friction: NOTHING, COMPENSATOR with law
-    (13,), DISTURBANCE or KALMAN with kalman (6,), period h [s]; b_v ... a_c: the filters of
-    velocity (of the force, DISTURBANCE), error (of the position, DISTURBANCE) and C.
+    position: RST_LAW with R, S and W, or PID_LAW with pid (6,). W, of the length of S: how what a
+    clipped command did not carry out is forgotten, W u = T r - R y + (W - S) taken. friction:
+    NOTHING, COMPENSATOR with law (13,), DISTURBANCE or KALMAN with kalman (6,), period h [s];
+    b_v ... a_c: the filters of velocity (of the force, DISTURBANCE), error (of the position,
+    DISTURBANCE) and C.
     """
 
     position: int
     R: Array
     S: Array
+    W: Array
     pid: Array
     friction: int
     law: Array
@@ -121,6 +124,8 @@ def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> N
     """The position controller's next state, after `taken` of the `asked` was carried out."""
     if c.position == RST_LAW:
         shift(s.x, c.R, c.S, y, taken)
+        for j in range(len(s.x) - 1):
+            s.x[j] -= c.W[j + 1] * (asked - taken)
         return
     e = s.pid[ERROR]
     outward = (asked - taken) * e * c.pid[K_R] > 0.0
@@ -144,14 +149,12 @@ def servo_sample(
     shake: float,
     limits: tuple[float, float],
     k_a: float,
-    windup: bool,
 ) -> tuple[float, float, float]:
     """Command [V], what the position controller wants, and the force loop's integral.
 
     acts: whether the position controller has its turn; k_a: of a motor, whose controller wants
     volts, or 0; shake: the dither [V]; limits: of the command [V] and of the force reference [N].
-    windup: the position controller is not told of a clipped command. Where it is, it goes on from
-    the force reference that gives the clipped command (the conditioning technique of Hanus).
+    Where the command is clipped, what was carried out is the force reference that gives it.
     """
     limit, most = limits
     asked = position_force(c, s, r, fed, y) if acts else wanted
@@ -160,14 +163,14 @@ def servo_sample(
         free = asked + added / k_a
         held = min(max(free, -limit), limit)
         u = min(max(held + shake, -limit), limit)
-        wanted, taken = asked, (asked if windup else asked + held - free)
+        wanted, taken = asked, asked + held - free
     else:
         wanted = min(max(asked + added, -most), most) - added
         before = integral
         u, integral = force_command(wanted + added, F, integral, pi[0], pi[1], limit)
         taken = wanted
         free = pi[0] * (wanted + added - F) + before
-        if not windup and free != u and pi[0] > 0.0:
+        if free != u and pi[0] > 0.0:
             taken = F + (u - before) / pi[0] - added
         u = min(max(u + shake, -limit), limit)
     if acts:

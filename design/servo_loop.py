@@ -40,7 +40,6 @@ def servo_kernel(
     shake: Array,
     limits: tuple[float, float],
     k_a: float,
-    windup: bool,
     noise_y: Array,
     noise_f: Array,
     start: tuple[float, float, float],
@@ -71,7 +70,7 @@ def servo_kernel(
         acts = k % ratio == 0
         u, wanted, integral = servo_sample(
             law, memory, acts, reference[k], feed[k // ratio], measured, felt, wanted, integral, pi,
-            shake[k], limits, k_a, windup,
+            shake[k], limits, k_a,
         )  # fmt: skip
         history[past + k] = acting_command(codes, addresses, q, s, z, now, u)
         g = plant[K1] * delayed(history, past + k, late)

@@ -4,69 +4,69 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.compensator import Compensator
+from design.filters import filters_at
+from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
 from design.rst import RST
+from design.servo import Compensation, Servo, simulate_servo
 from design.tracking import rate_limited
-from design.two_rate import simulate_two_rate
 from identification.arrays import Array, frozen
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.plant import Actuator, Motor
+from identification.plant import Actuator, Motor, Plant
 from workbench.design_values import Controller, Design
 from workbench.model import Model
 
 
 def run_loop(
-    machine: Model, found: Design, one: Controller, r: Array, rng: np.random.Generator
+    machine: Model,
+    found: Design,
+    one: Controller,
+    r: Array,
+    rng: np.random.Generator,
+    compensator: Compensator | None = None,
 ) -> LoopRun:
     """One reference r [m], (n,) at `loop_period`, through the loop, with the machine's noise.
 
     The controller sees it moved at its own rate; the run has it as given. A machine without an
     actuator takes the force reference as its force, and the rig's limit of the command [V] says
-    nothing of it. Raises BadModel where the design has a force loop and the machine nothing for it
-    to drive, or the other way round.
+    nothing of it. The compensator runs with the position controller, behind `filters_at`. Raises
+    BadModel where the design has a force loop and the machine nothing for it to drive, or the other
+    way round.
     """
     moved = rate_limited(r, one.rate, loop_period(found))
-    run = _run(machine, found, one, moved, rng)
+    plant = replace(machine.simulated, effects=in_the_loop(machine))
+    servo, whole = _servo(plant, found, one)
+    limit = None if plant.actuator is None else machine.rig.control_limit
+    if compensator is not None:
+        servo = replace(servo, friction=Compensation(compensator, filters_at(one.h)))
+    run = simulate_servo(
+        whole,
+        replace(servo, control_limit=limit),
+        moved,
+        loop_period(found),
+        noise=LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng),
+        start=(float(r[0]), 0.0, 0.0),
+        signals=_chambers(machine.rig),
+    )
     return replace(run, r=frozen(r))
 
 
-def _run(
-    machine: Model, found: Design, one: Controller, r: Array, rng: np.random.Generator
-) -> LoopRun:
-    plant = replace(machine.simulated, effects=in_the_loop(machine))
-    limit = None if plant.actuator is None else machine.rig.control_limit
-    noise = LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng)
-    start = (float(r[0]), 0.0, 0.0)
+def _servo(plant: Plant, found: Design, one: Controller) -> tuple[Servo, Plant]:
+    """The design's loops for this plant, and the plant that they drive."""
     if isinstance(plant.actuator, Actuator):
         if found.force is None:
             raise BadModel("the machine has an actuator, the design no force loop for it")
         force = ForcePI(found.force.k_i, found.force.T_i)
-        if plant.effects:
-            return simulate_effect_loop(
-                plant, one.rst, force, r, found.force.h,
-                noise=noise, control_limit=limit, start=start, signals=_chambers(machine.rig),
-            )  # fmt: skip
-        return simulate_two_rate(
-            plant, one.rst, force, r, found.force.h, noise=noise, control_limit=limit, y_0=r[0]
-        )
+        return Servo(one.rst, force, anti_windup=1.0 / one.dominant[0]), plant
     if found.force is not None:
         raise BadModel("the design has a force loop, the machine no actuator for it")
     motor = plant.actuator or Motor(1.0)
     rst = one.rst
     volts = RST(rst.R / motor.k_a, rst.S, rst.T / motor.k_a, rst.h)
-    whole = replace(plant, actuator=motor)
-    if plant.effects:
-        return simulate_effect_loop(
-            whole, volts, None, r, one.h, noise=noise, control_limit=limit, start=start,
-            signals=_chambers(machine.rig),
-        )  # fmt: skip
-    return simulate_loop(
-        whole, volts, None, r, one.h, noise=noise, control_limit=limit, start=start
-    )
+    return Servo(volts, None, anti_windup=0.0), replace(plant, actuator=motor)
 
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:

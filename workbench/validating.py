@@ -30,6 +30,7 @@ LAST = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
 BAND = 0.05  # of a step, in which a settled position stays
 REST = 2.0  # s at rest over which the noise in the command is taken
+COMPENSATED = " + compensator"  # behind a controller's name
 ESCAPED = 10.0  # times the step
 
 
@@ -86,7 +87,10 @@ class Figures:
 
 @dataclass(frozen=True)
 class Validation:
-    """Every controller on every plant (by names like "rst", then "model", "plant")."""
+    """Every controller on every plant (by names like "rst", then "model", "plant").
+
+    The loop that decides is without the compensator; "rst + compensator" is the same with it.
+    """
 
     card: str
     judged: Literal["rst", "pid"]
@@ -125,10 +129,17 @@ def validate(
     plants = {"model": model} | ({"plant": plant} if plant else {})
     figures: dict[str, dict[str, Figures]] = {}
     traces: dict[tuple[str, str], Traces] = {}
-    for name, controller in found.controllers.items():
+    cases = [
+        (name + suffix, controller, compensator)
+        for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value))
+        for name, controller in found.controllers.items()
+    ]
+    for name, controller, compensator in cases:
         figures[name] = {}
         for place, machine in plants.items():
-            run = Traces(*(run_loop(machine, found, controller, r, rng) for r in reference))
+            run = Traces(
+                *(run_loop(machine, found, controller, r, rng, compensator) for r in reference)
+            )
             traces[name, place] = run
             figures[name][place] = _figures(machine, found, controller, run, limits)
     judged = judged_of(found)
@@ -138,7 +149,7 @@ def validate(
         passed=all(one.passed for one in figures[judged].values()),
         limits=limits,
         figures=figures,
-        remarks=tuple(_remarks(figures[judged], found, (model, plant))),
+        remarks=tuple(_remarks(figures, judged, found, (model, plant))),
         versions=versions(),
     ), traces
 
@@ -328,11 +339,21 @@ def _too_much(result: Figures, limits: Limits, rotary: bool) -> Iterator[str]:
 
 
 def _remarks(
-    figures: Mapping[str, Figures], found: Design, machines: Sequence[Model | None]
+    figures: Mapping[str, Mapping[str, Figures]],
+    judged: str,
+    found: Design,
+    machines: Sequence[Model | None],
 ) -> list[str]:
-    out = ["the compensator is not part of this loop yet: friction is met by feedback alone"]
+    out = [
+        f"with the compensator, on the {place}: error at standstill"
+        f" {100 * figures[judged][place].standstill_relative:.3g} ->"
+        f" {100 * one.standstill_relative:.3g} %, along the smooth reference"
+        f" {100 * figures[judged][place].smooth_relative:.3g} -> {100 * one.smooth_relative:.3g} %"
+        f"{'' if one.stable else ', unstable'}"
+        for place, one in figures[judged + COMPENSATED].items()
+    ]
     out += dict.fromkeys(said for machine in machines if machine and (said := left_out(machine)))
-    for place, one in figures.items():
+    for place, one in figures[judged].items():
         if one.limit_cycle:
             weak = one.margins is None or one.margins.modulus < WEAK
             cause = "too little margin" if weak else "as an integrator against stiction makes"

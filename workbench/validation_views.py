@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.parameter_units import Shown, shown
-from workbench.validating import Figures, Validation
+from workbench.validating import COMPENSATED, Figures, Validation
 from workbench.views import Row, table, written
 
 if TYPE_CHECKING:
@@ -28,10 +28,16 @@ HEAD = (
 def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
     """One row a controller and plant, by `HEAD`."""
     return [
-        (name.upper(), place, *_row(one, shown(rotary)))
+        (_shown(name), place, *_row(one, shown(rotary)))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
+
+
+def _shown(name: str) -> str:
+    """A loop's name as a narrow column takes it."""
+    alone = name.removesuffix(COMPENSATED)
+    return alone.upper() if alone == name else f"{alone.upper()} + comp"
 
 
 def _row(one: Figures, units: Shown) -> Row:
@@ -59,7 +65,8 @@ def _row(one: Figures, units: Shown) -> Row:
 
 def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     """What fails and what to know, in words."""
-    lines = [line for name in found.figures for line in _missed(found, name)]
+    alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
+    lines = [line for name in alone for line in _missed(found, name)]
     first = next(iter(found.figures[found.judged].values()))
     unit = shown(rotary).position
     lines.append(

@@ -152,17 +152,23 @@ def test_dither_shakes_the_command() -> None:
     assert np.std(shaken.u[-1000:]) > 10.0 * np.std(plain.u[-1000:])
 
 
-def test_a_clipped_command_winds_nothing_up() -> None:
-    """A valve of 0.1 V limits the speed to 0.19 m/s: a step is late, and overshoots no more."""
+@pytest.mark.parametrize("time", [0.2, 0.05])
+def test_a_clipped_command_winds_less_up(time: float) -> None:
+    """A valve of 0.1 V limits the speed to 0.19 m/s."""
     over = {}
-    for told in (True, False):
+    for told in (None, time):
         servo = Servo(PID, PI, control_limit=0.1, anti_windup=told)
         found = simulate_servo(PLANT, servo, step(0.3, 8000), H)
         assert np.max(np.abs(found.u)) <= 0.1
         over[told] = float(np.max(found.y)) / 0.3 - 1.0
-    free = simulate_servo(PLANT, Servo(PID, PI), step(0.3, 8000), H)
-    assert over[True] < float(np.max(free.y)) / 0.3 - 1.0 + 0.02
-    assert over[False] > over[True] + 0.05
+        assert abs(found.y[-1] - 0.3) < 0.02
+    assert over[None] > over[time] + 0.05
+
+
+def test_an_unclipped_command_is_not_touched_by_anti_windup() -> None:
+    plain = run(Servo(PID, PI))
+    for time in (0.0, 0.1):
+        assert np.max(np.abs(run(Servo(PID, PI, anti_windup=time)).y - plain.y)) < 1e-10
 
 
 def test_the_force_reference_keeps_its_limit() -> None:

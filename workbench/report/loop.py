@@ -7,13 +7,14 @@ from design.loop import LoopRun
 from workbench.parameter_units import shown
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, line, style
 from workbench.report.page import Section, render
-from workbench.validating import Traces, Validation
+from workbench.validating import COMPENSATED, Traces, Validation
 from workbench.validation_views import HEAD, validation_lines, validation_rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 COLOURS = {"rst": REFERENCE, "pid": MODEL}
+DASHED = "--"  # with the compensator
 
 
 def judged(found: Validation, rotary: bool) -> Section:
@@ -40,10 +41,11 @@ def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> 
         label(axes[1][0], "", f"error [{units.position}]")
         label(axes[2][0], "time [s]", f"applied force [{units.force}]")
         handles = axes[0][0].get_legend_handles_labels()
-        drawn.legend(*handles, loc="outside upper right", ncols=3)
+        drawn.legend(*handles, loc="outside upper right", ncols=5)
         svg = inline(drawn, f"loop-{place}", "simulated loop: position, error and force")
     caption = (
-        "The loop with the identified Karnopp friction and the logs' noise, without compensator."
+        "The loop with the identified Karnopp friction and the logs' noise; broken lines: with the"
+        " compensator."
         " Left and right have their own time axes."
     )
     title = "Loop on the identified plant" if place == "model" else "Loop on the other plant"
@@ -54,6 +56,9 @@ def _lines(axes: "list[Axes]", trace: LoopRun, name: str, first: bool) -> None:
     position, error, force = axes
     if first:
         line(position, trace.t, trace.r, color=OTHER, ls=":", label="reference")
-    line(position, trace.t, trace.y, color=COLOURS[name], label=name.upper())
-    line(error, trace.t, trace.r - trace.y, color=COLOURS[name])
-    line(force, trace.t, trace.F, color=COLOURS[name], lw=0.8)
+    alone = name.removesuffix(COMPENSATED)
+    colour, look = COLOURS[alone], "-" if alone == name else DASHED
+    shown = name.replace(alone, alone.upper())
+    line(position, trace.t, trace.y, color=colour, ls=look, label=shown)
+    line(error, trace.t, trace.r - trace.y, color=colour, ls=look)
+    line(force, trace.t, trace.F, color=colour, ls=look, lw=0.8)
