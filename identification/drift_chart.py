@@ -1,0 +1,166 @@
+"""Slow drift: a multivariate EWMA of the changes over a machine's logs, as a value to be stored.
+
+The mean of the last logs is known better than one log, so a small lasting change shows in it.
+What does not average out is kept apart: the error of the model in force itself, and a margin
+below which a change does not matter. The limit is computed for the asked run length by the Markov
+chain of the chart's radius, not taken from a textbook's table. Sources: Lowry, Woodall, Champ and
+Rigdon, Technometrics 34 (1992); Runger and Prabhu, Biometrika 83 (1996).
+"""
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2, ncx2
+
+from identification.arrays import Array, BoolArray
+from identification.margin import Distance, beyond
+
+RINGS = 60  # states of the Markov chain
+PRIOR_LOGS = 4.0  # logs that the stated variation counts as beside those seen
+LEAST_VARIATION = 0.002  # relative sd below which a machine is not believed to repeat itself
+Rows = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class DriftState:
+    """What the logs since the model in force have shown; all relative to the model's values.
+
+    model: key of the model in force; names (d,): its parameters; mean (d,): weighted mean change
+    so far, `weight` (d,) of the whole weight 1 reached; covariance (d, d): of the mean, the
+    model's own error left out; last, last_variance (d,): of the last log without drift, None
+    before there is one; squares, pairs (d,): half square differences of successive logs beyond
+    their own variance, summed, and their number; logs: number of logs taken in.
+    """
+
+    model: str
+    names: tuple[str, ...]
+    mean: tuple[float, ...]
+    weight: tuple[float, ...]
+    covariance: Rows
+    last: tuple[float | None, ...]
+    last_variance: tuple[float, ...]
+    squares: tuple[float, ...]
+    pairs: tuple[int, ...]
+    logs: int = 0
+    schema: Literal["drift_state/1"] = "drift_state/1"
+
+
+def fresh_state(model: str, names: tuple[str, ...]) -> DriftState:
+    """The state of a machine whose model in force has seen no new log."""
+    d = len(names)
+    zeros = (0.0,) * d
+    return DriftState(model, names, zeros, zeros, (zeros,) * d, (None,) * d, zeros, zeros, (0,) * d)
+
+
+def variation(state: DriftState, stated: float) -> Array:
+    """Variance (d,) of the machine's parameters from log to log, relative.
+
+    The stated standard deviation counts as PRIOR_LOGS differences of successive logs, beside those
+    that were seen. Differences of neighbours hold little of a slow drift.
+    """
+    squares, pairs = np.array(state.squares), np.array(state.pairs, dtype=np.float64)
+    found = (PRIOR_LOGS * stated**2 + squares) / (PRIOR_LOGS + pairs)
+    return np.asarray(np.maximum(found, LEAST_VARIATION**2))
+
+
+def taken_in(
+    state: DriftState, change: Array, covariance: Array, judged: BoolArray, smoothing: float,
+    varied: Array, *, steady: bool,
+) -> DriftState:  # fmt: skip
+    """The state after a log.
+
+    change (d,), covariance (d, d): the log's change and its own error, without the model's; judged
+    (d,): which of them count; varied (d,): variance from log to log; steady: the log shows no
+    drift, so it counts for the variation too.
+    """
+    gain = np.where(judged, smoothing, 0.0)
+    keep = 1.0 - gain
+    noise = np.where(np.outer(judged, judged), covariance + np.diag(varied), 0.0)
+    spread = np.outer(keep, keep) * np.array(state.covariance) + np.outer(gain, gain) * noise
+    mean = keep * np.array(state.mean) + gain * np.where(judged, change, 0.0)
+    weight = keep * np.array(state.weight) + gain
+    own = np.diag(covariance)
+    last, last_variance = list(state.last), list(state.last_variance)
+    squares, pairs = list(state.squares), list(state.pairs)
+    for i in np.flatnonzero(judged) if steady else []:
+        before = last[i]
+        if before is not None:
+            half = 0.5 * (float(change[i]) - before) ** 2
+            squares[i] += max(half - 0.5 * (float(own[i]) + last_variance[i]), 0.0)
+            pairs[i] += 1
+        last[i], last_variance[i] = float(change[i]), float(own[i])
+    return DriftState(
+        state.model, state.names, _tuple(mean), _tuple(weight), tuple(map(_tuple, spread)),
+        tuple(last), tuple(last_variance), tuple(squares), tuple(pairs), state.logs + 1,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class Mean:
+    """The mean change (k,) over the logs, its covariance (k, k), margin (k,), and which of the
+    state's parameters these are."""
+
+    at: tuple[int, ...]
+    change: Array
+    covariance: Array
+    margin: Array
+
+    @property
+    def distance(self) -> Distance:
+        """How far the mean lies beyond the margin."""
+        return beyond(self.change, self.covariance, self.margin)
+
+
+def mean_change(state: DriftState, in_force: Array, margin: float) -> Mean:
+    """The mean change, as far as logs have judged it; in_force (d, d): the model's own error.
+
+    While few logs have been seen only a part of the weight is reached: change, margin and error
+    are those of the part.
+    """
+    weight = np.array(state.weight)
+    at = np.flatnonzero(weight > 0)
+    w = weight[at]
+    grid = np.ix_(at, at)
+    covariance = np.array(state.covariance)[grid] + np.outer(w, w) * in_force[grid]
+    return Mean(
+        tuple(int(i) for i in at), np.array(state.mean)[at] / w,
+        covariance / np.outer(w, w), np.full(len(at), margin),
+    )  # fmt: skip
+
+
+def limit(parameters: int, smoothing: float, run_length: float) -> float:
+    """Square distance that the chart passes once in `run_length` logs on average without a change.
+
+    parameters: number of them; smoothing: the weight of the newest log. Of a chart whose logs have
+    unit covariance; a margin only makes alarms rarer.
+    """
+    low = float(chi2.isf(0.5, parameters))
+    high = float(chi2.isf(1e-3 / run_length, parameters))
+    return float(
+        brentq(
+            lambda h: np.log(mean_run(parameters, smoothing, h) / run_length), low, high, rtol=1e-4
+        )
+    )
+
+
+def mean_run(parameters: int, smoothing: float, square: float) -> float:
+    """Mean number of logs up to an alarm of a chart with the limit `square`, without a change.
+
+    The radius of the mean is a Markov chain, since the next one depends on it alone: its square
+    is noncentral chi-square. Source: Runger and Prabhu 1996, in control.
+    """
+    radius = np.sqrt(square * smoothing / (2.0 - smoothing))
+    width = 2.0 * radius / (2 * RINGS + 1)
+    middle = width * np.arange(RINGS + 1)
+    edge = width * (np.arange(RINGS + 1) + 0.5)
+    away = ((1.0 - smoothing) * middle / smoothing) ** 2
+    below = ncx2.cdf((edge[None, :] / smoothing) ** 2, parameters, away[:, None] + 1e-12)
+    chance = np.diff(below, axis=1, prepend=0.0)
+    runs = np.linalg.solve(np.eye(RINGS + 1) - chance, np.ones(RINGS + 1))
+    return float(runs[0])
+
+
+def _tuple(values: Array) -> tuple[float, ...]:
+    return tuple(float(v) for v in values)

@@ -1,0 +1,98 @@
+"""The model in force, as the drift test takes it: values, joint covariance, and what it left."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from identification.arrays import Array, frozen
+from identification.errors import BadModel
+from identification.log import Rig
+from identification.plant import Actuator, Plant, units_of
+from identification.result import Drive, KarnoppFit
+
+VISCOUS = ("F_vp", "F_vn")
+FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
+LEAST_FORCE = 0.1  # of the largest friction force, below which a force is small
+
+
+@dataclass(frozen=True, eq=False)
+class InForce:
+    """A machine's model against which its new logs are tested, in SI.
+
+    names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
+    key.name; untold: those that the model does not tell, with the reason. drive, stiffness [N/m]:
+    how its fit was driven; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
+    the force equation was fitted; fastest [m/s]: speed at which a viscous force is judged, 0 where
+    it is not known. key: names the model in a `DriftState`. Raises BadModel where sizes differ.
+    """
+
+    plant: Plant
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    rig: Rig
+    drive: Drive
+    stiffness: float = 0.0
+    chi_square: float = 1.0
+    imposed: bool = False
+    untold: Mapping[str, str] = field(default_factory=dict)
+    key: str = ""
+    fastest: float = 0.0
+
+    def __post_init__(self) -> None:
+        d = len(self.names)
+        object.__setattr__(self, "values", frozen(self.values))
+        object.__setattr__(self, "covariance", frozen(self.covariance))
+        if self.values.shape != (d,) or self.covariance.shape != (d, d):
+            raise BadModel(
+                f"model in force: {d} names, values {self.values.shape}, covariance"
+                f" {self.covariance.shape}; one value a name and a square covariance needed"
+            )
+
+    @property
+    def scales(self) -> Array:
+        """Size (d,) that a relative change refers to: the value, or what is small beside friction.
+
+        A force below a tenth of the largest friction force is judged against that tenth; so is
+        a viscous one, at the fastest speed of the model's logs.
+        """
+        size = np.abs(self.values)
+        largest = max(abs(getattr(self.plant.friction, name)) for name in FORCES)
+        for i, name in enumerate(self.names):
+            if name in FORCES:
+                size[i] = max(size[i], LEAST_FORCE * largest)
+            if name in VISCOUS and self.fastest > 0:
+                size[i] = max(size[i], LEAST_FORCE * largest / self.fastest)
+        return np.where(size > 0, size, 1.0)
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units by name."""
+        found = dict(units_of(self.rig.motion))
+        for acting in self.plant.effects:
+            found |= {f"{acting.key}.{p.name}": p.unit for p in acting.effect.params}
+        return found
+
+
+def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> InForce:
+    """The model of a fit as the one in force; fastest [m/s]: speed in its logs, 0 if unknown."""
+    untold = {n: e.reason or "" for n, e in fit.estimates.items() if e.value is None}
+    friction = fit.friction
+    every = {name: float(getattr(friction, name)) for name in fit.free if hasattr(friction, name)}
+    if isinstance(fit.actuator, Actuator):
+        every |= {"k1": fit.actuator.k1, "k2": fit.actuator.k2}
+    return InForce(
+        plant=Plant(friction, fit.actuator),
+        names=fit.free,
+        values=np.array([every[name] for name in fit.free]),
+        covariance=fit.covariance,
+        rig=rig,
+        drive=fit.drive,
+        stiffness=fit.stiffness,
+        chi_square=fit.chi_square,
+        imposed=all(np.isnan(one.position_rms) for one in fit.logs),
+        untold=untold,
+        key=key,
+        fastest=fastest,
+    )

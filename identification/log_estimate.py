@@ -1,0 +1,216 @@
+"""What one new log says of a known machine: a local refit from the model in force.
+
+The model in force is close as long as the machine has not changed, so Gauss-Newton on the
+simulated response arrives from there in a few steps. Where it does not, it begins again from the
+log's own first estimate, then from a global search; where no start brings chi-square down, the
+structure does not fit the log.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.identifiability import estimates, events_of
+from identification.imposed import fit_imposed
+from identification.in_force import InForce
+from identification.karnopp import NAMES
+from identification.log import Log
+from identification.objective import START_V, START_Y
+from identification.output_error import searched_plant
+from identification.plant import Actuator, Plant
+from identification.problem import Problem, pose, simulated
+from identification.refine import Optimum, refine, robust_covariance
+from identification.residual_tests import effective_samples
+from identification.stepping import kernel_parameters
+from identification.stretches import stretches
+from identification.weighing import BETWEEN, OUTLIER, ROUGH, STRETCHES
+
+SEARCHES = 2  # global searches of a log that no local fit follows
+PIECES = (4.0, 1.5)  # s; stretches in which a log is followed that is not followed as a whole
+LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
+DRAWN = 512
+
+
+@dataclass(frozen=True, eq=False)
+class LogEstimate:
+    """Parameters of one log: values (d,) and covariance (d, d) by `names`.
+
+    untold: parameters that the log does not tell, with the reason; they are among `names` all the
+    same. chi_square: what the best fit leaves per value; allowed: up to which the structure fits;
+    searched: whether the local fits failed and a global search was made.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    untold: Mapping[str, str]
+    chi_square: float
+    allowed: float
+    searched: bool
+
+    @property
+    def follows(self) -> bool:
+        """Whether the structure of the model in force follows the log."""
+        return self.chi_square <= self.allowed
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """A problem, an optimum of it, and its chi-square."""
+
+    problem: Problem
+    optimum: Optimum
+
+    @property
+    def chi_square(self) -> float:
+        return self.optimum.cost / self.problem.count
+
+
+def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
+    """The parameters of the model in force as this log alone tells them.
+
+    Raises NotIdentifiable where nothing moves, BadLog where a signal is missing.
+    """
+    drive = None if model.rig.kind == "motor" else model.drive
+    problem = pose([log], model.rig, drive)
+    if model.imposed:
+        return _imposed(model, problem, rng)
+    allowed = problem.adequate
+    if model.chi_square > problem.adequate:
+        allowed = LIKE * model.chi_square
+    best: _Fit | None = None
+    searched = False
+    for found, by_search in _fits(model, problem, rng):
+        if best is None or found.chi_square < best.chi_square:
+            best, searched = found, by_search
+        if best.chi_square <= allowed:
+            break
+    assert best is not None
+    return _told(best, allowed, searched, rng)
+
+
+def _fits(
+    model: InForce, problem: Problem, rng: np.random.Generator
+) -> Iterator[tuple[_Fit, bool]]:
+    """Fits of ever greater effort, and whether each is of a global search."""
+    if problem.hold:
+        problem = _opened(problem)
+    plant = model.plant
+    starts = [_row(model, plant), problem.row.copy()]
+    if problem.drive == "force" and not problem.hold and model.stiffness > 0:
+        starts[1][-1] = model.stiffness
+    followed: list[_Fit] = []
+    for row in starts:
+        near, whole = _local(problem, row)
+        yield whole, False
+        followed.append(min((near, whole), key=lambda one: one.chi_square))
+    for seconds in PIECES:
+        for start in followed:
+            yield _in_pieces(problem, start.optimum.p, seconds), False
+    for _ in range(SEARCHES):
+        plant = searched_plant(problem.logs, rng, rig=model.rig, drive=model.drive)
+        near, whole = _local(problem, _row(model, plant))
+        yield whole, True
+        yield _in_pieces(problem, near.optimum.p, PIECES[-1]), True
+
+
+def _row(model: InForce, plant: Plant) -> Array:
+    """Kernel parameters (11,) of a plant, driven as the model in force."""
+    k1, k2 = 0.0, model.stiffness
+    if isinstance(plant.actuator, Actuator) and model.drive == "command":
+        k1, k2 = plant.actuator.k1, plant.actuator.k2
+    return kernel_parameters(plant.friction.array, k1, k2)
+
+
+def _local(problem: Problem, row: Array) -> tuple[_Fit, _Fit]:
+    """The nearest minimum over windows that begin at rests, and from there over the whole log."""
+    cap = problem.cap
+    near = refine(problem.runs, row, problem.free, cap=cap)
+    whole = refine(near.runs(problem.long_runs), near.p, problem.free, cap=cap)
+    whole = refine(whole.runs(problem.long_runs), whole.p, problem.free)
+    return _Fit(problem, near), _Fit(problem, whole)
+
+
+def _in_pieces(problem: Problem, row: Array, seconds: float) -> _Fit:
+    """The fit over stretches whose states are unknown: a stop that is lost spoils one of them."""
+    cut = stretches(problem.runs, seconds)
+    near = refine(cut.all, row, problem.free, cap=problem.cap)
+    optimum = refine(cut.begun(near.starts).all, near.p, problem.free)
+    runs = tuple(cut.begun(optimum.starts).restarted())
+    shared = len(optimum.free)
+    optimum = replace(
+        optimum,
+        starts=np.array([run.start for run in runs]),
+        covariance=optimum.covariance[:shared, :shared],
+    )
+    return _Fit(replace(problem, runs=runs, stretched=True), optimum)
+
+
+def _opened(problem: Problem) -> Problem:
+    """The problem of a motor with each run's first position and velocity unknown."""
+    runs = tuple(
+        replace(run, open=(START_Y, START_V) if run.start[START_V] != 0.0 else (START_Y,))
+        for run in problem.runs
+    )
+    return replace(problem, runs=runs)
+
+
+def _told(found: _Fit, allowed: float, searched: bool, rng: np.random.Generator) -> LogEstimate:
+    """The fit's parameters, how sure they are, and which of them the log tells."""
+    problem, optimum = found.problem, found.optimum
+    names = tuple((*NAMES, "k1", "k2")[int(i)] for i in optimum.free)
+    center = optimum.p[optimum.free]
+    covariance = _covariance(found)
+    runs = [simulated(problem, optimum, i) for i in range(len(problem.logs))]
+    events = events_of([run.mode for run in runs], [run.v for run in runs])
+    samples = rng.multivariate_normal(center, covariance, DRAWN, check_valid="ignore")
+    log = problem.logs[0].name
+    told = estimates(names, center, samples, events, False, log)
+    untold = {name: one.reason or "" for name, one in told.items() if one.value is None}
+    return LogEstimate(names, center, covariance, untold, found.chi_square, allowed, searched)
+
+
+def _covariance(found: _Fit) -> Array:
+    """Covariance (d, d) of the shared parameters, widened where the residual is no white noise."""
+    problem, optimum = found.problem, found.optimum
+    shared = len(optimum.free)
+    plain = optimum.covariance[:shared, :shared] * ROUGH[1] ** 2 * max(found.chi_square, 1.0)
+    if problem.drive == "command" and found.chi_square <= problem.adequate:
+        return np.asarray(plain)
+    if not problem.stretched:
+        runs = optimum.runs(problem.long_runs)
+        scattered = robust_covariance(runs, optimum, OUTLIER, STRETCHES)[:shared, :shared]
+        if np.all(np.isfinite(scattered)):
+            plain = _bounded(found, scattered, plain)
+    if problem.drive == "force" and not problem.hold:
+        plain = 2.0 * plain + np.diag((BETWEEN[optimum.free] * optimum.p[optimum.free]) ** 2)
+    return np.asarray(plain)
+
+
+def _bounded(found: _Fit, scattered: Array, plain: Array) -> Array:
+    """The scatter of stretches, at most what as few independent samples would make of `plain`.
+
+    One stretch with a missed stop would rule the scatter of a fit that follows the rest.
+    """
+    if found.chi_square > found.problem.adequate:
+        return scattered
+    residuals = [
+        simulated(found.problem, found.optimum, i).y - log["y"]
+        for i, log in enumerate(found.problem.logs)
+    ]
+    shrunk = max(sum(map(len, residuals)) / effective_samples(residuals), 1.0)
+    most = np.maximum(np.diag(plain), 0.0) * shrunk
+    ratio = np.sqrt(np.minimum(1.0, most / np.maximum(np.diag(scattered), 1e-300)))
+    return np.asarray(scattered * np.outer(ratio, ratio))
+
+
+def _imposed(model: InForce, problem: Problem, rng: np.random.Generator) -> LogEstimate:
+    """Sliding friction of a body led along a path, from the force equation."""
+    fit = fit_imposed(problem, rng, model.rig, "as the model in force")
+    every = fit.friction
+    values = np.array([float(getattr(every, name)) for name in fit.free])
+    untold = {n: e.reason or "" for n, e in fit.estimates.items() if e.value is None}
+    allowed = LIKE * max(model.chi_square, 1.0)
+    return LogEstimate(fit.free, values, fit.covariance, untold, fit.chi_square, allowed, False)
