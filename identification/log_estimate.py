@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.box import Box
+from identification.experiment import total_cost
 from identification.identifiability import estimates, events_of
 from identification.imposed import fit_imposed
 from identification.in_force import InForce
@@ -23,12 +25,17 @@ from identification.plant import Actuator, Plant
 from identification.problem import Problem, pose, simulated
 from identification.refine import Optimum, refine, robust_covariance
 from identification.residual_tests import effective_samples
-from identification.stepping import kernel_parameters
+from identification.search import evolve
+from identification.stepping import K2, kernel_parameters
 from identification.stretches import stretches
 from identification.weighing import BETWEEN, OUTLIER, ROUGH, STRETCHES
 
-SEARCHES = 2  # global searches of a log that no local fit follows
+SEARCHES = 1  # global searches of a log that no local fit follows
 PIECES = (4.0, 1.5)  # s; stretches in which a log is followed that is not followed as a whole
+LOST = 0.1  # of the stretches, at least one, that may be spoiled by a lost stop
+CLOSE = 0.1  # relative range of a search close by
+POPULATION, GENERATIONS = 64, 60
+MISFIT = 3.0  # chi-square from which a log is not followed; a stop lost here or there leaves less
 LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
 DRAWN = 512
 
@@ -58,14 +65,16 @@ class LogEstimate:
 
 @dataclass(frozen=True, eq=False)
 class _Fit:
-    """A problem, an optimum of it, and its chi-square."""
+    """A problem, an optimum of it, and what it leaves per value."""
 
     problem: Problem
     optimum: Optimum
+    chi_square: float
 
-    @property
-    def chi_square(self) -> float:
-        return self.optimum.cost / self.problem.count
+
+def _plain(problem: Problem, optimum: Optimum) -> _Fit:
+    """A fit judged by the whole of its runs."""
+    return _Fit(problem, optimum, optimum.cost / problem.count)
 
 
 def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
@@ -77,9 +86,7 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     problem = pose([log], model.rig, drive)
     if model.imposed:
         return _imposed(model, problem, rng)
-    allowed = problem.adequate
-    if model.chi_square > problem.adequate:
-        allowed = LIKE * model.chi_square
+    allowed = MISFIT if model.chi_square <= problem.adequate else LIKE * model.chi_square
     best: _Fit | None = None
     searched = False
     for found, by_search in _fits(model, problem, rng):
@@ -97,18 +104,22 @@ def _fits(
     """Fits of ever greater effort, and whether each is of a global search."""
     if problem.hold:
         problem = _opened(problem)
-    plant = model.plant
-    starts = [_row(model, plant), problem.row.copy()]
+    starts = [_row(model, model.plant), problem.row.copy()]
     if problem.drive == "force" and not problem.hold and model.stiffness > 0:
-        starts[1][-1] = model.stiffness
-    followed: list[_Fit] = []
+        starts[1][K2] = model.stiffness
+    rows: list[Array] = []
     for row in starts:
+        straight = _straight(problem, row)
+        yield straight, False
         near, whole = _local(problem, row)
         yield whole, False
-        followed.append(min((near, whole), key=lambda one: one.chi_square))
-    for seconds in PIECES:
-        for start in followed:
-            yield _in_pieces(problem, start.optimum.p, seconds), False
+        best = min((straight, near, whole), key=lambda one: one.chi_square)
+        rows += [row, best.optimum.p]
+        for seconds in PIECES:
+            yield _in_pieces(problem, row, seconds), False
+            yield _in_pieces(problem, best.optimum.p, seconds), False
+    for row in (rows[0], rows[3]):
+        yield _near_by(problem, row, rng), True
     for _ in range(SEARCHES):
         plant = searched_plant(problem.logs, rng, rig=model.rig, drive=model.drive)
         near, whole = _local(problem, _row(model, plant))
@@ -124,28 +135,61 @@ def _row(model: InForce, plant: Plant) -> Array:
     return kernel_parameters(plant.friction.array, k1, k2)
 
 
+def _straight(problem: Problem, row: Array) -> _Fit:
+    """The nearest minimum over the whole log; its start first, or the first step goes astray."""
+    nothing = problem.free[:0]
+    begun = refine(problem.long_runs, row, nothing)
+    return _plain(problem, refine(begun.runs(problem.long_runs), row, problem.free))
+
+
 def _local(problem: Problem, row: Array) -> tuple[_Fit, _Fit]:
     """The nearest minimum over windows that begin at rests, and from there over the whole log."""
     cap = problem.cap
     near = refine(problem.runs, row, problem.free, cap=cap)
     whole = refine(near.runs(problem.long_runs), near.p, problem.free, cap=cap)
     whole = refine(whole.runs(problem.long_runs), whole.p, problem.free)
-    return _Fit(problem, near), _Fit(problem, whole)
+    return _plain(problem, near), _plain(problem, whole)
 
 
 def _in_pieces(problem: Problem, row: Array, seconds: float) -> _Fit:
-    """The fit over stretches whose states are unknown: a stop that is lost spoils one of them."""
+    """The fit over stretches whose states are unknown, and how well it follows most of them.
+
+    A stop can turn on less than the noise, and where it is lost a stretch is spoiled: what is far
+    off has a bounded say, and the worst stretches are left out of the verdict.
+    """
     cut = stretches(problem.runs, seconds)
-    near = refine(cut.all, row, problem.free, cap=problem.cap)
-    optimum = refine(cut.begun(near.starts).all, near.p, problem.free)
-    runs = tuple(cut.begun(optimum.starts).restarted())
+    for free, cap in ((problem.free[:0], problem.cap), (problem.free, problem.cap)):
+        near = refine(cut.all, row, free, cap=cap)
+        cut, row = cut.begun(near.starts), near.p
+    optimum = refine(cut.all, row, problem.free, cap=OUTLIER)
+    cut = cut.begun(optimum.starts)
+    runs = tuple(cut.restarted())
+    costs = [float(total_cost([part], optimum.p[None], 0.0)[0]) for part in cut.all]
+    counts = np.array([part.measured.count for part in cut.all])
+    order = np.argsort(np.array(costs) / counts)
+    kept = order[: max(1, len(order) - max(1, int(LOST * len(order))))]
+    chi_square = float(np.sum(np.array(costs)[kept]) / np.sum(counts[kept]))
     shared = len(optimum.free)
     optimum = replace(
         optimum,
         starts=np.array([run.start for run in runs]),
         covariance=optimum.covariance[:shared, :shared],
     )
-    return _Fit(replace(problem, runs=runs, stretched=True), optimum)
+    return _Fit(replace(problem, runs=runs, stretched=True), optimum, chi_square)
+
+
+def _near_by(problem: Problem, row: Array, rng: np.random.Generator) -> _Fit:
+    """The best of a search close to a row over short stretches, from which a gradient goes on."""
+    runs = stretches(problem.runs, PIECES[-1]).restarted()
+    free = problem.box.free[:9]
+    size = np.abs(row[free])
+    box = Box(free, size * (1.0 - CLOSE), size * (1.0 + CLOSE), row)
+    first = box.around(row, POPULATION, 0.2, rng)
+    found = evolve(lambda z: total_cost(runs, box.rows(z), OUTLIER), first, GENERATIONS, rng)
+    best = box.rows(found.members[:1])[0]
+    whole = _straight(problem, best)
+    pieces = _in_pieces(problem, best, PIECES[-1])
+    return min((whole, pieces), key=lambda one: one.chi_square)
 
 
 def _opened(problem: Problem) -> Problem:
