@@ -24,6 +24,7 @@ from identification.drift_chart import (
     taken_in,
     variation,
 )
+from identification.effect_estimate import estimate_with_effects
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.in_force import InForce
 from identification.log import Log
@@ -142,7 +143,8 @@ def drift_test(
     if state is None or state.model != model.key or state.names != model.names:
         state = fresh_state(model.key, model.names)
     try:
-        found = estimate_log(model, log, rng)
+        estimate = estimate_with_effects if model.plant.effects else estimate_log
+        found = estimate(model, log, rng)
     except NotIdentifiable as error:
         return _silent(log.name, "not_judged", str(error), {}, None, state)
     if not found.follows:

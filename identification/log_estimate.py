@@ -78,7 +78,7 @@ def _plain(problem: Problem, optimum: Optimum) -> _Fit:
 
 
 def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
-    """The parameters of the model in force as this log alone tells them.
+    """The parameters of a model in force without effects, as this log alone tells them.
 
     Raises NotIdentifiable where nothing moves, BadLog where a signal is missing.
     """

@@ -47,11 +47,16 @@ CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The plant refined, standard deviations by name (effects as key.name), and its misfit."""
+    """The plant refined, standard deviations by name (effects as key.name), and its misfit.
+
+    names (d,): parameters that were free, in the order of `covariance` (d, d).
+    """
 
     plant: Plant
     sd: dict[str, float]
     misfit: float
+    names: tuple[str, ...]
+    covariance: Array
 
 
 def names_of(plant: Plant, drive: Drive) -> list[str]:
@@ -234,13 +239,15 @@ def refit(
             break
         (x, J, cost), found = trial, better
     best = plant_with(plant, names, full(x))
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * cost / len(J))
+    inverse = np.linalg.pinv(J.T @ J) * cost / len(J)
     if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
-        spread = spread * np.sqrt(SECONDS / logs[0].log.h)
+        inverse = inverse * SECONDS / logs[0].log.h
+    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
     sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
     if found > FOLLOWED:
         sd |= {name: max(sd[name], prior.get(name, 0.0)) for name in sd}
-    return Refit(best, sd, found)
+    covariance = inverse * np.outer(unit[open_], unit[open_])
+    return Refit(best, sd, found, tuple(names[i] for i in open_), covariance)
 
 
 def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:

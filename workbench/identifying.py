@@ -15,6 +15,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.arx import ArxModel, fit_arx, one_step_errors, simulation_errors
 from identification.arx_select import select_arx
+from identification.differentiate import differentiate
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.inverse_model import ForceError, Smoothing, force_error
 from identification.karnopp import NAMES
@@ -23,13 +24,14 @@ from identification.output_error import fit_karnopp
 from identification.plant import Actuator, Motor
 from identification.residual_tests import residual_tests
 from identification.result import Drive, Estimate, KarnoppFit
-from workbench.model import ArxPlant, ArxTests, FitSummary, LogEntry, Model, versions
+from workbench.model import ArxPlant, ArxTests, Correlation, FitSummary, LogEntry, Model, versions
 from workbench.parameter_units import actuator_units, friction_units
 
 Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
+FAST = 0.99
 LARGEST = 4  # na, nb and nk tried where no orders are given
 MEETS = 1e-2  # relative difference up to which two periods count as one
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
@@ -99,9 +101,24 @@ def identify(
             ),
             log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
             versions=versions(),
+            correlation=_correlation(fit),
         ),
         fit,
     )
+
+
+def _correlation(fit: KarnoppFit) -> Correlation:
+    """How the errors of the fitted parameters go together."""
+    sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
+    size = np.where(sd > 0, sd, 1.0)
+    matrix = np.clip(fit.covariance / np.outer(size, size), -1.0, 1.0)
+    np.fill_diagonal(matrix, 1.0)
+    return Correlation(fit.free, tuple(tuple(row) for row in matrix.tolist()))
+
+
+def speed_of(log: Log) -> float:
+    """What 1 % of the measured speeds exceed [m/s]."""
+    return float(np.quantile(np.abs(differentiate(log["y"], log.h).v), FAST))
 
 
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
@@ -147,6 +164,7 @@ def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
         position_rms=found.position_rms if np.isfinite(found.position_rms) else None,
         force_rms=found.force_rms,
         chi_square=found.chi_square,
+        speed=speed_of(log),
     )
 
 

@@ -18,6 +18,7 @@ from workbench.parameter_units import actuator_units, friction_units, in_unit
 from workbench.reading import read_result
 
 SCHEMA = "model/1"
+SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
 
 
@@ -67,7 +68,7 @@ class LogEntry:
 
     position_rms is None where no free run follows the log: the motion is imposed on the body.
     travel: lowest and highest measured position [m]; force_peak: largest applied force [N];
-    duration, h [s].
+    duration, h [s]; speed: what 1 % of the measured speeds exceed [m/s], None in older files.
     """
 
     file: str
@@ -81,6 +82,7 @@ class LogEntry:
     position_rms: float | None
     force_rms: float | None
     chi_square: float
+    speed: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("h", "duration"):
@@ -114,6 +116,27 @@ class FitSummary:
 
 
 @dataclass(frozen=True)
+class Correlation:
+    """How the errors of the parameters `names` (d,) go together: `matrix` (d, d).
+
+    With the standard deviations that stand with the parameters it is their covariance. Raises
+    BadModel where it is no such matrix.
+    """
+
+    names: tuple[str, ...]
+    matrix: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        d = len(self.names)
+        if len(set(self.names)) != d or [len(row) for row in self.matrix] != [d] * d:
+            raise BadModel(
+                f"[correlation] {d} names and rows of other lengths; a square one needed"
+            )
+        if not all(abs(entry) <= 1.0 + SLACK for row in self.matrix for entry in row):
+            raise BadModel("[correlation] has entries beyond -1 to 1; run the command again")
+
+
+@dataclass(frozen=True)
 class ModelFile:
     """A model as model.json has it, in the units that are written there; see `Model`."""
 
@@ -128,6 +151,7 @@ class ModelFile:
     versions: Mapping[str, str]
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     posterior: Mapping[str, Any] | None = None
+    correlation: Correlation | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -155,7 +179,8 @@ class Model(ModelFile):
 
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
-    posterior: what `--posterior` found. library: where the effects' equations are.
+    posterior: what `--posterior` found; correlation: of the parameters' errors. library: where
+    the effects' equations are.
     """
 
     library: Library = field(default_factory=built_in, compare=False, repr=False)

@@ -15,7 +15,7 @@ from identification.trace_result import Errors, FoundEffect, Trace
 from workbench.card import load_card
 from workbench.effect_values import relabelled
 from workbench.fetch import card_path
-from workbench.identifying import Source, arx_plant
+from workbench.identifying import Source, arx_plant, speed_of
 from workbench.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
 from workbench.sources import Sources
 from workbench.units import Motion
@@ -169,6 +169,7 @@ def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
         position_rms=errors.position_rms,
         force_rms=None,
         chi_square=chi,
+        speed=speed_of(log),
     )
 
 
