@@ -15,6 +15,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
 from identification.arrays import Array, BoolArray
+from identification.errors import BadModel
 from identification.margin import Distance, beyond
 
 RINGS = 60  # states of the Markov chain
@@ -29,8 +30,8 @@ class DriftState:
 
     model: key of the model in force; names (d,): its parameters; mean (d,): weighted mean change
     so far, `weight` (d,) of the whole weight 1 reached; covariance (d, d): of the mean, the
-    model's own error left out; last, last_variance (d,): of the last log without drift, None
-    before there is one; squares, pairs (d,): half square differences of successive logs beyond
+    model's own error left out; last, last_variance (d,): of the last log, None before there is
+    one; squares, pairs (d,): half square differences of successive logs beyond
     their own variance, summed, and their number; logs: number of logs taken in.
     """
 
@@ -45,6 +46,15 @@ class DriftState:
     pairs: tuple[int, ...]
     logs: int = 0
     schema: Literal["drift_state/1"] = "drift_state/1"
+
+    def __post_init__(self) -> None:
+        d = len(self.names)
+        rows = [
+            self.mean, self.weight, self.covariance, self.last, self.last_variance, self.squares,
+            self.pairs, *self.covariance,
+        ]  # fmt: skip
+        if any(len(row) != d for row in rows):
+            raise BadModel(f"drift state of {d} parameters with entries of other lengths")
 
 
 def fresh_state(model: str, names: tuple[str, ...]) -> DriftState:
@@ -67,13 +77,12 @@ def variation(state: DriftState, stated: float) -> Array:
 
 def taken_in(
     state: DriftState, change: Array, covariance: Array, judged: BoolArray, smoothing: float,
-    varied: Array, *, steady: bool,
+    varied: Array,
 ) -> DriftState:  # fmt: skip
     """The state after a log.
 
     change (d,), covariance (d, d): the log's change and its own error, without the model's; judged
-    (d,): which of them count; varied (d,): variance from log to log; steady: the log shows no
-    drift, so it counts for the variation too.
+    (d,): which of them count; varied (d,): variance from log to log.
     """
     gain = np.where(judged, smoothing, 0.0)
     keep = 1.0 - gain
@@ -84,7 +93,7 @@ def taken_in(
     own = np.diag(covariance)
     last, last_variance = list(state.last), list(state.last_variance)
     squares, pairs = list(state.squares), list(state.pairs)
-    for i in np.flatnonzero(judged) if steady else []:
+    for i in np.flatnonzero(judged):
         before = last[i]
         if before is not None:
             half = 0.5 * (float(change[i]) - before) ** 2

@@ -192,7 +192,8 @@ def judged(
         chi_square=found.chi_square,
         allowed=found.allowed,
         reason="",
-        state=after,
+        # A jump would stay in the mean long after it has been repaired.
+        state=state if single.alarm else after,
     )
 
 
@@ -244,10 +245,12 @@ def _moved(model: InForce, found: Mean, here: Mean) -> tuple[Shift, ...]:
     """The fewest parameters that explain the change, largest first, by how much on this log.
 
     The mean over the logs, where that found it, lags behind what drifts: it names the parameters,
-    and sizes them only where this log does not judge them.
+    and sizes them only where this log does not judge them or shows less.
     """
     names = {found.at[k] for k in moved(found.change, found.covariance, found.margin)}
-    sized = here if names <= set(here.at) else found
+    size_here = dict(zip(here.at, np.abs(here.change).tolist(), strict=True))
+    size_mean = dict(zip(found.at, np.abs(found.change).tolist(), strict=True))
+    sized = here if all(size_here.get(i, 0.0) >= size_mean[i] for i in names) else found
     chosen = tuple(k for k, i in enumerate(sized.at) if i in names)
     size, covariance = explained(sized.change, sized.covariance, sized.margin, chosen)
     out = [

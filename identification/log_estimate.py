@@ -104,9 +104,9 @@ def _fits(
     """Fits of ever greater effort, and whether each is of a global search."""
     if problem.hold:
         problem = _opened(problem)
-    starts = [_row(model, model.plant), problem.row.copy()]
-    if problem.drive == "force" and not problem.hold and model.stiffness > 0:
-        starts[1][K2] = model.stiffness
+    starts = [_row(model, problem, model.plant), problem.row.copy()]
+    if problem.drive == "force":
+        starts[1][K2] = starts[0][K2]
     rows: list[Array] = []
     for row in starts:
         straight = _straight(problem, row)
@@ -122,16 +122,18 @@ def _fits(
         yield _near_by(problem, row, rng), True
     for _ in range(SEARCHES):
         plant = searched_plant(problem.logs, rng, rig=model.rig, drive=model.drive)
-        near, whole = _local(problem, _row(model, plant))
+        near, whole = _local(problem, _row(model, problem, plant))
         yield whole, True
         yield _in_pieces(problem, near.optimum.p, PIECES[-1]), True
 
 
-def _row(model: InForce, plant: Plant) -> Array:
+def _row(model: InForce, problem: Problem, plant: Plant) -> Array:
     """Kernel parameters (11,) of a plant, driven as the model in force."""
-    k1, k2 = 0.0, model.stiffness
-    if isinstance(plant.actuator, Actuator) and model.drive == "command":
+    k1, k2 = 0.0, 0.0
+    if problem.drive == "command" and isinstance(plant.actuator, Actuator):
         k1, k2 = plant.actuator.k1, plant.actuator.k2
+    elif not problem.hold:
+        k2 = model.stiffness or float(problem.row[K2])
     return kernel_parameters(plant.friction.array, k1, k2)
 
 

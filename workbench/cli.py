@@ -17,6 +17,7 @@ COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
     "identify": "Find friction, plant and actuator of a machine from its logs.",
     "trace": "Find the physical effect that the model of a machine lacks.",
+    "drift": "Test new logs against the model in force: has the machine changed?",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",

@@ -1,0 +1,92 @@
+"""`workbench drift`: new logs against the model in force -> drift.json and report.html."""
+
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from workbench.options import POSITIVE, card_option, effects_option
+from workbench.output import OutputFolder, emit, output_options, progress
+
+
+@click.command(
+    epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json"
+)
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@card_option
+@click.option(
+    "--state",
+    "state_file",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="File that carries the test from log to log; made where there is none.",
+)
+@click.option(
+    "--margin",
+    type=POSITIVE,
+    default=2.0,
+    show_default=True,
+    help="Change of a parameter that does not matter [%].",
+)
+@click.option(
+    "--variation",
+    type=POSITIVE,
+    default=1.0,
+    show_default=True,
+    help="Standard deviation of a parameter from log to log [%], until the logs show it.",
+)
+@click.option(
+    "--run-length",
+    type=POSITIVE,
+    default=1000.0,
+    show_default=True,
+    help="Logs without drift up to a false alarm, on average, at least.",
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@effects_option
+@output_options
+def command(
+    model_file: Path,
+    logs: tuple[str, ...],
+    card: str,
+    state_file: Path | None,
+    margin: float,
+    variation: float,
+    run_length: float,
+    seed: int,
+    effects: tuple[Path, ...],
+    as_json: bool,
+    out: Path | None,
+) -> int:
+    """Test new logs against the model in force: has the machine changed, and in which parameters?
+
+    Every log is judged alone and, with those before it, by their mean, which finds what changes
+    slowly. Writes drift.json and report.html. Exit status 0: no drift; 1: drift, a changed
+    structure, or no log that could be judged.
+    """
+    from identification.drift_test import Settings
+    from workbench.drift_views import drift_view
+    from workbench.drifting import drift_document, model_key, read_stream, tested, write_stream
+    from workbench.model import read_model
+    from workbench.own_effects import library
+    from workbench.report.drift import drift_report
+    from workbench.sources import read_sources
+
+    settings = Settings(margin=margin / 100, variation=variation / 100, run_length=run_length)
+    model = read_model(model_file, library(effects))
+    stream = read_stream(state_file) if state_file else None
+    sources = read_sources(logs, card)
+    with OutputFolder("drift", out, now=datetime.now()) as folder:
+        with progress("testing", as_json=as_json):
+            found = tested(
+                model, model_key(model), sources, stream=stream, settings=settings, seed=seed
+            )
+        document = drift_document(found, str(model_file))
+        folder.write_json("drift.json", document)
+        folder.write_text("report.html", drift_report(found))
+    # After the results: a run that is ended between them is simply made again.
+    if state_file:
+        write_stream(state_file, found.stream)
+    emit({**document, "out": folder.final}, as_json, lambda: drift_view(found, folder.final))
+    return 0 if found.verdict == "none" else 1

@@ -1,0 +1,111 @@
+"""A drift test in words and tables, for a terminal and for its report."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from identification.drift_test import Shift, Statistic
+from workbench.drifting import Drifted, Tested
+from workbench.views import Row, table, written
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+RUN_HEAD = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
+SHIFT_HEAD = ("parameter", "before", "after", "unit", "change", "95 % interval")
+
+
+def sentence(found: Drifted) -> str:
+    """The verdict over all runs in one or two plain sentences."""
+    tests = [one.test for one in found.tests]
+    if found.verdict == "structure":
+        names = _files(found, "structure")
+        return (
+            f"Another structure: no parameters of the model follow {names}. This is no drift;"
+            " trace finds the effect that joined."
+        )
+    if found.verdict == "drift":
+        last = [test for test in tests if test.verdict == "drift"][-1]
+        changes = ", ".join(_changed(shift) for shift in last.moved)
+        return f"Drift in {_files(found, 'drift')}: {changes}; the structure holds."
+    if found.verdict == "not_judged":
+        return f"Not judged: {tests[0].reason}"
+    known = sum(test.verdict == "none" for test in tests)
+    margin = f"{100 * found.settings.margin:.3g} %"
+    return f"No drift in {known} of {len(tests)} log(s): no change surely beyond {margin}."
+
+
+def _files(found: Drifted, verdict: str) -> str:
+    names = [one.source.file for one in found.tests if one.test.verdict == verdict]
+    return ", ".join(dict.fromkeys(names))
+
+
+def _changed(shift: Shift) -> str:
+    return f"{shift.name} {percent(shift.change)} ({percent(shift.low)} to {percent(shift.high)})"
+
+
+def percent(value: float) -> str:
+    """A relative change in percent, with its sign."""
+    return f"{100 * value:+.2f} %" if abs(value) < 0.1 else f"{100 * value:+.1f} %"
+
+
+def run_rows(found: Drifted) -> list[Row]:
+    """Every run's verdict and statistics."""
+    return [_run_row(one) for one in found.tests]
+
+
+def _run_row(one: Tested) -> Row:
+    test = one.test
+    chi = "-" if test.chi_square is None else f"{test.chi_square:.3g} of {test.allowed:.3g}"
+    return (
+        one.source.file,
+        test.verdict.replace("_", " "),
+        _over(test.single),
+        _over(test.mean),
+        chi,
+        ", ".join(shift.name for shift in test.moved) or "-",
+    )
+
+
+def _over(found: Statistic | None) -> str:
+    return "-" if found is None else f"{found.value:.3g} of {found.threshold:.3g}"
+
+
+def shift_rows(one: Tested) -> list[Row]:
+    """Every parameter of a run before and after; those not judged with the reason."""
+    rows = [_shift_row(shift) for shift in one.test.shifts.values()]
+    rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
+    return rows
+
+
+def _shift_row(shift: Shift) -> Row:
+    interval = f"{percent(shift.low)} to {percent(shift.high)}"
+    before, after = f"{shift.before:.4g}", f"{shift.after:.4g}"
+    return (shift.name, before, after, shift.unit, percent(shift.change), interval)
+
+
+def notes(found: Drifted) -> list[str]:
+    """What to know of the tests: thresholds, runs not judged, remarks."""
+    setting = found.settings
+    out = [
+        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
+        f" sure: at most one false alarm in {setting.run_length:g} logs on average"
+    ]
+    for one in found.tests:
+        if one.test.reason:
+            out.append(one.test.reason)
+        if one.test.found_by == "mean":
+            out.append(f"{one.source.file}: found by the mean over the logs, not by this log alone")
+    return [*out, *found.remarks]
+
+
+def drift_view(found: Drifted, folder: Path) -> "Group":
+    """The verdict, every run, the parameters of the last one, for a terminal."""
+    from rich.console import Group, RenderableType
+
+    parts: list[RenderableType] = [sentence(found), table(RUN_HEAD, run_rows(found))]
+    rows = shift_rows(found.tests[-1])
+    if rows:
+        parts.append(table(SHIFT_HEAD, rows))
+    parts.extend(f"note: {line}" for line in notes(found))
+    parts.append(written(folder, "drift.json", "report.html"))
+    return Group(*parts)

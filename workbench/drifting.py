@@ -1,0 +1,248 @@
+"""A model in force and new runs -> drift tests, the state that is stored, and drift.json."""
+
+import hashlib
+import secrets
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from identification.drift_chart import DriftState
+from identification.drift_test import DriftTest, Settings, Shift, Statistic, Verdict, drift_test
+from identification.errors import BadModel
+from identification.in_force import InForce
+from identification.karnopp import NAMES
+from identification.plant import Motor
+from identification.result import Estimate
+from workbench.identifying import Source
+from workbench.model import Model, as_number, model_document, used, versions
+from workbench.output import BadOutput, dumps
+from workbench.reading import read_result
+from workbench.sources import Sources
+
+SCHEMA, STREAM = "drift/1", "drift_stream/1"
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A log that has been tested: its file, verdict, and the statistics over their thresholds."""
+
+    file: str
+    sha256: str
+    verdict: Verdict
+    single: float | None
+    mean: float | None
+
+
+@dataclass(frozen=True)
+class Stream:
+    """What `--state` holds: the chart's state, and the logs that it has taken in, in order."""
+
+    state: DriftState
+    seen: tuple[Seen, ...]
+    schema: Literal["drift_stream/1"] = "drift_stream/1"
+
+
+@dataclass(frozen=True)
+class Tested:
+    """One run's test; again: its file had been taken in before, so the state does not count it."""
+
+    source: Source
+    test: DriftTest
+    again: bool
+
+
+@dataclass(frozen=True)
+class Drifted:
+    """The tests of new runs against a model in force, and the stream after them."""
+
+    model: Model
+    key: str
+    settings: Settings
+    tests: tuple[Tested, ...]
+    stream: Stream
+    remarks: tuple[str, ...]
+
+    @property
+    def verdict(self) -> Verdict:
+        """The worst of the runs' verdicts; "not_judged" only where none could be judged."""
+        found = {one.test.verdict for one in self.tests}
+        order: tuple[Verdict, ...] = ("structure", "drift", "none", "not_judged")
+        return next(verdict for verdict in order if verdict in found)
+
+
+def model_key(model: Model) -> str:
+    """What names a model in a stored state: sha256 of what model.json says of it."""
+    return hashlib.sha256(dumps(model_document(model)).encode()).hexdigest()
+
+
+def model_in_force(model: Model, key: str) -> InForce:
+    """The model as the drift test takes it; key: names it in the stored state.
+
+    Without a correlation in the model file the parameters' errors count as independent.
+    """
+    every: dict[str, Estimate] = {name: model.friction[name] for name in NAMES}
+    if not isinstance(model.simulated.actuator, Motor):
+        every |= model.actuator or {}
+    for effect, found in model.effects.items():
+        every |= {f"{effect}.{name}": estimate for name, estimate in found.items()}
+    told = {n: e for n, e in every.items() if e.value is not None and e.sd is not None}
+    why = "it gives no standard deviation"
+    untold = {n: e.reason or why for n, e in every.items() if n not in told}
+    return InForce(
+        plant=model.simulated,
+        names=tuple(told),
+        values=np.array([used(e) for e in told.values()]),
+        covariance=_covariance(model, told),
+        rig=model.rig,
+        drive=model.fit.drive,
+        stiffness=model.fit.stiffness,
+        chi_square=model.fit.chi_square,
+        imposed=model.imposed,
+        untold=untold,
+        key=key,
+        fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),
+    )
+
+
+def _covariance(model: Model, told: Mapping[str, Estimate]) -> Any:
+    """Covariance (d, d) of the told parameters by their deviations and the model's correlation."""
+    sd = np.array([e.sd or 0.0 for e in told.values()])
+    together = np.eye(len(told))
+    if model.correlation is not None:
+        place = {name: i for i, name in enumerate(model.correlation.names)}
+        matrix = np.array(model.correlation.matrix)
+        at = [(i, place[name]) for i, name in enumerate(told) if name in place]
+        rows, columns = [i for i, _ in at], [k for _, k in at]
+        together[np.ix_(rows, rows)] = matrix[np.ix_(columns, columns)]
+    return together * np.outer(sd, sd)
+
+
+def tested(
+    model: Model, key: str, sources: Sources, *, stream: Stream | None = None,
+    settings: Settings | None = None, seed: int = 0,
+) -> Drifted:  # fmt: skip
+    """The runs tested one after the other against the model.
+
+    stream: of the same model, what was stored after earlier logs; one of another model is left
+    aside with a remark. Raises BadModel where model and card are not of one kind of machine.
+    """
+    settings = settings or Settings()
+    _same_machine(model, sources)
+    in_force = replace(model_in_force(model, key), rig=sources.rig)
+    remarks = list(sources.remarks)
+    if sources.card.name != model.card:
+        remarks.append(f"the model is of {model.card}, the logs of {sources.card.name}")
+    if stream is not None and stream.state.model != key:
+        remarks.append("the stored state is of another model; it begins anew with this one")
+        stream = None
+    before = {one.sha256 for one in stream.seen} if stream else set()
+    state = stream.state if stream else None
+    tests: list[Tested] = []
+    for source in sources.runs:
+        # A log's own stream, so that its verdict does not hang on the others of the command.
+        rng = np.random.default_rng([seed, int(source.sha256[:8], 16)])
+        found = drift_test(in_force, source.log, rng, state=state, settings=settings)
+        again = source.sha256 in before
+        if again:
+            remarks.append(f"{source.file}: taken in before; the state does not count it again")
+        state = state if again and state is not None else found.state
+        tests.append(Tested(source, found, again))
+    assert state is not None
+    seen = (*(stream.seen if stream else ()), *(_seen(one) for one in tests if not one.again))
+    return Drifted(model, key, settings, tuple(tests), Stream(state, seen), tuple(remarks))
+
+
+def _same_machine(model: Model, sources: Sources) -> None:
+    for name in ("motion", "kind"):
+        of_model, of_logs = getattr(model.rig, name), getattr(sources.rig, name)
+        if of_model != of_logs:
+            raise BadModel(
+                f"the model is of a rig with {name} {of_model!r}, the card {sources.card.name} says"
+                f" {of_logs!r}; give the model and the card of one machine"
+            )
+
+
+def _seen(one: Tested) -> Seen:
+    test = one.test
+    return Seen(
+        one.source.file, one.source.sha256, test.verdict, _ratio(test.single), _ratio(test.mean)
+    )
+
+
+def _ratio(found: Statistic | None) -> float | None:
+    return None if found is None else found.value / found.threshold
+
+
+def read_stream(path: Path) -> Stream | None:
+    """What `--state` stored at `path`, None where there is no file yet; raises BadModel."""
+    return read_result(path, Stream, STREAM) if path.exists() else None
+
+
+def write_stream(path: Path, stream: Stream) -> None:
+    """Store the stream, whole or not at all. Raises BadOutput where it cannot be written."""
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(dumps(stream) + "\n", encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise BadOutput(
+            f"--state {path}: cannot be written ({error.strerror}); name another file"
+        ) from None
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:
+    """The tests as drift.json holds them."""
+    return {
+        "schema": SCHEMA,
+        "card": found.model.card,
+        "model": {"file": model_file, "key": found.key},
+        "settings": asdict(found.settings),
+        "verdict": found.verdict,
+        "log": [_of_run(one) for one in found.tests],
+        "seen": [asdict(one) for one in found.stream.seen],
+        "remarks": list(found.remarks),
+        "versions": versions(),
+    }
+
+
+def _of_run(one: Tested) -> dict[str, Any]:
+    test, source = one.test, one.source
+    return {
+        "file": source.file,
+        "sha256": source.sha256,
+        "rows": source.rows,
+        "verdict": test.verdict,
+        "reason": test.reason,
+        "found_by": test.found_by,
+        "moved": [_number(shift) for shift in test.moved],
+        "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
+        "not_judged": dict(test.not_judged),
+        "single": _statistic(test.single),
+        "mean": _statistic(test.mean),
+        "chi_square": test.chi_square,
+        "chi_square_allowed": test.allowed,
+    }
+
+
+def _number(shift: Shift) -> dict[str, Any]:
+    """A parameter before, after, and its relative change, each as results carry a parameter."""
+    return {
+        "name": shift.name,
+        "before": as_number(_estimate(shift.before, shift.before_sd, shift.unit)),
+        "after": as_number(_estimate(shift.after, shift.after_sd, shift.unit)),
+        "change": as_number(Estimate(shift.change, "1", shift.sd, shift.low, shift.high)),
+    }
+
+
+def _estimate(value: float, sd: float, unit: str) -> Estimate:
+    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
+
+
+def _statistic(found: Statistic | None) -> dict[str, Any] | None:
+    return None if found is None else asdict(found)
