@@ -175,7 +175,7 @@ def judged(
         np.full(len(at), settings.margin),
     )  # fmt: skip
     single = _statistic(here, float(chi2.isf(0.5 / settings.run_length, len(at))))
-    after = taken_in(state, change, own, told, settings.smoothing, varied, steady=not single.alarm)
+    after = taken_in(state, change, own, told, settings.smoothing, varied)
     over = mean_change(after, in_force, settings.margin)
     mean = _statistic(over, limit(len(over.at), settings.smoothing, 2.0 * settings.run_length))
     by: FoundBy | None = "log" if single.alarm else ("mean" if mean.alarm else None)
