@@ -51,7 +51,7 @@ class Settings:
     run_length: float = 1000.0
     smoothing: float = 0.2
     variation: float = 0.01
-    widest: float = 0.1
+    widest: float = 0.25
 
     def __post_init__(self) -> None:
         for name, value in (("margin", self.margin), ("variation", self.variation)):

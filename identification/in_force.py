@@ -13,6 +13,7 @@ from identification.result import Drive, KarnoppFit
 
 VISCOUS = ("F_vp", "F_vn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
+LEAST_EFFECT = 0.1  # of an effect's typical parameter, below which one is small
 LEAST_FORCE = 0.1  # of the largest friction force, below which a force is small
 
 
@@ -64,7 +65,18 @@ class InForce:
                 size[i] = max(size[i], LEAST_FORCE * largest)
             if name in VISCOUS and self.fastest > 0:
                 size[i] = max(size[i], LEAST_FORCE * largest / self.fastest)
+            if "." in name:
+                size[i] = max(size[i], self._least_of_effect(name))
         return np.where(size > 0, size, 1.0)
+
+    def _least_of_effect(self, name: str) -> float:
+        """Size below which an effect's parameter is small; an asymmetry is a share by itself."""
+        key, _, own = name.partition(".")
+        if own == "asymmetry":
+            return 1.0
+        effect = next(acting.effect for acting in self.plant.effects if acting.key == key)
+        param = next(p for p in effect.params if p.name == own)
+        return LEAST_EFFECT * abs(param.typical)
 
     @property
     def units(self) -> Mapping[str, str]:

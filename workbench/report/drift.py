@@ -75,7 +75,7 @@ def _changes(axes: "Axes", found: Drifted, last: Tested) -> None:
         )  # fmt: skip
     axes.set_yticks(place, [shift.name for shift in shifts])
     axes.invert_yaxis()
-    axes.legend(loc="best")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     label(axes, "change from the model in force [%]", "", last.source.file)
 
 
@@ -98,7 +98,7 @@ def _over_logs(axes: "Axes", found: Drifted) -> None:
     axes.set_yscale("symlog", linthresh=LINEAR)
     axes.set_ylim(bottom=-0.05)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(loc="best")
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
     label(axes, "log since the model was put in force", "statistic over its threshold")
 
 
