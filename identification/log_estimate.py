@@ -13,6 +13,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.box import Box
+from identification.climb import ATTEMPTS as CLIMBS
+from identification.climb import climb
 from identification.experiment import total_cost
 from identification.identifiability import estimates, events_of
 from identification.imposed import fit_imposed
@@ -22,7 +24,7 @@ from identification.log import Log
 from identification.objective import START_V, START_Y
 from identification.output_error import searched_plant
 from identification.plant import Actuator, Plant
-from identification.problem import Problem, pose, simulated
+from identification.problem import ADEQUATE, Problem, pose, simulated
 from identification.refine import Optimum, refine, robust_covariance
 from identification.residual_tests import effective_samples
 from identification.search import evolve
@@ -30,13 +32,13 @@ from identification.stepping import K2, kernel_parameters
 from identification.stretches import stretches
 from identification.weighing import BETWEEN, OUTLIER, ROUGH, STRETCHES
 
-SEARCHES = 1  # global searches of a log that no local fit follows
 PIECES = (4.0, 1.5)  # s; stretches in which a log is followed that is not followed as a whole
 LOST = 0.1  # of the stretches, at least one, that may be spoiled by a lost stop
 CLOSE = 0.1  # relative range of a search close by
 POPULATION, GENERATIONS = 64, 60
-MISFIT = 3.0  # chi-square from which a log is not followed; a stop lost here or there leaves less
+MISFIT = 2.0  # chi-square from which a log is not followed; a stop lost here or there leaves less
 LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
+STIFF = 10.0  # of a body's rate times the sampling period
 DRAWN = 512
 
 
@@ -84,15 +86,16 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     """
     drive = None if model.rig.kind == "motor" else model.drive
     problem = pose([log], model.rig, drive)
-    if model.imposed:
+    if model.imposed or _stiff(model, log.h):
         return _imposed(model, problem, rng)
     allowed = MISFIT if model.chi_square <= problem.adequate else LIKE * model.chi_square
+    enough = allowed * ADEQUATE / MISFIT
     best: _Fit | None = None
     searched = False
     for found, by_search in _fits(model, problem, rng):
         if best is None or found.chi_square < best.chi_square:
             best, searched = found, by_search
-        if best.chi_square <= allowed:
+        if best.chi_square <= enough:
             break
     assert best is not None
     return _told(best, allowed, searched, rng)
@@ -120,11 +123,10 @@ def _fits(
             yield _in_pieces(problem, best.optimum.p, seconds), False
     for row in (rows[0], rows[3]):
         yield _near_by(problem, row, rng), True
-    for _ in range(SEARCHES):
-        plant = searched_plant(problem.logs, rng, rig=model.rig, drive=model.drive)
-        near, whole = _local(problem, _row(model, problem, plant))
-        yield whole, True
-        yield _in_pieces(problem, near.optimum.p, PIECES[-1]), True
+    row = _searched(model, problem, rng)
+    near, whole = _local(problem, row)
+    yield whole, True
+    yield _in_pieces(problem, near.optimum.p, PIECES[-1]), True
 
 
 def _row(model: InForce, problem: Problem, plant: Plant) -> Array:
@@ -194,6 +196,18 @@ def _near_by(problem: Problem, row: Array, rng: np.random.Generator) -> _Fit:
     return min((whole, pieces), key=lambda one: one.chi_square)
 
 
+def _searched(model: InForce, problem: Problem, rng: np.random.Generator) -> Array:
+    """Kernel parameters (11,) of a global search."""
+    if not problem.hold:
+        plant = searched_plant(problem.logs, rng, rig=model.rig, drive=model.drive)
+        return _row(model, problem, plant)
+
+    def quiet(_stage: str, _share: float) -> None:
+        pass
+
+    return climb(problem, rng, quiet, CLIMBS[:1]).optimum.p
+
+
 def _opened(problem: Problem) -> Problem:
     """The problem of a motor with each run's first position and velocity unknown."""
     runs = tuple(
@@ -252,11 +266,22 @@ def _bounded(found: _Fit, scattered: Array, plain: Array) -> Array:
     return np.asarray(scattered * np.outer(ratio, ratio))
 
 
+def _stiff(model: InForce, h: float) -> bool:
+    """Whether the model's body settles within a sample, so that it follows the force anyway.
+
+    Its free run would take many steps a sample, and tell no more than the force equation.
+    """
+    p = model.plant.friction
+    rate = max(p.F_vp, p.F_vn) / p.m + float(np.sqrt(model.stiffness / p.m))
+    return rate * h > STIFF
+
+
 def _imposed(model: InForce, problem: Problem, rng: np.random.Generator) -> LogEstimate:
     """Sliding friction of a body led along a path, from the force equation."""
     fit = fit_imposed(problem, rng, model.rig, "as the model in force")
     every = fit.friction
     values = np.array([float(getattr(every, name)) for name in fit.free])
     untold = {n: e.reason or "" for n, e in fit.estimates.items() if e.value is None}
-    allowed = LIKE * max(model.chi_square, 1.0)
+    # What a free run left is no measure of what the force equation leaves.
+    allowed = LIKE * max(model.chi_square, 1.0) if model.imposed else np.inf
     return LogEstimate(fit.free, values, fit.covariance, untold, fit.chi_square, allowed, False)

@@ -1,0 +1,162 @@
+"""Drift test of a log: none, drift with its parameters, another structure, not judged."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.drift_chart import fresh_state
+from identification.drift_test import DriftTest, Settings, drift_test, judged
+from identification.errors import BadSpecification
+from identification.in_force import InForce, in_force
+from identification.karnopp import Karnopp
+from identification.library import built_in
+from identification.log import Log, Rig
+from identification.log_estimate import LogEstimate
+from identification.output_error import fit_karnopp
+from identification.plant import Plant
+from identification.simulate import free_run
+from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
+
+FORCE = Rig("force")
+NINE = table(2)
+
+
+@cache
+def model() -> InForce:
+    fit = fit_karnopp([made_log(NINE, seed=1)], np.random.default_rng(1), rig=FORCE)
+    return in_force(fit, FORCE, key="first", fastest=0.2)
+
+
+def tested(log: Log, last: DriftTest | None = None) -> DriftTest:
+    return drift_test(model(), log, np.random.default_rng(2), state=last.state if last else None)
+
+
+def scaled(factor: float, *names: str) -> Karnopp:
+    return replace(NINE, **{name: factor * getattr(NINE, name) for name in names})
+
+
+def with_spring(k: float) -> Log:
+    log = made_log(NINE, seed=4)
+    plant = Plant(NINE, ACTUATOR, (built_in()["spring"].acting({"k": k}),))
+    run = free_run(plant, log, (0.0, 0.0, 0.0), "command")
+    rng = np.random.default_rng(5)
+    y = run.y + NOISE_Y * rng.standard_normal(len(log))
+    return log.with_signals(y=y, F=run.F + NOISE_F * rng.standard_normal(len(log)))
+
+
+def test_the_same_machine_on_another_day_shows_no_drift() -> None:
+    found = tested(made_log(NINE, seed=2))
+    assert found.verdict == "none"
+    assert found.moved == ()
+    assert len(found.shifts) == 11
+    assert found.single is not None and found.single.value == 0.0
+    assert found.chi_square == pytest.approx(1.0, abs=0.2)
+    assert found.state.logs == 1
+
+
+def test_table_2_to_table_3_is_found_from_one_log() -> None:
+    found = tested(made_log(table(3), seed=3))
+    assert found.verdict == "drift"
+    assert found.found_by == "log"
+    assert {shift.name for shift in found.moved} == set(Karnopp.__dataclass_fields__)
+    for shift in found.moved:
+        truth = getattr(table(3), shift.name)
+        assert shift.after == pytest.approx(truth, rel=0.01)
+        assert shift.low < truth / getattr(NINE, shift.name) - 1.0 < shift.high
+    # A jump that is repaired leaves nothing behind.
+    assert found.state.logs == 0
+
+
+def test_a_change_within_the_margin_is_no_drift_however_sure() -> None:
+    sure = Settings(variation=0.0)
+    log = made_log(scaled(1.015, "F_cp", "F_cn"), seed=6)
+    found = drift_test(model(), log, np.random.default_rng(2), settings=sure)
+    assert found.verdict == "none"
+    assert found.shifts["F_cp"].change == pytest.approx(0.015, abs=2e-3)
+    strict = drift_test(
+        model(), log, np.random.default_rng(2), settings=replace(sure, margin=0.005)
+    )
+    assert strict.verdict == "drift"
+    assert {shift.name for shift in strict.moved} == {"F_cp", "F_cn"}
+
+
+@pytest.mark.parametrize("names", [("F_cp", "F_cn"), ("m",)])
+def test_a_drift_of_two_percent_a_log_is_found_within_five(names: tuple[str, ...]) -> None:
+    last: DriftTest | None = None
+    for k in range(1, 6):
+        last = tested(made_log(scaled(1.0 + 0.02 * k, *names), seed=10 + k), last)
+        if last.verdict == "drift":
+            break
+    assert last is not None and last.verdict == "drift"
+    assert {shift.name for shift in last.moved} == set(names)
+
+
+def test_a_spring_that_joined_is_another_structure() -> None:
+    found = tested(with_spring(500.0))
+    assert found.verdict == "structure"
+    assert "trace" in found.reason
+    assert found.state.logs == 0
+
+
+def test_a_log_that_stands_still_is_not_judged() -> None:
+    rng = np.random.default_rng(1)
+    log = made_log(NINE, seed=2, seconds=4.0)
+    still = log.with_signals(y=NOISE_Y * rng.standard_normal(len(log)))
+    found = tested(still)
+    assert found.verdict == "not_judged"
+    assert "no motion" in found.reason
+
+
+def test_what_a_log_does_not_show_is_not_judged() -> None:
+    t: Array = 1e-3 * np.arange(6000)
+    one_way = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0.0) + 0.003
+    found = tested(made_log(NINE, seed=8, u=np.asarray(one_way)))
+    assert {"F_cn", "F_vn", "dv_n", "F_sn"} <= set(found.not_judged)
+    assert "negative direction" in found.not_judged["F_sn"]
+    assert "F_vp" in found.shifts
+
+
+def test_a_state_of_another_model_begins_anew() -> None:
+    last = tested(made_log(NINE, seed=2))
+    other = replace(model(), key="second")
+    found = drift_test(other, made_log(NINE, seed=3), np.random.default_rng(2), state=last.state)
+    assert found.state.model == "second"
+    assert found.state.logs == 1
+
+
+def two(correlation: float) -> tuple[InForce, LogEstimate]:
+    """A model and a log in which m and F_vp both look larger, their errors going together."""
+    sd = np.array([0.05 * NINE.m, 0.05 * NINE.F_vp])
+    together = np.array([[1.0, correlation], [correlation, 1.0]]) * np.outer(sd, sd)
+    values = np.array([NINE.m, NINE.F_vp])
+    known = InForce(
+        Plant(NINE, ACTUATOR), ("m", "F_vp"), values, 1e-6 * np.diag(sd**2), FORCE, "command"
+    )
+    return known, LogEstimate(("m", "F_vp"), 1.45 * values, together, {}, 1.0, 2.0, False)
+
+
+def test_errors_that_go_together_name_one_parameter_and_not_both() -> None:
+    settings = Settings(variation=0.001)
+    for correlation, count in ((0.98, 1), (0.0, 2)):
+        known, log = two(correlation)
+        found = judged(known, log, "log", fresh_state("", known.names), settings)
+        assert found.verdict == "drift"
+        assert len(found.moved) == count
+
+
+def test_the_models_own_error_counts() -> None:
+    known, log = two(0.0)
+    unsure = replace(known, covariance=np.diag((0.2 * known.values) ** 2))
+    found = judged(unsure, log, "log", fresh_state("", known.names), Settings())
+    assert found.verdict == "none"
+
+
+@pytest.mark.parametrize(
+    "wrong", [{"margin": -0.1}, {"variation": 1.0}, {"run_length": 3.0}, {"smoothing": 0.0}]
+)
+def test_wrong_settings_are_refused(wrong: dict[str, float]) -> None:
+    with pytest.raises(BadSpecification, match=next(iter(wrong))):
+        Settings(**wrong)
