@@ -120,7 +120,7 @@ def _covariance(model: Model, told: Mapping[str, Estimate]) -> Any:
     return together * np.outer(sd, sd)
 
 
-def tested(
+def drift_of(
     model: Model, key: str, sources: Sources, *, stream: Stream | None = None,
     settings: Settings | None = None, seed: int = 0,
 ) -> Drifted:  # fmt: skip

@@ -31,10 +31,17 @@ def test_a_free_parameter_takes_its_change_and_what_goes_with_it() -> None:
     )
 
 
-def test_of_two_that_go_together_one_explains_both() -> None:
-    change = np.array([0.1, 0.075])
-    assert len(moved(change, TOGETHER, MARGIN)) == 1
-    assert moved(change, np.diag(np.diag(TOGETHER)), MARGIN) == (0, 1)
+def test_errors_that_go_together_make_a_common_change_less_sure_and_a_contrary_one_surer() -> None:
+    alone = np.diag(np.diag(TOGETHER))
+    same, contrary = np.array([0.055, 0.055]), np.array([0.055, -0.055])
+    assert beyond(same, TOGETHER, MARGIN).square < 0.6 * beyond(same, alone, MARGIN).square
+    assert beyond(contrary, TOGETHER, MARGIN).square > 10 * beyond(contrary, alone, MARGIN).square
+
+
+def test_the_fewest_that_explain_a_change_are_named() -> None:
+    # The second lies 2.5 deviations beyond its margin, by the error that it shares with the first.
+    assert moved(np.array([0.1, 0.045]), TOGETHER, MARGIN) == (0,)
+    assert moved(np.array([0.1, 0.08]), TOGETHER, MARGIN) == (0, 1)
 
 
 def test_the_size_is_that_with_the_others_in_the_margin() -> None:

@@ -67,7 +67,7 @@ def command(
     """
     from identification.drift_test import Settings
     from workbench.drift_views import drift_view
-    from workbench.drifting import drift_document, model_key, read_stream, tested, write_stream
+    from workbench.drifting import drift_document, drift_of, model_key, read_stream, write_stream
     from workbench.model import read_model
     from workbench.own_effects import library
     from workbench.report.drift import drift_report
@@ -79,7 +79,7 @@ def command(
     sources = read_sources(logs, card)
     with OutputFolder("drift", out, now=datetime.now()) as folder:
         with progress("testing", as_json=as_json):
-            found = tested(
+            found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed
             )
         document = drift_document(found, str(model_file))

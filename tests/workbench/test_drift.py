@@ -1,0 +1,188 @@
+"""The drift command and what lies behind it: model in force, stored stream, report, refusals."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from identification.errors import BadModel
+from identification.karnopp import NAMES
+from tests.chain import CARD, TABLES, identified, model_of
+from workbench.cli import main
+from workbench.drifting import model_in_force, model_key, read_stream
+from workbench.model import Correlation, model_document, read_model
+from workbench.output import dumps
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a card, three logs of one machine, one of it changed, and the first's model."""
+    folder = tmp_path_factory.mktemp("shop")
+    (folder / "card.toml").write_text(CARD, encoding="utf-8")
+    changed = CARD.replace("F_cp = 12.0", "F_cp = 15.0")
+    (folder / "changed.toml").write_text(changed, encoding="utf-8")
+    for card, seed, name in (("card", 5, "a"), ("card", 6, "b"), ("changed", 7, "c")):
+        arguments = ["simulate", str(folder / f"{card}.toml"), "--seed", str(seed)]
+        assert main([*arguments, "--out", str(folder / "made")]) == 0
+        (folder / "made/short.csv").rename(folder / f"{name}.csv")
+    identify = ["identify", str(folder / "a.csv"), "--card", str(folder / "card.toml")]
+    assert main([*identify, "--out", str(folder / "model")]) == 0
+    return folder
+
+
+def run(shop: Path, out: Path, logs: str, *more: str) -> int:
+    named = [str(shop / f"{name}.csv") for name in logs]
+    model, card = str(shop / "model/model.json"), str(shop / "card.toml")
+    return main(["drift", model, *named, "--card", card, "--out", str(out), *more])
+
+
+def test_no_drift_is_status_0_and_a_report(shop: Path, tmp_path: Path) -> None:
+    assert run(shop, tmp_path / "d", "b") == 0
+    found = json.loads((tmp_path / "d/drift.json").read_text(encoding="utf-8"))
+    assert found["verdict"] == "none"
+    (log,) = found["log"]
+    assert set(NAMES) <= set(log["parameters"])
+    after = log["parameters"]["F_cp"]["after"]
+    assert after["low"] < 12.0 < after["high"]
+    assert set(after) == {"value", "unit", "sd", "low", "high"}
+    report = (tmp_path / "d/report.html").read_text(encoding="utf-8")
+    assert "<svg" in report and "No drift" in report
+
+
+def test_drift_is_status_1_and_names_the_parameter(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "bc", "--json") == 1
+    found = json.loads(capsys.readouterr().out)
+    assert [log["verdict"] for log in found["log"]] == ["none", "drift"]
+    (moved,) = found["log"][1]["moved"]
+    assert moved["name"] == "F_cp"
+    assert moved["change"]["low"] < 0.25 < moved["change"]["high"]
+
+
+def test_the_state_carries_the_test_and_counts_no_log_twice(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    state = tmp_path / "state.json"
+    assert run(shop, tmp_path / "d", "a", "--state", str(state)) == 0
+    assert run(shop, tmp_path / "d", "b", "--state", str(state)) == 0
+    once = state.read_text(encoding="utf-8")
+    stream = read_stream(state)
+    assert stream is not None
+    assert [one.file for one in stream.seen] == ["a.csv", "b.csv"]
+    assert stream.state.logs == 2
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "b", "--state", str(state)) == 0
+    assert "taken in before" in " ".join(capsys.readouterr().out.split())
+    assert state.read_text(encoding="utf-8") == once
+    assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
+
+
+def test_a_verdict_does_not_hang_on_the_command_it_came_in(shop: Path, tmp_path: Path) -> None:
+    assert run(shop, tmp_path / "one", "b") == 0
+    assert run(shop, tmp_path / "two", "ab") == 0
+    one = json.loads((tmp_path / "one/drift.json").read_text(encoding="utf-8"))
+    two = json.loads((tmp_path / "two/drift.json").read_text(encoding="utf-8"))
+    alone, second = one["log"][0], two["log"][1]
+    assert alone["chi_square"] == second["chi_square"]
+    for name, shift in alone["parameters"].items():
+        assert shift["after"]["value"] == second["parameters"][name]["after"]["value"]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "is not JSON"),
+        ('{"schema": "model/1"}', "'drift_stream/1' needed"),
+        ('{"schema": "drift_stream/1", "seen": [], "state": {"model": "x"}}', "has no 'names'"),
+    ],
+)
+def test_a_bad_state_is_one_line_and_status_2(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], text: str, said: str
+) -> None:
+    state = tmp_path / "state.json"
+    state.write_text(text, encoding="utf-8")
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "b", "--state", str(state)) == 2
+    shown = capsys.readouterr()
+    assert shown.out == "" and len(shown.err.splitlines()) == 1
+    assert said in shown.err
+    assert state.read_text(encoding="utf-8") == text
+    assert not (tmp_path / "d").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--margin", "120"], "margin"),
+        (["--run-length", "2"], "run_length"),
+        (["--state", "."], "is a directory"),
+    ],
+)
+def test_wrong_options_are_one_line_and_status_2(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "b", *arguments) == 2
+    shown = capsys.readouterr()
+    assert len(shown.err.splitlines()) == 1 and said in shown.err
+
+
+def test_a_state_of_another_model_is_said_and_left_aside(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    state = tmp_path / "state.json"
+    assert run(shop, tmp_path / "d", "a", "--state", str(state)) == 0
+    document = json.loads(state.read_text(encoding="utf-8"))
+    document["state"]["model"] = "another"
+    state.write_text(dumps(document), encoding="utf-8")
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "b", "--state", str(state)) == 0
+    assert "of another model" in " ".join(capsys.readouterr().out.split())
+    stream = read_stream(state)
+    assert stream is not None and stream.state.logs == 1
+
+
+def test_a_model_of_another_kind_of_rig_is_refused(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    motor = tmp_path / "motor.json"
+    model = model_of(TABLES["paper_table2"], k_a=20.0)
+    motor.write_text(dumps(model_document(model)), encoding="utf-8")
+    capsys.readouterr()
+    arguments = ["drift", str(motor), str(shop / "b.csv"), "--card", str(shop / "card.toml")]
+    assert main([*arguments, "--out", str(tmp_path / "d")]) == 2
+    assert "give the model and the card of one machine" in capsys.readouterr().err
+
+
+def test_the_model_file_keeps_the_covariance_of_the_fit(tmp_path: Path) -> None:
+    found = identified()
+    path = tmp_path / "model.json"
+    path.write_text(dumps(model_document(found.model)), encoding="utf-8")
+    model = read_model(path)
+    known = model_in_force(model, model_key(model))
+    assert known.names == found.fit.free
+    off = found.fit.covariance[0, 1] / np.sqrt(
+        found.fit.covariance[0, 0] * found.fit.covariance[1, 1]
+    )
+    mine = known.covariance[0, 1] / np.sqrt(known.covariance[0, 0] * known.covariance[1, 1])
+    assert abs(off) > 0.01
+    assert mine == pytest.approx(off)
+    assert model_key(model) == model_key(found.model)
+    assert known.fastest > 0.05
+
+
+def test_an_older_model_file_without_a_correlation_is_read() -> None:
+    model = replace(identified().model, correlation=None)
+    known = model_in_force(model, "k")
+    assert known.covariance == pytest.approx(np.diag(np.diag(known.covariance)))
+
+
+def test_a_correlation_that_is_none_is_refused() -> None:
+    with pytest.raises(BadModel, match="square"):
+        Correlation(("m", "F_cp"), ((1.0,), (1.0,)))
+    with pytest.raises(BadModel, match="-1 to 1"):
+        Correlation(("m", "F_cp"), ((1.0, 2.0), (2.0, 1.0)))
