@@ -10,7 +10,8 @@ with other references. In every second stream each friction parameter varies fro
 standard deviation of 1 % by itself, which is no drift. Seeds below 9000 served to choose.
 
 stable: logs without drift; the mean run length up to an alarm (any verdict but "none"), with its
-95 % interval (Poisson). jump: one log after a change of table. slow: 2 % a log of a parameter.
+95 % interval (Poisson). jump: one log after a change of table, or
+of the friction by 20 and 50 %. slow: 2 % a log of a parameter.
 structure: an effect of 20 % of the Coulomb level joins. length: the same change in logs of 20, 60
 and 200 s.
 """
@@ -27,7 +28,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from benchmarks.blind_effects import SIZES, acting, place_of, shows
-from benchmarks.blind_machines import MACHINES, Machine, machine, simulated, stream
+from benchmarks.blind_machines import MACHINES, Machine, drifted, machine, simulated, stream
 from identification.drift_test import DriftTest, drift_test
 from identification.effects._base import Acting
 from identification.errors import BadModel, UserError
@@ -44,6 +45,7 @@ VARIATION = 0.01
 STRENGTH = 0.2
 RATE = 0.02
 MOST = 15  # logs of a slow drift
+JUMPS = (0.2, 0.5)  # of stick and Coulomb friction; viscous by half of it the other way
 TABLES = ("table1", "table2", "table3")
 SLOW = {
     "F_cp and F_cn": ("F_cp", "F_cn"),
@@ -130,14 +132,17 @@ def stable(name: str, seed: int, logs: int) -> list[Outcome]:
 
 
 def jump(name: str, seed: int) -> list[Outcome]:
-    """One log of 40 s after the machine has become that of another table."""
+    """One log of 40 s after the machine has become that of another table, or has changed a lot."""
     one = machine(name, seed)
     model = put_in_force(one, seed)
+    rng = stream(seed, name, "jump")
+    after = {f"{name} -> {o}": machine(o, seed).friction for o in TABLES if o != name}
+    if name not in TABLES:
+        after = {f"friction by {100 * s:.0f} %": drifted(one.friction, s, rng) for s in JUMPS}
     out = []
-    for other in TABLES:
-        if other != name:
-            log = simulated(one, (), seed, "jump", MODEL, machine(other, seed).friction).log
-            out.append(tested(model, one, log, seed, f"{name} -> {other}", 1, None)[0])
+    for what, friction in after.items():
+        log = simulated(one, (), seed, "jump", MODEL, friction).log
+        out.append(tested(model, one, log, seed, what, 1, None)[0])
     return out
 
 
@@ -270,10 +275,9 @@ def main() -> None:
     asked = parser.parse_args()
     names = asked.machines.split(",")
     for part in asked.parts:
-        mine = [n for n in names if part != "jump" or n in TABLES]
         jobs = [
-            (part, mine[i % len(mine)], asked.first + i // len(mine), asked.logs)
-            for i in range(asked.streams if mine else 0)
+            (part, names[i % len(names)], asked.first + i // len(names), asked.logs)
+            for i in range(asked.streams)
         ]
         if asked.jobs == 1:
             found = [o for job in jobs for o in run(job)]
