@@ -19,7 +19,8 @@ from identification.errors import BadModel
 from identification.margin import Distance, beyond
 
 RINGS = 60  # states of the Markov chain
-PRIOR_LOGS = 4.0  # logs that the stated variation counts as beside those seen
+CAUTION = 2.0  # deviations by which a learnt variance is taken larger
+PRIOR_LOGS = 10.0  # logs that the stated variation counts as beside those seen
 LEAST_VARIATION = 0.002  # relative sd below which a machine is not believed to repeat itself
 Rows = tuple[tuple[float, ...], ...]
 
@@ -71,7 +72,10 @@ def variation(state: DriftState, stated: float) -> Array:
     that were seen. Differences of neighbours hold little of a slow drift.
     """
     squares, pairs = np.array(state.squares), np.array(state.pairs, dtype=np.float64)
-    found = (PRIOR_LOGS * stated**2 + squares) / (PRIOR_LOGS + pairs)
+    weight = PRIOR_LOGS + pairs
+    found = (PRIOR_LOGS * stated**2 + squares) / weight
+    # What is learnt from a few logs errs, and too small a variance is what alarms for nothing.
+    found *= 1.0 + CAUTION * np.sqrt(3.0 * pairs) / weight
     return np.asarray(np.maximum(found, LEAST_VARIATION**2))
 
 
