@@ -88,7 +88,7 @@ def notes(found: Drifted) -> list[str]:
     setting = found.settings
     out = [
         f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
-        f" sure: thresholds for one false alarm in {setting.run_length:g} logs at most",
+        f" sure: thresholds for a false alarm in {setting.run_length:g} logs or more",
         "the intervals hold the errors of the model and of the log, and how much the machine varies"
         f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
     ]
