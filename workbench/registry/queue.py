@@ -20,7 +20,7 @@ from workbench.registry.database import Database
 from workbench.registry.errors import LostClaim
 from workbench.registry.rows import add_version, decide, lock_machine, version_in_force
 from workbench.registry.tables import AttemptRow, ClaimRow, LogRow, OutcomeRow, VersionRow
-from workbench.registry.values import Claim, Judgement, Outcome, SeenLog
+from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Version
 
 
 class Queue:
@@ -146,6 +146,26 @@ class Queue:
             session.add(done)
             session.flush()
             return _outcome(session, row, done)
+
+    def last_evidence(self, version: Version) -> dict[str, Any] | None:
+        """Evidence of the latest result against this version; None where there is none yet."""
+        query = (
+            select(OutcomeRow.evidence)
+            .join(VersionRow, VersionRow.id == OutcomeRow.version_id)
+            .where(
+                VersionRow.machine == version.machine,
+                VersionRow.number == version.number,
+                OutcomeRow.verdict != "set_aside",
+            )
+            .order_by(OutcomeRow.at.desc(), OutcomeRow.log_id.desc())
+            .limit(1)
+        )
+        with self._database.reading() as session:
+            text = session.scalar(query)
+        if text is None:
+            return None
+        found: dict[str, Any] = json.loads(text)
+        return found
 
     def outcomes(self, machine: str) -> tuple[Outcome, ...]:
         """Results of a machine's logs, in the order of their files."""
