@@ -19,8 +19,15 @@ from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import LostClaim
 from workbench.registry.rows import add_version, decide, lock_machine, version_in_force
-from workbench.registry.tables import AttemptRow, ClaimRow, LogRow, OutcomeRow, VersionRow
-from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Version
+from workbench.registry.tables import (
+    AttemptRow,
+    ClaimRow,
+    LogRow,
+    NoticeRow,
+    OutcomeRow,
+    VersionRow,
+)
+from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Verdict, Version
 
 
 class Queue:
@@ -177,6 +184,40 @@ class Queue:
         )
         with self._database.reading() as session:
             return tuple(_outcome(session, row, done) for row, done in session.execute(query))
+
+    def unsent(self, verdicts: Sequence[Verdict], *, since: datetime) -> tuple[Outcome, ...]:
+        """Results of these verdicts from `since` on that no webhook has taken, oldest first."""
+        query = (
+            select(LogRow, OutcomeRow)
+            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+            .outerjoin(NoticeRow, NoticeRow.log_id == LogRow.id)
+            .where(
+                OutcomeRow.verdict.in_(verdicts),
+                OutcomeRow.at >= since,
+                NoticeRow.log_id.is_(None),
+            )
+            .order_by(OutcomeRow.at, LogRow.id)
+        )
+        with self._database.reading() as session:
+            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
+
+    def sent(self, outcome: Outcome, *, now: datetime) -> None:
+        """Note that a webhook has taken the alarm; nothing where it is noted already."""
+        with self._database.writing() as session:
+            lock_machine(session, outcome.machine, now)
+            row = _log(session, outcome.machine, outcome.log)
+            if session.get(NoticeRow, row.id) is None:
+                session.add(NoticeRow(log_id=row.id, at=now))
+
+    def verdicts(self) -> dict[tuple[str, str], int]:
+        """How many logs have each verdict, by machine and verdict."""
+        query = (
+            select(LogRow.machine, OutcomeRow.verdict, func.count())
+            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+            .group_by(LogRow.machine, OutcomeRow.verdict)
+        )
+        with self._database.reading() as session:
+            return {(name, verdict): count for name, verdict, count in session.execute(query)}
 
 
 def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:

@@ -17,7 +17,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-APPEND_ONLY = ("machine", "log", "record", "version", "decision", "attempt", "outcome")
+APPEND_ONLY = ("machine", "log", "record", "version", "decision", "attempt", "outcome", "notice")
 NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -182,3 +182,11 @@ class OutcomeRow(Base):
             name="verdict",
         ),
     )
+
+
+class NoticeRow(Base):
+    """The alarm of a log has been taken by the webhook."""
+
+    __tablename__ = "notice"
+    log_id: Mapped[int] = mapped_column(ForeignKey("outcome.log_id"), primary_key=True)
+    at: Mapped[datetime]

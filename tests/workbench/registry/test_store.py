@@ -7,6 +7,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from workbench.registry.errors import BadRegistry
+from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import APPEND_ONLY, Base
 from workbench.registry.values import Candidate, Judgement, SeenLog
@@ -86,8 +87,6 @@ def test_what_is_not_there_is_refused(registry: Registry) -> None:
 
 def filled(registry: Registry) -> None:
     """A row in every table."""
-    from workbench.registry.queue import Queue
-
     add(registry, "a", 1.0, 2.0)
     registry.promote("a", 1, now=NOW, **WHO)
     registry.promote("a", 2, now=NOW, **WHO)
@@ -97,10 +96,10 @@ def filled(registry: Registry) -> None:
     claim = queue.claim("a", owner="w", lease=timedelta(minutes=1), now=NOW)
     assert claim is not None
     queue.begin(claim, log, now=NOW)
-    queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW)
+    queue.sent(queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW), now=NOW)
 
 
-KEY = {"machine": "name", "outcome": "log_id"}
+KEY = {"machine": "name", "outcome": "log_id", "notice": "log_id"}
 
 
 @pytest.mark.parametrize("table", APPEND_ONLY)

@@ -21,6 +21,7 @@ KEYS = {  # what a replaced row would collide with; SQLite's REPLACE calls no DE
     "decision": ("o.id = NEW.id",),
     "attempt": ("o.id = NEW.id",),
     "outcome": ("o.log_id = NEW.log_id",),
+    "notice": ("o.log_id = NEW.log_id",),
 }
 POSTGRES_FUNCTIONS = (
     """CREATE FUNCTION registry_append_only() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN
@@ -183,6 +184,13 @@ def _jobs() -> None:
             "verdict IN ('none', 'not_judged', 'structure', 'promoted', 'refused', 'set_aside')",
             name=op.f("ck_outcome_verdict"),
         ),
+    )
+    op.create_table(
+        "notice",
+        sa.Column("log_id", sa.Integer(), autoincrement=False, nullable=False),
+        sa.Column("at", UtcTime(), nullable=False),
+        sa.PrimaryKeyConstraint("log_id", name="pk_notice"),
+        sa.ForeignKeyConstraint(["log_id"], ["outcome.log_id"], name="fk_notice_log_id"),
     )
 
 
