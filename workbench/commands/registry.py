@@ -202,6 +202,34 @@ def rollback(machine: str, reason: str, by: str | None, where: str | None, as_js
     emit(decision, as_json, lambda: _said(decision))
 
 
+@command.command(epilog="Example: workbench registry retry bench-a --reason 'card corrected'")
+@click.argument("machine")
+@click.argument("logs", nargs=-1, metavar="[LOG...]")
+@decision_options
+@registry_options
+def retry(
+    machine: str,
+    logs: tuple[str, ...],
+    reason: str,
+    by: str | None,
+    where: str | None,
+    as_json: bool,
+) -> None:
+    """Have logs judged again by the next pass; their earlier results stay on record.
+
+    LOG: a file name or the beginning of a fingerprint; by default all that were set aside.
+    """  # fmt: skip
+    from workbench.registry.queue import Queue
+
+    who, now = by or getpass.getuser(), datetime.now(UTC)
+    with _open(where) as found:
+        files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
+    said = (
+        f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none set aside"
+    )
+    emit({"machine": machine, "logs": files}, as_json, lambda: said)
+
+
 def _open(where: str | None, *, create: bool = False) -> "Registry":
     from workbench.registry.database import location
     from workbench.registry.store import Registry

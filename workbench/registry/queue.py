@@ -17,14 +17,23 @@ from sqlalchemy.orm import Session
 
 from workbench.output import dumps
 from workbench.registry.database import Database
-from workbench.registry.errors import LostClaim
-from workbench.registry.rows import add_version, decide, lock_machine, version_in_force
+from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.rows import (
+    add_version,
+    decide,
+    judged_now,
+    lock_machine,
+    need_machine,
+    turn,
+    version_in_force,
+)
 from workbench.registry.tables import (
     AttemptRow,
     ClaimRow,
     LogRow,
     NoticeRow,
     OutcomeRow,
+    ReopeningRow,
     VersionRow,
 )
 from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Verdict, Version
@@ -51,10 +60,11 @@ class Queue:
             lock_machine(session, machine, now)
             query = select(LogRow.sha256).where(LogRow.machine == machine)
             have = set(session.scalars(query))
-            new = {log.sha256: log for log in reversed(logs) if log.sha256 not in have}
+            new: dict[str, SeenLog] = {}
             for log in logs:
-                if new.get(log.sha256) is log:
-                    session.add(_log_row(machine, log, now))
+                if log.sha256 not in have:
+                    new.setdefault(log.sha256, log)
+            session.add_all(_log_row(machine, log, now) for log in new.values())
             return len(new)
 
     def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
@@ -88,10 +98,12 @@ class Queue:
     def waiting(self, machine: str) -> tuple[tuple[SeenLog, int], ...]:
         """Logs without a result and how often each was begun; oldest first, often begun last."""
         begun = func.count(AttemptRow.id)
+        now = and_(AttemptRow.log_id == LogRow.id, AttemptRow.turn == turn())
         query = (
             select(LogRow, begun)
-            .outerjoin(OutcomeRow, OutcomeRow.log_id == LogRow.id)
-            .outerjoin(AttemptRow, AttemptRow.log_id == LogRow.id)
+            .select_from(LogRow)
+            .outerjoin(OutcomeRow, judged_now())
+            .outerjoin(AttemptRow, now)
             .where(LogRow.machine == machine, OutcomeRow.log_id.is_(None))
             .group_by(LogRow.id)
             .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
@@ -104,9 +116,11 @@ class Queue:
         """Note that the worker begins with a log; raises LostClaim."""
         with self._database.writing() as session:
             _hold(session, claim, now)
+            row = _log(session, claim.machine, log)
             session.add(
                 AttemptRow(
-                    log_id=_log(session, claim.machine, log).id,
+                    log_id=row.id,
+                    turn=_turn(session, row),
                     token=claim.token,
                     owner=claim.owner,
                     at=now,
@@ -124,7 +138,8 @@ class Queue:
         with self._database.writing() as session:
             lock_machine(session, claim.machine, now)
             row = _log(session, claim.machine, log)
-            done = session.get(OutcomeRow, row.id)
+            now_turn = _turn(session, row)
+            done = session.get(OutcomeRow, (row.id, now_turn))
             if done is not None and done.token == claim.token:
                 return _outcome(session, row, done)
             _hold(session, claim, now)
@@ -143,6 +158,7 @@ class Queue:
                 )
             done = OutcomeRow(
                 log_id=row.id,
+                turn=now_turn,
                 version_id=None if current is None else current.id,
                 verdict=judgement.verdict,
                 reason=judgement.reason,
@@ -153,6 +169,32 @@ class Queue:
             session.add(done)
             session.flush()
             return _outcome(session, row, done)
+
+    def reopen(
+        self, machine: str, logs: Sequence[str], *, reason: str, by: str, now: datetime
+    ) -> tuple[str, ...]:
+        """Files that wait again from now on; their earlier results stay.
+
+        logs: names or beginnings of fingerprints of logs with a result, none: all that were set
+        aside. Raises BadRegistry where one is not there or waits anyhow.
+        """
+        with self._database.writing() as session:
+            need_machine(session, machine, lock=True)
+            query = select(LogRow, OutcomeRow).join(OutcomeRow, judged_now())
+            found = session.execute(query.where(LogRow.machine == machine).order_by(LogRow.id))
+            judged = [(row, done.verdict) for row, done in found]
+            chosen = [row for row, verdict in judged if not logs and verdict == "set_aside"]
+            for name in dict.fromkeys(logs):
+                own = [r for r, _ in judged if r.file == name or r.sha256.startswith(name)]
+                if not own:
+                    raise BadRegistry(
+                        f"{machine}: no log {name!r} with a result; 'workbench registry show"
+                        f" {machine}' names them"
+                    )
+                chosen += [row for row in own if row not in chosen]
+            for row in chosen:
+                session.add(ReopeningRow(log_id=row.id, reason=reason, made_by=by, at=now))
+            return tuple(row.file for row in chosen)
 
     def last_evidence(self, version: Version) -> dict[str, Any] | None:
         """Evidence of the latest result against this version; None where there is none yet."""
@@ -180,17 +222,18 @@ class Queue:
             select(LogRow, OutcomeRow)
             .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
             .where(LogRow.machine == machine)
-            .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
+            .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id, OutcomeRow.turn)
         )
         with self._database.reading() as session:
             return tuple(_outcome(session, row, done) for row, done in session.execute(query))
 
     def unsent(self, verdicts: Sequence[Verdict], *, since: datetime) -> tuple[Outcome, ...]:
         """Results of these verdicts from `since` on that no webhook has taken, oldest first."""
+        told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
         query = (
             select(LogRow, OutcomeRow)
             .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
-            .outerjoin(NoticeRow, NoticeRow.log_id == LogRow.id)
+            .outerjoin(NoticeRow, told)
             .where(
                 OutcomeRow.verdict.in_(verdicts),
                 OutcomeRow.at >= since,
@@ -206,14 +249,14 @@ class Queue:
         with self._database.writing() as session:
             lock_machine(session, outcome.machine, now)
             row = _log(session, outcome.machine, outcome.log)
-            if session.get(NoticeRow, row.id) is None:
-                session.add(NoticeRow(log_id=row.id, at=now))
+            if session.get(NoticeRow, (row.id, outcome.turn)) is None:
+                session.add(NoticeRow(log_id=row.id, turn=outcome.turn, at=now))
 
     def verdicts(self) -> dict[tuple[str, str], int]:
         """How many logs have each verdict, by machine and verdict."""
         query = (
             select(LogRow.machine, OutcomeRow.verdict, func.count())
-            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+            .join(OutcomeRow, judged_now())
             .group_by(LogRow.machine, OutcomeRow.verdict)
         )
         with self._database.reading() as session:
@@ -234,6 +277,11 @@ def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
             " counts"
         )
     return row
+
+
+def _turn(session: Session, row: LogRow) -> int:
+    query = select(func.count(ReopeningRow.id)).where(ReopeningRow.log_id == row.id)
+    return session.scalar(query) or 0
 
 
 def _log(session: Session, machine: str, log: SeenLog) -> LogRow:
@@ -267,4 +315,5 @@ def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> Outcome:
         number=None if row.version_id is None else session.scalar(number),
         evidence=json.loads(row.evidence),
         at=row.at,
+        turn=row.turn,
     )

@@ -5,7 +5,7 @@ import json
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
@@ -16,7 +16,9 @@ from workbench.registry.tables import (
     InForceRow,
     LogRow,
     MachineRow,
+    OutcomeRow,
     RecordRow,
+    ReopeningRow,
     VersionRow,
 )
 from workbench.registry.values import Candidate, Decision, DecisionKind, Document, Kind, Version
@@ -133,6 +135,21 @@ def decide(
             pointer.version_id, pointer.decision_id = version.id, row.id
         session.flush()
     return row
+
+
+def turn() -> ColumnElement[int]:
+    """How often the log of a query's `LogRow` was reopened."""
+    return (
+        select(func.count(ReopeningRow.id))
+        .where(ReopeningRow.log_id == LogRow.id)
+        .correlate(LogRow)
+        .scalar_subquery()
+    )
+
+
+def judged_now() -> ColumnElement[bool]:
+    """Joins a log with its result, earlier ones of a log that was reopened left out."""
+    return and_(OutcomeRow.log_id == LogRow.id, OutcomeRow.turn == turn())
 
 
 def numbered(session: Session, machine: str, number: int) -> VersionRow:

@@ -15,6 +15,7 @@ from workbench.registry.rows import (
     add_version,
     decide,
     decision_value,
+    judged_now,
     lock_machine,
     need_machine,
     numbered,
@@ -177,7 +178,7 @@ def _state(session: Session, name: str) -> MachineState:
     version = version_in_force(session, name)
     since = None if pointer is None else session.get_one(DecisionRow, pointer.decision_id)
     logs = select(func.count()).select_from(LogRow).where(LogRow.machine == name)
-    judged = logs.join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+    judged = logs.join(OutcomeRow, judged_now())
     count = session.scalar(logs) or 0
     versions = select(func.count()).select_from(VersionRow).where(VersionRow.machine == name)
     return MachineState(

@@ -17,7 +17,17 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-APPEND_ONLY = ("machine", "log", "record", "version", "decision", "attempt", "outcome", "notice")
+APPEND_ONLY = (
+    "machine",
+    "log",
+    "record",
+    "version",
+    "decision",
+    "attempt",
+    "outcome",
+    "notice",
+    "reopening",
+)
 NAMES = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     "uq": "uq_%(table_name)s_%(column_0_N_name)s",
@@ -154,22 +164,35 @@ class ClaimRow(Base):
     until: Mapped[datetime]
 
 
+class ReopeningRow(Base):
+    """A log is to be judged again; the number of these is the log's turn, from 0."""
+
+    __tablename__ = "reopening"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), index=True)
+    reason: Mapped[str]
+    made_by: Mapped[str]
+    at: Mapped[datetime]
+
+
 class AttemptRow(Base):
     """A worker began with a log."""
 
     __tablename__ = "attempt"
     id: Mapped[int] = mapped_column(primary_key=True)
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), index=True)
+    turn: Mapped[int]
     token: Mapped[str]
     owner: Mapped[str]
     at: Mapped[datetime]
 
 
 class OutcomeRow(Base):
-    """What a log led to; one a log, so that no log counts twice."""
+    """What a log led to; one a log and turn, so that no log counts twice."""
 
     __tablename__ = "outcome"
     log_id: Mapped[int] = mapped_column(ForeignKey("log.id"), primary_key=True)
+    turn: Mapped[int] = mapped_column(primary_key=True)
     version_id: Mapped[int | None] = mapped_column(ForeignKey("version.id"))
     verdict: Mapped[str]
     reason: Mapped[str]
@@ -188,5 +211,7 @@ class NoticeRow(Base):
     """The alarm of a log has been taken by the webhook."""
 
     __tablename__ = "notice"
-    log_id: Mapped[int] = mapped_column(ForeignKey("outcome.log_id"), primary_key=True)
+    log_id: Mapped[int] = mapped_column(primary_key=True)
+    turn: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
+    __table_args__ = (ForeignKeyConstraint(["log_id", "turn"], ["outcome.log_id", "outcome.turn"]),)

@@ -69,7 +69,10 @@ class SeenLog:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a log led to; number: the version in force against which it was judged."""
+    """What a log led to; number: the version in force against which it was judged.
+
+    turn: how often the log had been reopened before.
+    """
 
     machine: str
     log: SeenLog
@@ -78,6 +81,7 @@ class Outcome:
     number: int | None
     evidence: Document
     at: datetime
+    turn: int = 0
 
 
 @dataclass(frozen=True)

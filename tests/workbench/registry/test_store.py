@@ -97,6 +97,7 @@ def filled(registry: Registry) -> None:
     assert claim is not None
     queue.begin(claim, log, now=NOW)
     queue.sent(queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW), now=NOW)
+    queue.reopen("a", [log.file], reason="again", by="w", now=NOW)
 
 
 KEY = {"machine": "name", "outcome": "log_id", "notice": "log_id"}

@@ -20,8 +20,9 @@ KEYS = {  # what a replaced row would collide with; SQLite's REPLACE calls no DE
     "version": ("o.id = NEW.id", "o.machine = NEW.machine AND o.number = NEW.number"),
     "decision": ("o.id = NEW.id",),
     "attempt": ("o.id = NEW.id",),
-    "outcome": ("o.log_id = NEW.log_id",),
-    "notice": ("o.log_id = NEW.log_id",),
+    "outcome": ("o.log_id = NEW.log_id AND o.turn = NEW.turn",),
+    "notice": ("o.log_id = NEW.log_id AND o.turn = NEW.turn",),
+    "reopening": ("o.id = NEW.id",),
 }
 POSTGRES_FUNCTIONS = (
     """CREATE FUNCTION registry_append_only() RETURNS trigger LANGUAGE plpgsql AS $$ BEGIN
@@ -161,6 +162,7 @@ def _jobs() -> None:
         "attempt",
         sa.Column("id", sa.Integer(), nullable=False),
         sa.Column("log_id", sa.Integer(), nullable=False),
+        sa.Column("turn", sa.Integer(), nullable=False),
         sa.Column("token", sa.Text(), nullable=False),
         sa.Column("owner", sa.Text(), nullable=False),
         sa.Column("at", UtcTime(), nullable=False),
@@ -169,15 +171,27 @@ def _jobs() -> None:
     )
     op.create_index("ix_attempt_log_id", "attempt", ["log_id"])
     op.create_table(
+        "reopening",
+        sa.Column("id", sa.Integer(), nullable=False),
+        sa.Column("log_id", sa.Integer(), nullable=False),
+        sa.Column("reason", sa.Text(), nullable=False),
+        sa.Column("made_by", sa.Text(), nullable=False),
+        sa.Column("at", UtcTime(), nullable=False),
+        sa.PrimaryKeyConstraint("id", name="pk_reopening"),
+        sa.ForeignKeyConstraint(["log_id"], ["log.id"], name="fk_reopening_log_id"),
+    )
+    op.create_index("ix_reopening_log_id", "reopening", ["log_id"])
+    op.create_table(
         "outcome",
         sa.Column("log_id", sa.Integer(), autoincrement=False, nullable=False),
+        sa.Column("turn", sa.Integer(), autoincrement=False, nullable=False),
         sa.Column("version_id", sa.Integer(), nullable=True),
         sa.Column("verdict", sa.Text(), nullable=False),
         sa.Column("reason", sa.Text(), nullable=False),
         sa.Column("evidence", sa.Text(), nullable=False),
         sa.Column("token", sa.Text(), nullable=False),
         sa.Column("at", UtcTime(), nullable=False),
-        sa.PrimaryKeyConstraint("log_id", name="pk_outcome"),
+        sa.PrimaryKeyConstraint("log_id", "turn", name="pk_outcome"),
         sa.ForeignKeyConstraint(["log_id"], ["log.id"], name="fk_outcome_log_id"),
         sa.ForeignKeyConstraint(["version_id"], ["version.id"], name="fk_outcome_version_id"),
         sa.CheckConstraint(
@@ -188,9 +202,12 @@ def _jobs() -> None:
     op.create_table(
         "notice",
         sa.Column("log_id", sa.Integer(), autoincrement=False, nullable=False),
+        sa.Column("turn", sa.Integer(), autoincrement=False, nullable=False),
         sa.Column("at", UtcTime(), nullable=False),
-        sa.PrimaryKeyConstraint("log_id", name="pk_notice"),
-        sa.ForeignKeyConstraint(["log_id"], ["outcome.log_id"], name="fk_notice_log_id"),
+        sa.PrimaryKeyConstraint("log_id", "turn", name="pk_notice"),
+        sa.ForeignKeyConstraint(
+            ["log_id", "turn"], ["outcome.log_id", "outcome.turn"], name="fk_notice_log_id_turn"
+        ),
     )
 
 
