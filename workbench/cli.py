@@ -22,7 +22,7 @@ COMMANDS = {
     "validate": "Check a design on a plant in simulation.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "registry": "Show and change what is in force on each machine.",
-    "reidentify": "Judge the new logs of all machines once; re-tune what has drifted.",
+    "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",
 }
 OURS = ("workbench", "identification", "design")

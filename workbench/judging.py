@@ -70,16 +70,38 @@ class Chain:
         """A model of the machine as it is now, against the one in force."""
         train, held_out = divided(sources)
         challenger, candidate, refused = self._made(train)
-        if challenger is None or challenger.design is None:
+        if challenger is None:
             return Judgement("refused", f"{found.reason}; {refused}", candidate, evidence)
         rng = np.random.default_rng(self.seed)
         contest = challenge(champion, challenger, held_out, rng, self.terms)
-        return Judgement(
-            "promoted" if contest.won else "refused",
-            f"{found.reason}; {contest.reason}",
-            candidate,
-            {**evidence, "contest": contest_document(contest)},
+        evidence = {**evidence, "contest": contest_document(contest)}
+        reason = f"{found.reason}; {contest.reason}"
+        if contest.won:
+            return Judgement("promoted", reason, candidate, evidence)
+        kept = self._kept(champion, challenger) if contest.model_won else None
+        if kept is None or candidate is None:
+            return Judgement("refused", reason, candidate, evidence)
+        said = f"{reason}; so the model is replaced and the controllers stay"
+        return Judgement("promoted", said, kept, evidence, (candidate, reason))
+
+    def _kept(self, champion: Contender, challenger: Contender) -> Candidate | None:
+        """The new model with the controllers in force, where they pass on it.
+
+        The compensator holds the friction of the new model, as of any design made for it.
+        """
+        if champion.design is None:
+            return None
+        fresh = (
+            champion.design.compensator
+            if challenger.design is None
+            else (challenger.design.compensator)
         )
+        made = replace(champion.design, compensator=fresh)
+        model, rng = challenger.model, np.random.default_rng(self.seed)
+        checked, _ = validate(model, made, rng)
+        if not checked.passed:
+            return None
+        return Candidate(model_document(model), design_document(made), validation_document(checked))
 
     def _made(self, sources: Sources) -> tuple[Contender | None, Candidate | None, str]:
         """Model, design and validation of the sources, and what speaks against them."""

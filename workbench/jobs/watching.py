@@ -66,14 +66,14 @@ def watch_machines(
     scheduler.add_job(run, DateTrigger(clock()), id="first", misfire_grace_time=None)
     scheduler.start()
     try:
-        for _ in watch(root, watch_filter=_of_log, stop_event=stop, raise_interrupt=False):
+        for _ in watch(root, watch_filter=of_log, stop_event=stop, raise_interrupt=False):
             soon()
     finally:
         stop.set()
         scheduler.shutdown(wait=True)
 
 
-def _of_log(_change: Change, path: str) -> bool:
+def of_log(_change: Change, path: str) -> bool:
     """Whether a change is one of a log file, or of a card."""
     file = Path(path)
     return (file.parent.name == LOGS and file.suffix.lower() in SUFFIXES) or file.suffix == ".toml"

@@ -8,7 +8,7 @@ back finds another's token, and its result is dropped.
 
 import json
 import secrets
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -36,7 +36,16 @@ from workbench.registry.tables import (
     ReopeningRow,
     VersionRow,
 )
-from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Verdict, Version
+from workbench.registry.values import (
+    Candidate,
+    Claim,
+    DecisionKind,
+    Judgement,
+    Outcome,
+    SeenLog,
+    Verdict,
+    Version,
+)
 
 
 class Queue:
@@ -144,13 +153,13 @@ class Queue:
                 return _outcome(session, row, done)
             _hold(session, claim, now)
             current = version_in_force(session, claim.machine)
-            if judgement.candidate is not None:
-                version, _ = add_version(session, claim.machine, judgement.candidate, now)
+            for kind, candidate, reason in _decided(judgement):
+                version, _ = add_version(session, claim.machine, candidate, now)
                 decide(
                     session,
-                    "promoted" if judgement.verdict == "promoted" else "refused",
+                    kind,
                     version,
-                    reason=judgement.reason,
+                    reason=reason,
                     by=by,
                     now=now,
                     evidence=judgement.evidence,
@@ -261,6 +270,15 @@ class Queue:
         )
         with self._database.reading() as session:
             return {(name, verdict): count for name, verdict, count in session.execute(query)}
+
+
+def _decided(judgement: Judgement) -> Iterator[tuple[DecisionKind, Candidate, str]]:
+    """The decisions that a judgement means, the one that may move the pointer last."""
+    if judgement.rival is not None:
+        yield "refused", *judgement.rival
+    if judgement.candidate is not None:
+        kind: DecisionKind = "promoted" if judgement.verdict == "promoted" else "refused"
+        yield kind, judgement.candidate, judgement.reason
 
 
 def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:

@@ -95,12 +95,16 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a worker makes of one log; a candidate is put in force where it is "promoted"."""
+    """What a worker makes of one log; a candidate is put in force where it is "promoted".
+
+    rival: one that was made too and is refused, with its reason.
+    """
 
     verdict: Verdict
     reason: str
     candidate: Candidate | None = None
     evidence: Document = field(default_factory=dict)
+    rival: tuple[Candidate, str] | None = None
 
 
 @dataclass(frozen=True)

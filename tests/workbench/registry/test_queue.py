@@ -91,6 +91,16 @@ def test_a_refused_candidate_is_kept_with_its_reason(queue: Queue, registry: Reg
     assert (last.kind, last.number, last.reason) == ("refused", 2, "no better")
 
 
+def test_a_rival_is_refused_beside_what_is_promoted(queue: Queue, registry: Registry) -> None:
+    rival = Candidate({"m": 2.0}, {"k": 3.0})
+    both = Judgement("promoted", "model alone", DRIFT.candidate, {}, (rival, "tracks worse"))
+    queue.finish(claimed(queue), LOG, both, by="w", now=NOW)
+    last = [(d.kind, d.number, d.reason) for d in registry.decisions("m")[-2:]]
+    assert last == [("refused", 2, "tracks worse"), ("promoted", 3, "model alone")]
+    state = registry.machine("m")
+    assert state.in_force is not None and state.in_force.number == 3
+
+
 def test_often_begun_logs_come_last(queue: Queue) -> None:
     claim = claimed(queue)
     for _ in range(3):
