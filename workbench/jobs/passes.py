@@ -114,20 +114,23 @@ class Pass:
         """What the pass did; raises BadRoot, and RegistryAway once its patience has ended."""
         folders = machine_folders(root)
         done = PassReport(len(folders), (), (), {}, 0, ())
+        outcomes: list[Outcome] = []  # kept also of a machine that fails half-way
         for folder in folders:
             if self._stop():
                 break
             try:
-                done = self._machine(folder, done)
+                done = self._machine(folder, done, outcomes)
             except RegistryAway:
                 raise
             except (UserError, OSError, MemoryError) as error:
                 line = " ".join(str(error).split()) or type(error).__name__
                 self._report("machine_failed", machine=folder.name, reason=line)
                 done = replace(done, failed={**done.failed, folder.name: line})
-        return done
+        return replace(done, outcomes=tuple(outcomes))
 
-    def _machine(self, folder: MachineFolder, done: PassReport) -> PassReport:
+    def _machine(
+        self, folder: MachineFolder, done: PassReport, outcomes: list[Outcome]
+    ) -> PassReport:
         name, settings, retry = folder.name, self._settings, self._settings.patience
         known = retry(self._queue.known, name)
         found = scan(folder, known, settle=settings.settle, now=self._clock())
@@ -150,7 +153,7 @@ class Pass:
             return replace(done, busy=(*done.busy, name))
         try:
             with kept_alive(self._queue, claim, settings.lease, self._clock):
-                outcomes = self._logs(folder, found, claim)
+                self._logs(folder, found, claim, outcomes)
         except LostClaim as error:
             self._report("claim_lost", machine=name, reason=str(error))
             return replace(done, busy=(*done.busy, name))
@@ -160,15 +163,16 @@ class Pass:
             self._queue.release(claim)
             raise
         retry(self._queue.release, claim)
-        return replace(done, outcomes=(*done.outcomes, *outcomes))
+        return done
 
     def _ready(self, log: SeenLog, found: Scan) -> bool:
         """Whether a waiting log can be judged now: it is there, or something else in its place."""
         return log.sha256 in found.complete or _replaced(log, found)
 
-    def _logs(self, folder: MachineFolder, found: Scan, claim: Claim) -> list[Outcome]:
-        """Results of the machine's logs; what is waiting is asked again, now that it is ours."""
-        outcomes = []
+    def _logs(
+        self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[Outcome]
+    ) -> None:
+        """Judge the machine's logs; what is waiting is asked again, now that it is ours."""
         for log, begun in self._settings.patience(self._queue.waiting, folder.name):
             if self._stop():
                 break
@@ -177,7 +181,6 @@ class Pass:
             outcome = self._log(folder, found, claim, log, begun)
             if outcome is not None:
                 outcomes.append(outcome)
-        return outcomes
 
     def _log(
         self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
