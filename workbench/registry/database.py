@@ -169,8 +169,8 @@ def _away(where: str, error: Exception) -> str:
     said = error.orig if isinstance(error, DBAPIError) else error
     line = " ".join(str(said).split())
     advice = "nothing is lost; look after the database and run again"
-    if "full" in line:
-        advice = "nothing is lost; free some space and run again"
+    if "full" in line or "I/O" in line:
+        advice = "nothing is lost; free some space on its disk and run again"
     elif "locked" in line:
         advice = "another process holds it; run again"
     elif "readonly" in line or "unable to open" in line:

@@ -47,6 +47,8 @@ from workbench.registry.values import (
     Version,
 )
 
+OFTEN = 5
+
 
 class Queue:
     """The logs of machines that wait for a result, and the claims on them."""
@@ -105,7 +107,10 @@ class Queue:
             )
 
     def waiting(self, machine: str) -> tuple[tuple[SeenLog, int], ...]:
-        """Logs without a result and how often each was begun; oldest first, often begun last."""
+        """Logs without a result and how often each was begun; oldest first.
+
+        One begun `OFTEN` times comes last: it may be what its workers die of.
+        """
         begun = func.count(AttemptRow.id)
         now = and_(AttemptRow.log_id == LogRow.id, AttemptRow.turn == turn())
         query = (
@@ -119,7 +124,7 @@ class Queue:
         )
         with self._database.reading() as session:
             found = [(_seen(row), int(count)) for row, count in session.execute(query)]
-        return tuple(sorted(found, key=lambda entry: max(entry[1] - 1, 0)))
+        return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
 
     def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
         """Note that the worker begins with a log; raises LostClaim."""

@@ -126,7 +126,7 @@ def test_a_full_disk_is_said_and_leaves_what_was(tmp_path: Path) -> None:
         with registry.database.writing() as session:
             pages = session.execute(text("PRAGMA page_count")).scalar()
             session.execute(text(f"PRAGMA max_page_count = {pages}"))
-        with pytest.raises(RegistryAway, match=r"full.*free some space"):
+        with pytest.raises(RegistryAway, match=r"full.*free some space on its disk"):
             registry.add("a", Candidate({"m": "x" * 100_000}), reason="r", by="t", now=NOW)
         assert [v.number for v in registry.versions("a")] == [1]
 

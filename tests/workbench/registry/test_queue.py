@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.queue import Queue
+from workbench.registry.queue import OFTEN, Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Claim, Judgement, SeenLog
 
@@ -103,9 +103,10 @@ def test_a_rival_is_refused_beside_what_is_promoted(queue: Queue, registry: Regi
 
 def test_often_begun_logs_come_last(queue: Queue) -> None:
     claim = claimed(queue)
-    for _ in range(3):
+    for count in range(OFTEN):
+        assert queue.waiting("m") == ((OTHER, count), (LOG, 0))
         queue.begin(claim, OTHER, now=NOW)
-    assert queue.waiting("m") == ((LOG, 0), (OTHER, 3))
+    assert queue.waiting("m") == ((LOG, 0), (OTHER, OFTEN))
 
 
 def test_evidence_of_the_last_log_goes_to_the_next(queue: Queue, registry: Registry) -> None:
