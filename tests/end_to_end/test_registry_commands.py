@@ -125,6 +125,8 @@ def test_what_is_wrong_is_said_in_one_line(here: Path, capsys: pytest.CaptureFix
     assert "no version 3" in refused(capsys, ["registry", "diff", "bench", "1", "3"])
     assert "is in force already" in refused(capsys, ["registry", "promote", "bench", "2", *WHY])
     assert "--reason" in refused(capsys, ["registry", "rollback", "bench"])
+    empty = ["registry", "rollback", "bench", "--reason", " "]
+    assert "--reason is empty" in refused(capsys, empty)
     away = ["registry", "list", "--registry", "postgresql://u:secret@127.0.0.1:9/x"]
     line = refused(capsys, away)
     assert "secret" not in line and "127.0.0.1" in line

@@ -40,8 +40,15 @@ def registry_options(command: Command) -> Command:
 def decision_options(command: Command) -> Command:
     """Why and by whom: `reason` (--reason) and `by` (--by)."""
     by = click.option("--by", metavar="NAME", help="Who decides.  [default: you]")
-    why = click.option("--reason", required=True, metavar="TEXT", help="Why; it is recorded.")
+    why = click.option("--reason", required=True, metavar="TEXT", callback=_given,
+                       help="Why; it is recorded.")  # fmt: skip
     return why(by(command))
+
+
+def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
+    if not value.strip():
+        raise click.UsageError("--reason is empty; say why in a few words.", ctx)
+    return value.strip()
 
 
 @click.group(epilog="Example: workbench registry show bench-a --json")

@@ -137,7 +137,8 @@ class Pass:
         done = replace(done, growing=done.growing + found.growing)
         for file in found.later:
             self._report("log_from_the_future", machine=name, file=file)
-        logs = [log for _, log in found.complete.values()]
+        seen = set(known.values())
+        logs = [log for _, log in found.complete.values() if log.sha256 not in seen]
         new = retry(self._queue.announce, name, logs, now=self._clock())
         if new:
             self._report("logs_found", machine=name, count=new)

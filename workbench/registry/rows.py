@@ -7,7 +7,7 @@ from typing import Any
 
 from sqlalchemy import ColumnElement, and_, func, select
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session, aliased
 
 from workbench.output import dumps
 from workbench.registry.errors import BadRegistry
@@ -173,38 +173,55 @@ def version_in_force(session: Session, machine: str) -> VersionRow | None:
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
 
 
+def version_values(session: Session, *where: ColumnElement[bool]) -> dict[int, Version]:
+    """Versions by the ids of their rows, in the order of machines and numbers."""
+    model, design, validation = (aliased(RecordRow) for _ in range(3))
+    query = (
+        select(VersionRow, model.sha256, design.sha256, validation.sha256)
+        .join(model, model.id == VersionRow.model_id)
+        .outerjoin(design, design.id == VersionRow.design_id)
+        .outerjoin(validation, validation.id == VersionRow.validation_id)
+        .where(*where)
+        .order_by(VersionRow.machine, VersionRow.number)
+    )
+    return {
+        row.id: Version(row.machine, row.number, of_model, of_design, of_validation, row.made_at)
+        for row, of_model, of_design, of_validation in session.execute(query)
+    }
+
+
 def version_value(session: Session, row: VersionRow) -> Version:
     """The version as a value."""
+    return version_values(session, VersionRow.id == row.id)[row.id]
 
-    def digest(record: int | None) -> str | None:
-        query = select(RecordRow.sha256).where(RecordRow.id == record)
-        return None if record is None else session.scalar(query)
 
-    model = digest(row.model_id)
-    assert model is not None
-    return Version(
-        machine=row.machine,
-        number=row.number,
-        model=model,
-        design=digest(row.design_id),
-        validation=digest(row.validation_id),
-        made_at=row.made_at,
+def decision_values(session: Session, *where: ColumnElement[bool]) -> tuple[Decision, ...]:
+    """Decisions in the order in which they were made."""
+    query = (
+        select(DecisionRow, VersionRow.number, LogRow.sha256)
+        .join(VersionRow, VersionRow.id == DecisionRow.version_id)
+        .outerjoin(LogRow, LogRow.id == DecisionRow.log_id)
+        .where(*where)
+        .order_by(DecisionRow.id)
     )
+    return tuple(_decision(row, number, log) for row, number, log in session.execute(query))
 
 
-def decision_value(session: Session, row: DecisionRow) -> Decision:
-    """The decision as a value."""
-    log = select(LogRow.sha256).where(LogRow.id == row.log_id)
-    number = select(VersionRow.number).where(VersionRow.id == row.version_id)
+def _decision(row: DecisionRow, number: int, log: str | None) -> Decision:
     kind: Any = row.kind
     return Decision(
         id=row.id,
         machine=row.machine,
         kind=kind,
-        number=session.scalars(number).one(),
-        log=None if row.log_id is None else session.scalar(log),
+        number=number,
+        log=log,
         reason=row.reason,
         evidence=json.loads(row.evidence),
         made_by=row.made_by,
         at=row.at,
     )
+
+
+def decision_value(session: Session, row: DecisionRow) -> Decision:
+    """The decision as a value."""
+    return decision_values(session, DecisionRow.id == row.id)[0]

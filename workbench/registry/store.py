@@ -1,13 +1,14 @@
 """The registry of machines: what is in force, what was, and why it changed."""
 
 import json
+import re
 from collections.abc import Sequence
 from datetime import datetime
 from types import TracebackType
 from typing import Any, Self
 
-from sqlalchemy import func, select
-from sqlalchemy.orm import Session
+from sqlalchemy import ColumnElement, Select, func, select
+from sqlalchemy.orm import InstrumentedAttribute, Session
 
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
@@ -15,12 +16,14 @@ from workbench.registry.rows import (
     add_version,
     decide,
     decision_value,
+    decision_values,
     judged_now,
     lock_machine,
     need_machine,
     numbered,
     version_in_force,
     version_value,
+    version_values,
 )
 from workbench.registry.tables import (
     DecisionRow,
@@ -33,6 +36,7 @@ from workbench.registry.tables import (
 )
 from workbench.registry.values import Candidate, Decision, Kind, MachineState, Version
 
+_NAME = re.compile(r"[^/\\\x00-\x1f\x7f]+")
 MOVES = ("promoted", "rolled_back")
 
 
@@ -64,7 +68,14 @@ class Registry:
     def add(
         self, machine: str, candidate: Candidate, *, reason: str, by: str, now: datetime
     ) -> Version:
-        """The version that holds these documents; not in force yet. The same again adds nothing."""
+        """The version that holds these documents; not in force yet. The same again adds nothing.
+
+        Raises BadRegistry where the name could be no folder's.
+        """
+        if not machine or machine.startswith((".", "_")) or not _NAME.fullmatch(machine):
+            raise BadRegistry(
+                f"machine {machine!r}: a name needed that can be a folder's, as bench-a"
+            )
         with self.database.writing() as session:
             lock_machine(session, machine, now)
             row, new = add_version(session, machine, candidate, now)
@@ -102,14 +113,14 @@ class Registry:
     def machines(self) -> tuple[MachineState, ...]:
         """Every machine by name."""
         with self.database.reading() as session:
-            names = session.scalars(select(MachineRow.name).order_by(MachineRow.name)).all()
-            return tuple(_state(session, name) for name in names)
+            return _states(session)
 
     def machine(self, name: str) -> MachineState:
         """One machine; raises BadRegistry where there is none of that name."""
         with self.database.reading() as session:
             need_machine(session, name)
-            return _state(session, name)
+            (found,) = _states(session, name)
+            return found
 
     def in_force(self, machine: str) -> Version | None:
         """The version in force; None where nothing has been promoted."""
@@ -126,20 +137,15 @@ class Registry:
         """Every version of a machine, in the order of their numbers."""
         with self.database.reading() as session:
             need_machine(session, machine)
-            rows = session.scalars(
-                select(VersionRow).where(VersionRow.machine == machine).order_by(VersionRow.number)
-            ).all()
-            return tuple(version_value(session, row) for row in rows)
+            return tuple(version_values(session, VersionRow.machine == machine).values())
 
     def decisions(self, machine: str | None = None) -> tuple[Decision, ...]:
         """Decisions of one machine or of all, in the order in which they were made."""
-        query = select(DecisionRow).order_by(DecisionRow.id)
-        if machine is not None:
-            query = query.where(DecisionRow.machine == machine)
+        where = () if machine is None else (DecisionRow.machine == machine,)
         with self.database.reading() as session:
             if machine is not None:
                 need_machine(session, machine)
-            return tuple(decision_value(session, row) for row in session.scalars(query))
+            return decision_values(session, *where)
 
     def document(self, version: Version, kind: Kind) -> dict[str, Any]:
         """A version's document as model.json and the others hold it; raises BadRegistry if none."""
@@ -173,20 +179,43 @@ class Registry:
         return stack
 
 
-def _state(session: Session, name: str) -> MachineState:
-    pointer = session.get(InForceRow, name)
-    version = version_in_force(session, name)
-    since = None if pointer is None else session.get_one(DecisionRow, pointer.decision_id)
-    logs = select(func.count()).select_from(LogRow).where(LogRow.machine == name)
-    judged = logs.join(OutcomeRow, judged_now())
-    count = session.scalar(logs) or 0
-    versions = select(func.count()).select_from(VersionRow).where(VersionRow.machine == name)
-    return MachineState(
-        name=name,
-        in_force=None if version is None else version_value(session, version),
-        since=None if since is None else decision_value(session, since),
-        versions=session.scalar(versions) or 0,
-        logs=count,
-        waiting=count - (session.scalar(judged) or 0),
-        set_aside=session.scalar(judged.where(OutcomeRow.verdict == "set_aside")) or 0,
+def _states(session: Session, name: str | None = None) -> tuple[MachineState, ...]:
+    """The machines by name, or the one of that name, in a few queries for all of them."""
+
+    def only(column: InstrumentedAttribute[str]) -> tuple[ColumnElement[bool], ...]:
+        return () if name is None else (column == name,)
+
+    pointers = session.scalars(select(InForceRow).where(*only(InForceRow.machine))).all()
+    forces = {row.machine: row for row in pointers}
+    current = select(InForceRow.version_id).where(*only(InForceRow.machine))
+    versions = version_values(session, VersionRow.id.in_(current))
+    behind = select(InForceRow.decision_id).where(*only(InForceRow.machine))
+    decisions = {d.id: d for d in decision_values(session, DecisionRow.id.in_(behind))}
+    made = _counts(session, select(VersionRow.machine, func.count()), only(VersionRow.machine))
+    logs = _counts(session, select(LogRow.machine, func.count()), only(LogRow.machine))
+    judged = select(LogRow.machine, func.count()).join(OutcomeRow, judged_now())
+    done = _counts(session, judged, only(LogRow.machine))
+    bad = (*only(LogRow.machine), OutcomeRow.verdict == "set_aside")
+    aside = _counts(session, judged, bad)
+    query = select(MachineRow.name).where(*only(MachineRow.name)).order_by(MachineRow.name)
+    return tuple(
+        MachineState(
+            name=one,
+            in_force=versions[forces[one].version_id] if one in forces else None,
+            since=decisions[forces[one].decision_id] if one in forces else None,
+            versions=made.get(one, 0),
+            logs=logs.get(one, 0),
+            waiting=logs.get(one, 0) - done.get(one, 0),
+            set_aside=aside.get(one, 0),
+        )
+        for one in session.scalars(query)
     )
+
+
+def _counts(
+    session: Session, query: Select[str, int], where: tuple[ColumnElement[bool], ...]
+) -> dict[str, int]:
+    """Numbers by machine of a query whose first column is the machine."""
+    machine = query.selected_columns[0]
+    rows = session.execute(query.where(*where).group_by(machine))
+    return {name: count for name, count in rows}

@@ -85,6 +85,13 @@ def test_what_is_not_there_is_refused(registry: Registry) -> None:
     assert len(registry.decisions()) == 2
 
 
+@pytest.mark.parametrize("name", ["", "a/b", ".hidden", "two\nlines"])
+def test_a_name_that_no_folder_can_have_is_refused(registry: Registry, name: str) -> None:
+    with pytest.raises(BadRegistry, match="can be a folder's"):
+        add(registry, name, 1.0)
+    assert registry.machines() == ()
+
+
 def filled(registry: Registry) -> None:
     """A row in every table."""
     add(registry, "a", 1.0, 2.0)
