@@ -14,7 +14,7 @@ from identification.library import Library
 from identification.log import Log
 from workbench.challenge import Contender, Terms, challenge, contest_document
 from workbench.design_values import Design, design_document, read_design
-from workbench.drifting import Drift, DriftTest, drift_by_refit
+from workbench.drift_verdict import Drift, DriftTest, drift_by_refit
 from workbench.identifying import Source
 from workbench.jobs.passes import Task
 from workbench.model import Model, model_document, read_model

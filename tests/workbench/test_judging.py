@@ -15,7 +15,7 @@ from identification.karnopp import Karnopp
 from tests.chain import CARD, TABLES
 from workbench.card import Card, load_card
 from workbench.challenge import Terms
-from workbench.drifting import Drift, drift_by_refit
+from workbench.drift_verdict import Drift, drift_by_refit
 from workbench.jobs.passes import Task
 from workbench.judging import Chain, divided
 from workbench.model import Model, read_model
