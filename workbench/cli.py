@@ -23,6 +23,9 @@ COMMANDS = {
     "validate": "Check a design on a plant in simulation.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "paper": "Run the paper in simulation, its figures and numbers beside ours.",
+    "registry": "Show and change what is in force on each machine.",
+    "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
+    "watch": "Do so again and again, by schedule and on new files.",
 }
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141

@@ -41,6 +41,15 @@ def read_result(path: Path, kind: type[Value], schema: str) -> Value:
         raise BadModel(f"{path}: {error}") from None
 
 
+def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
+    """The JSON object in the file, unchecked but for its schema; raises BadModel in one line."""
+    raw = _read_json(path)
+    if not isinstance(raw, dict) or (schema is not None and raw.get("schema") != schema):
+        needed = "a JSON object" if schema is None else f"a {schema} file"
+        raise BadModel(f"{path}: holds {_shown(raw)}; {needed} needed")
+    return raw
+
+
 def _read_json(path: Path) -> object:
     try:
         text = path.read_text(encoding="utf-8")

@@ -14,6 +14,8 @@ from workbench import demonstration
 from workbench.cli import COMMANDS, main
 from workbench.validating import Limits, validate
 
+REGISTRY_ONLY = ("reidentify", "watch")  # their results go into the registry
+
 
 @pytest.fixture(scope="module")
 def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -57,7 +59,8 @@ def test_help_has_an_example(command: str, capsys: pytest.CaptureFixture[str]) -
     assert main([command, "--help"]) == 0
     shown = capsys.readouterr().out
     assert f"Example: workbench {command}" in shown
-    assert "--json" in shown and "--out" in shown
+    assert "--json" in shown
+    assert "--out" in shown or command in REGISTRY_ONLY
 
 
 def test_simulate_writes_log_and_truth(

@@ -195,7 +195,7 @@ def test_debug_shows_the_traceback(
 @pytest.mark.parametrize(
     ("arguments", "found"),
     [
-        (["idntify"], "No such command 'idntify'. Did you mean 'identify'?"),
+        (["vlidate"], "No such command 'vlidate'. Did you mean 'validate'?"),
         (["xyzzy"], "No such command 'xyzzy'. See 'workbench --help'."),
         (["probe", "--siz", "3"], "'--size'"),
         (["probe", "--size", "three"], "'three' is not a valid integer"),

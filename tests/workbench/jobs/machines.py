@@ -1,0 +1,26 @@
+"""Folders of machines with logs of one line, and a first version in force."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+from workbench.registry.store import Registry
+from workbench.registry.values import Candidate
+
+NOW = datetime(2026, 3, 1, tzinfo=UTC)
+
+
+def machine(root: Path, name: str, logs: dict[str, str]) -> Path:
+    """The folder of a machine with these logs."""
+    folder = root / name / "logs"
+    folder.mkdir(parents=True, exist_ok=True)
+    (root / name / "card.toml").write_text("", encoding="utf-8")
+    for file, text in logs.items():
+        (folder / file).write_text(text, encoding="utf-8")
+    return folder
+
+
+def in_force(registry: Registry, *names: str) -> None:
+    """A first version of each machine, in force."""
+    for name in names:
+        registry.add(name, Candidate({"first": name}), reason="first", by="test", now=NOW)
+        registry.promote(name, 1, reason="first", by="test", now=NOW)

@@ -1,0 +1,288 @@
+"""One pass: which files it takes, what it does with bad ones, and what it leaves for the next."""
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from identification.errors import BadCard, BadLog, NotIdentifiable
+from tests.workbench.jobs.machines import in_force, machine
+from tests.workbench.jobs.worker import clock, ignore, judge, settings
+from tests.workbench.registry.postgres import Server
+from workbench.jobs.lease import Patience
+from workbench.jobs.passes import Judge, Pass, PassReport, Task
+from workbench.jobs.scan import BadRoot, open_for_writing
+from workbench.registry.errors import RegistryAway
+from workbench.registry.queue import OFTEN, Queue
+from workbench.registry.store import Registry
+from workbench.registry.values import Judgement
+
+Run = Callable[..., PassReport]
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return tmp_path / "machines"
+
+
+@pytest.fixture
+def run(registry: Registry, root: Path) -> Run:
+    """Runs a pass with a judge and changed settings."""
+
+    def once(judge: Judge = judge, report: Any = ignore, **changes: object) -> PassReport:
+        return Pass(registry, judge, settings("w", **changes), clock, report).run(root)
+
+    return once
+
+
+def verdicts(done: PassReport) -> dict[str, str]:
+    return {one.log.file: one.verdict for one in done.outcomes}
+
+
+def test_each_log_once_a_bad_one_set_aside(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a", "b")
+    machine(root, "a", {"1.csv": "quiet", "2.csv": "bad", "3.csv": "drift", "4.csv": "quiet too"})
+    logs = machine(root, "b", {"1.csv": "quiet"})
+    (logs / "notes.md").write_text("no log", encoding="utf-8")
+    (logs / ".2.csv").write_text("hidden", encoding="utf-8")
+    (root / "no_machine").mkdir()
+    done = run()
+    found = {(one.machine, one.log.file): one.verdict for one in done.outcomes}
+    assert found == {
+        ("a", "1.csv"): "none",
+        ("a", "2.csv"): "set_aside",
+        ("a", "3.csv"): "promoted",
+        ("a", "4.csv"): "none",
+        ("b", "1.csv"): "none",
+    }
+    assert done.machines == 2
+    (bad,) = (one for one in done.outcomes if one.verdict == "set_aside")
+    assert bad.reason == "2.csv: is bad"
+    assert (root / "a" / "logs" / "2.csv").read_text(encoding="utf-8") == "bad"
+    assert run().outcomes == ()
+    machine(root, "a", {"copy_of_1.csv": "quiet", "5.csv": "new"})
+    assert verdicts(run()) == {"5.csv": "none"}
+
+
+def test_logs_of_a_machine_come_in_order_and_evidence_goes_on(
+    run: Run, registry: Registry, root: Path
+) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {f"{i}.csv": f"quiet {i}" for i in range(4)})
+    for i in range(4):
+        os.utime(logs / f"{i}.csv", (1000.0 - i, 1000.0 - i))
+    done = run()
+    assert [(o.log.file, o.evidence["count"]) for o in done.outcomes] == [
+        ("3.csv", 1),
+        ("2.csv", 2),
+        ("1.csv", 3),
+        ("0.csv", 4),
+    ]
+
+
+def test_a_file_still_being_written_is_left(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {"old.csv": "quiet", "new.csv": "quiet 2", "late.csv": "quiet 3"})
+    os.utime(logs / "old.csv", (1000.0, 1000.0))
+    future = datetime.now(UTC).timestamp() + 3600
+    os.utime(logs / "late.csv", (future, future))
+    told: list[tuple[str, Any]] = []
+    done = run(settle=timedelta(seconds=30), report=lambda e, **d: told.append((e, d.get("file"))))
+    assert verdicts(done) == {"old.csv": "none"}
+    assert done.growing == 2
+    assert ("log_from_the_future", "late.csv") in told
+    assert verdicts(run()) == {"new.csv": "none"}
+
+
+def test_a_file_open_for_writing_is_left(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {})
+    with (logs / "1.csv").open("w", encoding="utf-8") as file:
+        file.write("quiet")
+        file.flush()
+        os.utime(logs / "1.csv", (1000.0, 1000.0))
+        assert open_for_writing(logs / "1.csv")
+        done = run()
+        assert (done.growing, done.outcomes) == (1, ())
+        assert registry.machines()[0].logs == 0
+    assert not open_for_writing(logs / "1.csv")
+    assert verdicts(run()) == {"1.csv": "none"}
+
+
+def test_a_file_that_changes_while_it_is_judged_has_no_result(
+    run: Run, registry: Registry, root: Path
+) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {"1.csv": "quiet"})
+
+    def slow(task: Task) -> Judgement:
+        if task.path.read_text(encoding="utf-8") == "quiet":
+            (logs / "1.csv").write_text("quiet and more", encoding="utf-8")
+        return judge(task)
+
+    assert run(slow).outcomes == ()
+    done = run(slow)
+    # Of the earlier content nothing can be told any more; the later one has its own result.
+    assert [(o.verdict, "changed before" in o.reason) for o in done.outcomes] == [
+        ("set_aside", True),
+        ("none", False),
+    ]
+
+
+def test_a_log_taken_away_waits(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
+    run(stopping_judge)
+    (logs / "2.csv").rename(root / "elsewhere.csv")
+    assert verdicts(run()) == {"1.csv": "none"}
+    assert registry.machine("a").waiting == 1
+    (root / "elsewhere.csv").rename(logs / "renamed.csv")
+    (outcome,) = run().outcomes
+    assert outcome.verdict == "promoted"
+
+
+def stopping_judge(task: Task) -> Judgement:
+    raise MemoryError("none left")
+
+
+def stopping_judge_after(file: str) -> Judge:
+    """Judges that file and dies of every other."""
+
+    def dying(task: Task) -> Judgement:
+        if task.log.file != file:
+            raise MemoryError("none left")
+        return judge(task)
+
+    return dying
+
+
+def test_one_machine_that_fails_does_not_stop_others(
+    run: Run, registry: Registry, root: Path
+) -> None:
+    in_force(registry, "a", "b", "c")
+    for name in "abc":
+        machine(root, name, {"1.csv": f"quiet {name}"})
+
+    def failing(task: Task) -> Judgement:
+        if task.machine == "a":
+            raise BadCard("card.toml: is wrong")
+        if task.machine == "b":
+            raise OSError(28, "No space left on device")
+        return judge(task)
+
+    done = run(failing)
+    assert dict(done.failed) == {
+        "a": "card.toml: is wrong",
+        "b": "[Errno 28] No space left on device",
+    }
+    assert [o.machine for o in done.outcomes] == ["c"]
+    assert [o.machine for o in run().outcomes] == ["a", "b"]  # nothing was lost
+
+
+def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    raises = {
+        "1.csv": (BadLog("1.csv: gap"), "set_aside", "1.csv: gap"),
+        "2.csv": (NotIdentifiable("nothing moves"), "not_judged", "nothing moves"),
+        "3.csv": (
+            PermissionError(13, "Permission denied"),
+            "set_aside",
+            "3.csv: Permission denied",
+        ),
+        "4.csv": (KeyError("oops"), "set_aside", "4.csv: fault of ours: KeyError: 'oops'"),
+    }
+    machine(root, "a", {name: name for name in raises})
+    told: list[str] = []
+
+    def failing(task: Task) -> Judgement:
+        raise raises[task.log.file][0]
+
+    done = run(failing, report=lambda event, **_: told.append(event))
+    found = {o.log.file: (o.verdict, o.reason) for o in done.outcomes}
+    assert found == {name: (verdict, reason) for name, (_, verdict, reason) in raises.items()}
+    assert told.count("fault_of_ours") == 1
+
+
+def test_a_log_that_ends_its_workers_is_set_aside(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
+    for _ in range(3):
+        assert run(stopping_judge).outcomes == ()
+    for _ in range(OFTEN - 3):
+        run(stopping_judge)
+    assert run(stopping_judge_after("2.csv")).outcomes != ()  # the other one no longer waits
+    assert verdicts(run(attempts=OFTEN)) == {"1.csv": "set_aside"}
+    assert registry.machine("a").waiting == 0
+
+
+def test_a_machine_without_a_model_waits(run: Run, registry: Registry, root: Path) -> None:
+    machine(root, "a", {"1.csv": "drift"})
+    done = run()
+    assert (done.without_model, done.outcomes) == (("a",), ())
+    (outcome,) = run(first=True).outcomes
+    assert (outcome.verdict, outcome.number) == ("promoted", None)
+    assert registry.in_force("a") is not None
+
+
+def test_many_workers_at_once_judge_every_log_once(registry: Registry, root: Path) -> None:
+    names = [f"m{i}" for i in range(4)]
+    in_force(registry, *names)
+    for name in names:
+        machine(root, name, {f"{i}.csv": f"{'drift' if i % 3 else 'quiet'} {i}" for i in range(6)})
+    where = registry.database.where
+
+    def work(who: int) -> int:
+        with Registry(str(where)) as own:
+            total = 0
+            while not all(own.machine(n).logs == 6 and own.machine(n).waiting == 0 for n in names):
+                done = Pass(own, judge, settings(f"w{who}"), clock, ignore).run(root)
+                total += len(done.outcomes)
+            return total
+
+    with ThreadPoolExecutor(5) as pool:
+        counts = list(pool.map(work, range(5)))
+    assert sum(counts) == 24
+    assert [len(registry.versions(name)) for name in names] == [5] * 4
+
+
+def test_a_database_away_in_the_middle(postgres: Server, tmp_path: Path) -> None:
+    root = tmp_path / "machines"
+    url = postgres.database()
+    with Registry(url) as registry:
+        in_force(registry, "a")
+        machine(root, "a", {"1.csv": "drift"})
+
+        def outage(task: Task) -> Judgement:
+            postgres.stop()
+            return judge(task)
+
+        quick = settings("w", patience=Patience(0.3, 0.1))
+        try:
+            with pytest.raises(RegistryAway, match="nothing is lost"):
+                Pass(registry, outage, quick, clock, ignore).run(root)
+        finally:
+            postgres.start()
+        assert registry.machine("a").waiting == 1
+
+        def short_outage(task: Task) -> Judgement:
+            postgres.stop()
+            postgres.start()
+            return judge(task)
+
+        patient = settings("x", patience=Patience(20.0, 0.1))
+        while not (done := Pass(registry, short_outage, patient, clock, ignore).run(root)).outcomes:
+            assert done.busy == ("a",)  # until the lease of the first has ended
+        assert [o.verdict for o in done.outcomes] == ["promoted"]
+        assert len(registry.versions("a")) == 2
+        assert not Queue(registry.database).waiting("a")
+
+
+def test_a_root_that_is_none(run: Run, root: Path) -> None:
+    with pytest.raises(BadRoot, match="no such folder"):
+        run()
+    root.mkdir()
+    assert run().machines == 0

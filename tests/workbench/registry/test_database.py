@@ -1,0 +1,141 @@
+"""Layout, migration, several processes at once, and databases that are not there."""
+
+import multiprocessing
+import os
+import sqlite3
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from alembic.autogenerate import compare_metadata
+from alembic.migration import MigrationContext
+from alembic.script import ScriptDirectory
+from sqlalchemy import text
+
+from tests.workbench.registry.postgres import Server
+from workbench.registry.database import location
+from workbench.registry.errors import BadRegistry, RegistryAway
+from workbench.registry.migrate import HEAD, config
+from workbench.registry.store import Registry
+from workbench.registry.tables import Base
+from workbench.registry.values import Candidate
+
+NOW = datetime(2026, 3, 1, tzinfo=UTC)
+PROCESSES, EACH = 6, 15
+
+
+def test_steps_and_tables_agree(registry: Registry) -> None:
+    with registry.database.writing() as session:
+        context = MigrationContext.configure(session.connection(), opts={"compare_type": True})
+        assert compare_metadata(context, Base.metadata) == []
+        assert context.get_current_revision() == HEAD
+
+
+def test_the_last_step_is_the_one_that_is_expected() -> None:
+    assert ScriptDirectory.from_config(config()).get_current_head() == HEAD
+
+
+def test_a_newer_layout_is_refused(where: str) -> None:
+    with Registry(where) as registry, registry.database.writing() as session:
+        session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
+    with pytest.raises(BadRegistry, match="layout '9999', this workbench knows up to"):
+        Registry(where)
+
+
+def test_a_table_of_something_else_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "other.db"
+    with sqlite3.connect(path) as other:
+        other.execute("CREATE TABLE log (line TEXT)")
+    other.close()
+    with pytest.raises(BadRegistry, match="holds a table 'log' of something else"):
+        Registry(str(path))
+
+
+def many(where: str, who: int) -> None:
+    """What each of several processes does: add versions of one machine and promote them."""
+    with Registry(where) as registry:
+        for i in range(EACH):
+            version = registry.add(
+                "a", Candidate({"who": who, "i": i}), reason="r", by=str(who), now=NOW
+            )
+            registry.promote("a", version.number, reason="r", by=str(who), now=NOW)
+
+
+def test_several_processes_make_it_and_write_it_at_once(where: str) -> None:
+    context = multiprocessing.get_context("spawn")
+    workers = [context.Process(target=many, args=(where, who)) for who in range(PROCESSES)]
+    for worker in workers:
+        worker.start()
+    for worker in workers:
+        worker.join()
+    assert [worker.exitcode for worker in workers] == [0] * PROCESSES
+    with Registry(where) as registry:
+        count = PROCESSES * EACH
+        assert [v.number for v in registry.versions("a")] == list(range(1, count + 1))
+        decisions = registry.decisions("a")
+        state = registry.machine("a")
+    assert len(decisions) == 2 * count
+    moved = [d for d in decisions if d.kind == "promoted"]
+    assert state.since == moved[-1]
+    assert state.in_force is not None and state.in_force.number == moved[-1].number
+
+
+def test_a_server_that_is_away_says_so_and_is_used_when_back(postgres: Server) -> None:
+    url = postgres.database()
+    with Registry(url) as registry:
+        registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
+        postgres.stop()
+        try:
+            with pytest.raises(RegistryAway, match="nothing is lost"):
+                registry.machines()
+            with pytest.raises(RegistryAway, match="nothing is lost"):
+                Registry(url)
+        finally:
+            postgres.start()
+        assert [m.name for m in registry.machines()] == ["a"]
+
+
+def test_passwords_are_not_shown() -> None:
+    with pytest.raises(RegistryAway) as caught:
+        Registry("postgresql://me:secret@127.0.0.1:9/none")
+    assert "secret" not in str(caught.value)
+    assert "127.0.0.1" in str(caught.value)
+
+
+def test_places_that_cannot_be_are_refused(tmp_path: Path) -> None:
+    text_file = tmp_path / "notes.txt"
+    text_file.write_text("no database at all, but text\n" * 40, encoding="utf-8")
+    for place, said in (
+        (str(tmp_path), "is a folder"),
+        (str(tmp_path / "no" / "r.db"), "no folder"),
+        (str(text_file), "not a database"),
+        ("mysql://a/b", "a URL of 'mysql'"),
+        ("://", "cannot be read"),
+    ):
+        with pytest.raises(BadRegistry, match=said):
+            Registry(place)
+    with pytest.raises(BadRegistry, match="no such file; 'workbench registry add' makes one"):
+        Registry(str(tmp_path / "r.db"), create=False)
+    assert not (tmp_path / "r.db").exists()
+
+
+def test_a_full_disk_is_said_and_leaves_what_was(tmp_path: Path) -> None:
+    place = str(tmp_path / "r.db")
+    with Registry(place) as registry:
+        registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
+        with registry.database.writing() as session:
+            pages = session.execute(text("PRAGMA page_count")).scalar()
+            session.execute(text(f"PRAGMA max_page_count = {pages}"))
+        with pytest.raises(RegistryAway, match=r"full.*free some space on its disk"):
+            registry.add("a", Candidate({"m": "x" * 100_000}), reason="r", by="t", now=NOW)
+        assert [v.number for v in registry.versions("a")] == [1]
+
+
+def test_location_is_the_option_the_variable_or_the_default(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.delenv("WORKBENCH_REGISTRY", raising=False)
+    assert location(None) == "registry.db"
+    monkeypatch.setitem(os.environ, "WORKBENCH_REGISTRY", "x.db")
+    assert location(None) == "x.db"
+    assert location("y.db") == "y.db"

@@ -1,0 +1,151 @@
+"""One result a log: claims, leases that end, results that come twice or too late."""
+
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.queue import OFTEN, Queue
+from workbench.registry.store import Registry
+from workbench.registry.values import Candidate, Claim, Judgement, SeenLog
+
+NOW = datetime(2026, 3, 1, tzinfo=UTC)
+LEASE = timedelta(minutes=1)
+LOG = SeenLog("a" * 64, "a.csv", 10, 100)
+OTHER = SeenLog("b" * 64, "b.csv", 20, 50)
+DRIFT = Judgement("promoted", "moved", Candidate({"m": 2.0}, {"k": 2.0}, {"ok": True}), {"p": 0.01})
+
+
+@pytest.fixture
+def queue(registry: Registry) -> Queue:
+    registry.add("m", Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
+    registry.promote("m", 1, reason="first", by="t", now=NOW)
+    found = Queue(registry.database)
+    assert found.announce("m", [LOG, OTHER], now=NOW) == 2
+    return found
+
+
+def claimed(queue: Queue, owner: str = "w", now: datetime = NOW) -> Claim:
+    claim = queue.claim("m", owner=owner, lease=LEASE, now=now)
+    assert claim is not None
+    return claim
+
+
+def test_a_log_is_announced_once_by_its_content(queue: Queue) -> None:
+    renamed = SeenLog(LOG.sha256, "copy.csv", 10, 200)
+    new = SeenLog("c" * 64, "c.csv", 1, 1)
+    assert queue.announce("m", [LOG, renamed, new, new], now=NOW) == 1
+    assert queue.known("m")["a.csv", 10, 100] == LOG.sha256
+    assert [log for log, _ in queue.waiting("m")] == [new, OTHER, LOG]  # oldest first
+    assert queue.announce("other", [LOG], now=NOW) == 1
+
+
+def test_one_worker_at_a_time_until_its_lease_ends(queue: Queue) -> None:
+    first = claimed(queue)
+    assert queue.claim("m", owner="x", lease=LEASE, now=NOW + 0.9 * LEASE) is None
+    queue.renew(first, lease=LEASE, now=NOW + 0.9 * LEASE)
+    assert queue.claim("m", owner="x", lease=LEASE, now=NOW + 1.5 * LEASE) is None
+    second = claimed(queue, "x", NOW + 2 * LEASE)
+    for act in (
+        lambda: queue.renew(first, lease=LEASE, now=NOW + 2 * LEASE),
+        lambda: queue.begin(first, LOG, now=NOW + 2 * LEASE),
+        lambda: queue.finish(first, LOG, DRIFT, by="w", now=NOW + 2 * LEASE),
+    ):
+        with pytest.raises(LostClaim, match="another worker has taken over"):
+            act()
+    queue.release(first)  # gives nothing back that is another's
+    assert queue.claim("m", owner="y", lease=LEASE, now=NOW + 2 * LEASE) is None
+    queue.release(second)
+    assert claimed(queue, "y", NOW + 2 * LEASE).owner == "y"
+
+
+def test_a_result_has_all_that_belongs_to_it_or_nothing(queue: Queue, registry: Registry) -> None:
+    claim = claimed(queue)
+    late = claimed(queue, "x", NOW + 2 * LEASE)
+    with pytest.raises(LostClaim):
+        queue.finish(claim, LOG, DRIFT, by="w", now=NOW)
+    assert len(registry.versions("m")) == 1 and len(registry.decisions("m")) == 2
+    outcome = queue.finish(late, LOG, DRIFT, by="x", now=NOW)
+    assert (outcome.verdict, outcome.number, outcome.evidence) == ("promoted", 1, {"p": 0.01})
+    state = registry.machine("m")
+    assert state.in_force is not None and state.in_force.number == 2
+    assert state.since is not None
+    assert (state.since.log, state.since.evidence) == (LOG.sha256, {"p": 0.01})
+    assert (state.logs, state.waiting) == (2, 1)
+
+
+def test_the_same_result_again_changes_nothing(queue: Queue, registry: Registry) -> None:
+    claim = claimed(queue)
+    first = queue.finish(claim, LOG, DRIFT, by="w", now=NOW)
+    assert queue.finish(claim, LOG, DRIFT, by="w", now=NOW + LEASE) == first
+    assert len(registry.versions("m")) == 2 and len(registry.decisions("m")) == 3
+
+
+def test_a_refused_candidate_is_kept_with_its_reason(queue: Queue, registry: Registry) -> None:
+    assert DRIFT.candidate is not None
+    refusal = Judgement("refused", "no better", DRIFT.candidate)
+    queue.finish(claimed(queue), LOG, refusal, by="w", now=NOW)
+    state = registry.machine("m")
+    assert state.in_force is not None and state.in_force.number == 1
+    last = registry.decisions("m")[-1]
+    assert (last.kind, last.number, last.reason) == ("refused", 2, "no better")
+
+
+def test_a_rival_is_refused_beside_what_is_promoted(queue: Queue, registry: Registry) -> None:
+    rival = Candidate({"m": 2.0}, {"k": 3.0})
+    both = Judgement("promoted", "model alone", DRIFT.candidate, {}, (rival, "tracks worse"))
+    queue.finish(claimed(queue), LOG, both, by="w", now=NOW)
+    last = [(d.kind, d.number, d.reason) for d in registry.decisions("m")[-2:]]
+    assert last == [("refused", 2, "tracks worse"), ("promoted", 3, "model alone")]
+    state = registry.machine("m")
+    assert state.in_force is not None and state.in_force.number == 3
+
+
+def test_often_begun_logs_come_last(queue: Queue) -> None:
+    claim = claimed(queue)
+    for count in range(OFTEN):
+        assert queue.waiting("m") == ((OTHER, count), (LOG, 0))
+        queue.begin(claim, OTHER, now=NOW)
+    assert queue.waiting("m") == ((LOG, 0), (OTHER, OFTEN))
+
+
+def test_evidence_of_the_last_log_goes_to_the_next(queue: Queue, registry: Registry) -> None:
+    version = registry.version("m", 1)
+    assert queue.last_evidence(version) is None
+    claim = claimed(queue)
+    queue.finish(claim, LOG, Judgement("none", "", evidence={"n": 1}), by="w", now=NOW)
+    queue.finish(claim, OTHER, Judgement("set_aside", "bad"), by="w", now=NOW + LEASE)
+    assert queue.last_evidence(version) == {"n": 1}
+
+
+def test_a_log_reopened_is_judged_once_more(queue: Queue, registry: Registry) -> None:
+    claim = claimed(queue)
+    queue.begin(claim, LOG, now=NOW)
+    queue.finish(claim, LOG, Judgement("set_aside", "bad card"), by="w", now=NOW)
+    queue.finish(claim, OTHER, Judgement("none", "quiet"), by="w", now=NOW)
+    assert registry.machine("m").set_aside == 1
+    assert queue.reopen("m", [], reason="card corrected", by="t", now=NOW) == ("a.csv",)
+    assert queue.waiting("m") == ((LOG, 0),)
+    assert (registry.machine("m").waiting, registry.machine("m").set_aside) == (1, 0)
+    queue.finish(claim, LOG, Judgement("none", "quiet"), by="w", now=NOW)
+    assert queue.waiting("m") == ()
+    assert [(o.log, o.turn, o.verdict) for o in queue.outcomes("m")] == [
+        (OTHER, 0, "none"),
+        (LOG, 0, "set_aside"),
+        (LOG, 1, "none"),
+    ]
+    assert queue.reopen("m", ["bbbb"], reason="r", by="t", now=NOW) == ("b.csv",)
+    with pytest.raises(BadRegistry, match=r"no log 'b\.csv' with a result"):
+        queue.reopen("m", ["b.csv"], reason="r", by="t", now=NOW)
+
+
+def test_alarms_are_kept_until_they_are_taken(queue: Queue) -> None:
+    claim = claimed(queue)
+    done = queue.finish(claim, LOG, Judgement("set_aside", "bad"), by="w", now=NOW)
+    queue.finish(claim, OTHER, Judgement("none", "quiet"), by="w", now=NOW)
+    assert queue.unsent(["set_aside", "promoted"], since=NOW) == (done,)
+    assert queue.unsent(["set_aside"], since=NOW + LEASE) == ()
+    queue.sent(done, now=NOW)
+    queue.sent(done, now=NOW)
+    assert queue.unsent(["set_aside", "promoted"], since=NOW) == ()
+    assert queue.verdicts() == {("m", "set_aside"): 1, ("m", "none"): 1}

@@ -1,0 +1,188 @@
+"""What a log leads to: nothing, a new version, a refusal; on real logs of a simulated machine."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.errors import BadCard, BadLog, BadModel
+from identification.karnopp import Karnopp
+from tests.chain import CARD, TABLES
+from workbench.card import Card, load_card
+from workbench.challenge import Terms
+from workbench.drift_verdict import Drift, drift_by_refit
+from workbench.jobs.passes import Task
+from workbench.judging import Chain, divided
+from workbench.model import Model, read_model
+from workbench.output import dumps
+from workbench.recording import as_columns, record
+from workbench.registry.values import Judgement, SeenLog, Version
+from workbench.sources import Sources, read_sources
+
+OLD = TABLES["paper_table1"]
+NEW = replace(OLD, F_cp=16.0, F_vp=380.0, F_sp=26.0)
+VERSION = Version("a", 1, "m", "d", None, datetime(2026, 3, 1, tzinfo=UTC))
+
+
+@pytest.fixture(scope="module")
+def shop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A machine's folder with logs before and after its friction has changed."""
+    folder = tmp_path_factory.mktemp("a")
+    (folder / "card.toml").write_text(
+        CARD.replace("duration_s = 6.0", "duration_s = 10.0"), "utf-8"
+    )
+    card = load_card(folder / "card.toml")
+    for name, friction, seed in (("first", OLD, 5), ("same", OLD, 6), ("drifted", NEW, 7)):
+        write(folder / f"{name}.csv", card, friction, seed)
+    return folder
+
+
+def write(path: Path, card: Card, friction: Karnopp, seed: int) -> None:
+    assert card.recipe is not None
+    recipe = replace(card.recipe, plant=replace(card.recipe.plant, friction=friction))
+    log = record(card.name, recipe, seed, card.rig())
+    pd.DataFrame(as_columns(log, card)).to_csv(path, index=False, float_format="%.12g")
+
+
+@pytest.fixture(scope="module")
+def first(shop: Path) -> Judgement:
+    """The machine's first model."""
+    return Chain()(task(shop, "first", None))
+
+
+def task(
+    shop: Path, name: str, first: Judgement | None, previous: Mapping[str, Any] | None = None
+) -> Task:
+    log = SeenLog(name, f"{name}.csv", 1, 1)
+    made = None if first is None else first.candidate
+    return Task(
+        machine="a",
+        card=shop / "card.toml",
+        path=shop / f"{name}.csv",
+        log=log,
+        version=None if made is None else VERSION,
+        model=None if made is None else made.model,
+        design=None if made is None else made.design,
+        previous=previous,
+    )
+
+
+def model_of(first: Judgement, folder: Path) -> Model:
+    assert first.candidate is not None
+    (folder / "model.json").write_text(dumps(first.candidate.model), encoding="utf-8")
+    return read_model(folder / "model.json")
+
+
+def says(verdict: Any, **more: Any) -> Any:
+    """A drift test that always says the same, and keeps what it was given."""
+
+    def test(
+        model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
+    ) -> Drift:
+        return Drift(verdict, "said", state={"given": dict(state)}, **more)
+
+    return test
+
+
+def test_the_first_model_is_one_that_passes(first: Judgement) -> None:
+    assert first.verdict == "promoted"
+    assert first.candidate is not None
+    assert first.candidate.model["friction"]["F_cp"]["value"] == pytest.approx(12.0, rel=1e-2)
+    assert first.candidate.design is not None and first.candidate.validation is not None
+    assert first.candidate.validation["passed"] is True
+
+
+def test_the_refit_tells_a_changed_machine_from_the_same(
+    shop: Path, first: Judgement, tmp_path: Path
+) -> None:
+    model, rng = model_of(first, tmp_path), np.random.default_rng(1)
+    for name, verdict, names in (
+        ("same", "none", set()),
+        ("drifted", "drift", {"F_cp", "F_vp", "F_sp"}),
+    ):
+        sources = read_sources([str(shop / f"{name}.csv")], str(shop / "card.toml"))
+        found = drift_by_refit(model, sources, rng, {})
+        assert (found.verdict, {one.name for one in found.moved}) == (verdict, names)
+    (moved,) = (one for one in found.moved if one.name == "F_cp")
+    assert (moved.before, moved.after) == pytest.approx((12.0, 16.0), rel=1e-2)
+
+
+def test_a_drifted_machine_gets_a_new_version(shop: Path, first: Judgement) -> None:
+    chain = Chain(says("drift"), Terms(loop=-10.0))
+    found = chain(task(shop, "drifted", first))
+    assert found.verdict == "promoted", found.reason
+    assert found.candidate is not None
+    assert found.candidate.model["friction"]["F_cp"]["value"] == pytest.approx(16.0, rel=1e-2)
+    contest = found.evidence["contest"]["held_out"]
+    assert contest["challenger"]["position_rms"] < 0.5 * contest["champion"]["position_rms"]
+    (entry,) = found.candidate.model["log"]
+    assert entry["duration"] == pytest.approx(0.65 * 10.0, rel=0.01)  # the rest was held out
+
+
+def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
+    shop: Path, first: Judgement
+) -> None:
+    found = Chain(says("drift"), Terms(loop=0.9))(task(shop, "drifted", first))
+    assert found.verdict == "promoted", found.reason
+    assert "the model is replaced and the controllers stay" in found.reason
+    assert first.candidate is not None and first.candidate.design is not None
+    assert found.candidate is not None and found.candidate.design is not None
+    for name in ("rst", "pid", "force"):
+        assert found.candidate.design[name] == first.candidate.design[name]
+    friction = found.candidate.design["compensator"]["friction"]
+    assert friction["F_cp"]["value"] == pytest.approx(16.0, rel=1e-2)
+    assert found.rival is not None
+    rival, why = found.rival
+    assert rival.design != found.candidate.design and "at least 90 % less needed" in why
+
+
+def test_a_false_alarm_is_refused_with_its_reason(shop: Path, first: Judgement) -> None:
+    found = Chain(says("drift"))(task(shop, "same", first))
+    assert found.verdict == "refused"
+    assert "held out" in found.reason
+    assert found.candidate is not None
+
+
+@pytest.mark.parametrize("verdict", ["none", "structure", "not_judged"])
+def test_other_verdicts_are_passed_on_with_their_state(
+    shop: Path, first: Judgement, verdict: str
+) -> None:
+    found = Chain(says(verdict))(task(shop, "same", first, {"state": {"mean": 1.5}}))
+    assert (found.verdict, found.reason, found.candidate) == (verdict, "said", None)
+    assert found.evidence["state"] == {"given": {"mean": 1.5}}
+
+
+def test_the_log_that_made_the_model_does_not_judge_it(shop: Path, first: Judgement) -> None:
+    assert first.candidate is not None
+    one = task(shop, "first", first)
+    digest = first.candidate.model["log"][0]["sha256"]
+    found = Chain(says("drift"))(replace(one, log=replace(one.log, sha256=digest)))
+    assert (found.verdict, found.reason) == (
+        "none",
+        "the model in force was fitted on this log",
+    )
+
+
+def test_what_cannot_be_judged_says_why(shop: Path, first: Judgement, tmp_path: Path) -> None:
+    (tmp_path / "bad.csv").write_text("t,y\n0,0\n", encoding="utf-8")
+    one = task(shop, "same", first)
+    with pytest.raises(BadLog, match="no column"):
+        Chain()(replace(one, path=tmp_path / "bad.csv"))
+    with pytest.raises(BadCard, match="no such card"):
+        Chain()(replace(one, card=tmp_path / "card.toml"))
+    with pytest.raises(BadModel, match=r"a: in force: model\.json: "):
+        Chain()(replace(one, model={"schema": "model/1"}))
+
+
+def test_a_run_is_divided_in_time(shop: Path) -> None:
+    sources = read_sources([str(shop / "same.csv")], str(shop / "card.toml"))
+    train, (rest,) = divided(sources)
+    whole, (part,) = sources.runs[0].log, train.runs
+    assert len(part.log) + len(rest) == len(whole)
+    assert part.rows == len(part.log) == round(0.65 * len(whole))
+    assert part.log["t"][-1] < rest["t"][0]

@@ -1,0 +1,264 @@
+"""Champion and challenger: a new model and design replace the old only where they win.
+
+They have to win twice, with margin: on held-out logs or time blocks that neither was fitted on
+(free run in windows, and the force equation), and in the simulated loop of the machine as it is
+now, along one reference for both designs. Where only the model wins and the design in force still
+keeps every limit, the model alone is replaced. The rule is ours; the paper re-tunes without asking.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadModel
+from identification.log import Log
+from identification.result import Drive
+from workbench.closed_loop import loop_period, run_loop
+from workbench.design_values import Design
+from workbench.model import Model
+from workbench.predicting import default_drive, predict
+from workbench.validating import (
+    DWELLS,
+    SHORTEST_DWELL,
+    SMOOTH_SHARE,
+    SMOOTH_SPEED,
+    STEP_SHARE,
+    judged_of,
+    slowest,
+    travel,
+    validate,
+)
+
+WINDOW = 2.0  # s between fresh starts of a free run, as everywhere on held-out logs
+LEAST_HELD_OUT = 2.0  # s
+
+
+@dataclass(frozen=True)
+class Terms:
+    """What winning means.
+
+    held_out: least relative fall of a held-out error; worse: largest rise of any other one;
+    loop: least relative fall of the tracking error in simulation.
+    """
+
+    held_out: float = 0.1
+    worse: float = 0.02
+    loop: float = 0.02
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A model and the design made for it; None: a model alone."""
+
+    model: Model
+    design: Design | None
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Errors on held-out logs: free run [m] and force equation [N]; None where there is none."""
+
+    position_rms: float | None
+    force_rms: float | None
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """A design on the machine as it is now: error along the reference [m], and what it misses."""
+
+    rms: float | None
+    missed: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Who has won and why, with the figures of both; loop of the champion None: no design.
+
+    won: the challenger, model and design; model_won: its model, while the champion's design keeps
+    every limit on it and is not beaten.
+    """
+
+    won: bool
+    model_won: bool
+    reason: str
+    held_out: dict[str, HeldOut]
+    loop: dict[str, Tracking | None]
+
+
+def challenge(
+    champion: Contender,
+    challenger: Contender,
+    held_out: Sequence[Log],
+    rng: np.random.Generator,
+    terms: Terms | None = None,
+) -> Contest:
+    """The contest on logs that neither was fitted on, and in the loop on the challenger's plant.
+
+    rng: of the simulated sensors' noise. Raises BadModel where no held-out log is long enough.
+    """
+    terms = terms or Terms()
+    if not any(log.duration >= LEAST_HELD_OUT for log in held_out):
+        raise BadModel(f"no held-out log of at least {LEAST_HELD_OUT:g} s; give a longer one")
+    errors = {
+        name: held_out_errors(one.model, held_out, _drive((champion, challenger), held_out))
+        for name, one in (("champion", champion), ("challenger", challenger))
+    }
+    loop = _loops(champion, challenger, rng)
+    old, new = loop["champion"], loop["challenger"]
+    lost = _lost_held_out(errors["champion"], errors["challenger"], terms)
+    if lost:
+        return Contest(False, False, lost, errors, loop)
+    lost = _lost_loop(old, new, terms)
+    keeps = old is not None and old.rms is not None and not old.missed
+    said = _won(errors, loop) if not lost else f"{_held_out_said(errors)}; {lost}"
+    return Contest(not lost, bool(lost) and keeps, said, errors, loop)
+
+
+def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
+    """Root mean squares over the logs, by their lengths; no free run where motion is imposed."""
+    found = []
+    for log in logs:
+        window = WINDOW if log.duration >= 2 * WINDOW else None
+        one = predict(model, log, drive=drive, window=window)
+        position = None if model.imposed else one.position_rms
+        found.append((len(log), position, one.force_predicted_rms))
+    return HeldOut(
+        _pooled([(n, position) for n, position, _ in found]),
+        _pooled([(n, force) for n, _, force in found]),
+    )
+
+
+def contest_document(found: Contest) -> dict[str, Any]:
+    """The contest as the registry keeps it."""
+    return {
+        "won": found.won,
+        "model_won": found.model_won,
+        "reason": found.reason,
+        "held_out": {name: vars(one) for name, one in found.held_out.items()},
+        "loop": {name: one and vars(one) for name, one in found.loop.items()},
+    }
+
+
+def _drive(both: Sequence[Contender], logs: Sequence[Log]) -> Drive:
+    """One drive for both: the command where each model may be driven by it on each log."""
+    ways = {default_drive(one.model, log) for one in both for log in logs}
+    return "command" if ways == {"command"} else "force"
+
+
+def _pooled(found: Sequence[tuple[int, float | None]]) -> float | None:
+    known = [(n, value) for n, value in found if value is not None]
+    if not known:
+        return None
+    total = sum(n for n, _ in known)
+    with np.errstate(over="ignore"):
+        return float(np.sqrt(sum(n * value**2 for n, value in known) / total))
+
+
+def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms) -> str:
+    """Why the challenger does not win on held-out logs; empty where it does."""
+    better = False
+    for name, before, after in (
+        ("free run", old.position_rms, new.position_rms),
+        ("force", old.force_rms, new.force_rms),
+    ):
+        if before is None or after is None:
+            continue
+        if not after <= before * (1.0 + terms.worse):
+            return (
+                f"held out, {name}: {after:.4g} against {before:.4g}, worse than the one in force"
+            )
+        better = better or after <= before * (1.0 - terms.held_out)
+    if better:
+        return ""
+    return (
+        f"held out: {_figures(new)} against {_figures(old)}; one of them has to fall by"
+        f" {100 * terms.held_out:g} % at least"
+    )
+
+
+def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
+    """Why the challenger does not win in simulation; empty where it does."""
+    if new is None:
+        return "simulation: no design"
+    if new.missed or new.rms is None:
+        return f"simulation: {'; '.join(new.missed)}"
+    if old is None or old.missed or old.rms is None:
+        return ""
+    if new.rms <= old.rms * (1.0 - terms.loop):
+        return ""
+    return (
+        f"simulation: tracking error {new.rms:.4g} against {old.rms:.4g} of the design in force on"
+        f" the same machine, at least {100 * terms.loop:g} % less needed"
+    )
+
+
+def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
+    text = _held_out_said(errors)
+    new, old = loop["challenger"], loop["champion"]
+    if new is None or new.rms is None:
+        return text
+    text += f"; simulation: tracking error {new.rms:.4g}"
+    if old is None:
+        return f"{text}, no design before"
+    if old.missed or old.rms is None:
+        return f"{text}, the design in force misses: {'; '.join(old.missed)}"
+    return f"{text} against {old.rms:.4g}"
+
+
+def _held_out_said(errors: dict[str, HeldOut]) -> str:
+    return f"held out: {_figures(errors['challenger'])} against {_figures(errors['champion'])}"
+
+
+def _figures(found: HeldOut) -> str:
+    parts = [("free run", found.position_rms), ("force", found.force_rms)]
+    return ", ".join(f"{name} {value:.4g}" for name, value in parts if value is not None)
+
+
+def _loops(
+    champion: Contender, challenger: Contender, rng: np.random.Generator
+) -> dict[str, Tracking | None]:
+    """Both designs on the challenger's plant, along one reference, with the same noise."""
+    designs = [one.design for one in (champion, challenger) if one.design is not None]
+    seed = int(rng.integers(2**32))
+    out: dict[str, Tracking | None] = {}
+    for name, one in (("champion", champion), ("challenger", challenger)):
+        out[name] = None
+        if one.design is not None:
+            noise = np.random.default_rng(seed)
+            out[name] = tracking(challenger.model, one.design, designs, noise)
+    return out
+
+
+def tracking(
+    machine: Model, found: Design, designs: Sequence[Design], rng: np.random.Generator
+) -> Tracking:
+    """A design on a machine: what validation says of it, and its error on the common reference."""
+    if found.recommended == "none":
+        return Tracking(None, ("no controller keeps its goals",))
+    name = judged_of(found)
+    try:
+        checked, _ = validate(machine, found, rng)
+        reference = common_reference(machine, designs, loop_period(found))
+        run = run_loop(machine, found, found.controllers[name], reference, rng)
+    except BadModel as error:
+        return Tracking(None, (str(error),))
+    with np.errstate(over="ignore", invalid="ignore"):
+        rms = float(np.sqrt(np.mean((run.r - run.y) ** 2)))
+    return Tracking(rms if np.isfinite(rms) else None, checked.figures[name]["model"].missed)
+
+
+def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Array:
+    """Steps and then a smooth motion [m] at the period h [s], the same motion for every design."""
+    low, high = machine.travel
+    step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
+    dwell = max(
+        max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
+    )
+    w = SMOOTH_SPEED * min(one.controllers[judged_of(one)].dominant[0] for one in designs)
+    levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
+    t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
+    rise = np.clip(t * w / np.pi, 0.0, 1.0)
+    return np.concatenate([levels, amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)])

@@ -1,0 +1,273 @@
+"""`workbench registry`: what is in force on each machine, what was, and why."""
+
+import getpass
+import json
+from collections.abc import Callable
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from workbench.options import effects_option
+from workbench.output import OutputFolder, emit
+
+if TYPE_CHECKING:
+    from workbench.registry.store import Registry
+    from workbench.registry.values import Decision, Version
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+KINDS = ("model", "design", "validation")
+
+
+def registry_options(command: Command) -> Command:
+    """The options of every registry command: `where` (--registry) and `as_json` (--json)."""
+    options = (
+        click.option(
+            "--registry",
+            "where",
+            metavar="FILE|URL",
+            help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
+    )
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+def decision_options(command: Command) -> Command:
+    """Why and by whom: `reason` (--reason) and `by` (--by)."""
+    by = click.option("--by", metavar="NAME", help="Who decides.  [default: you]")
+    why = click.option("--reason", required=True, metavar="TEXT", callback=_given,
+                       help="Why; it is recorded.")  # fmt: skip
+    return why(by(command))
+
+
+def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
+    if not value.strip():
+        raise click.UsageError("--reason is empty; say why in a few words.", ctx)
+    return value.strip()
+
+
+@click.group(epilog="Example: workbench registry show bench-a --json")
+def command() -> None:
+    """Models and designs of machines, append-only, with one version in force each.
+
+    Every subcommand takes --registry FILE|URL and --json; 'show --out DIR' writes a version's
+    files.
+    """
+
+
+@command.command("list", epilog="Example: workbench registry list --registry fleet.db")
+@registry_options
+def list_machines(where: str | None, as_json: bool) -> None:
+    """List the machines, what is in force on each, and how many logs wait."""
+    from workbench.registry.views import list_view
+
+    with _open(where) as found:
+        machines = found.machines()
+    emit({"machines": machines}, as_json, lambda: list_view(machines))
+
+
+@command.command(epilog="Example: workbench registry show bench-a 2 --out version2")
+@click.argument("machine")
+@click.argument("number", type=click.IntRange(min=1), required=False)
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+              help="Write the files of the version too.")  # fmt: skip
+@registry_options
+def show(
+    machine: str, number: int | None, out: Path | None, where: str | None, as_json: bool
+) -> None:
+    """Show a machine: what is in force, every decision with its reason, every log's result.
+
+    NUMBER: a version whose files --out writes, by default the one in force.
+    """
+    from workbench.registry.queue import Queue
+    from workbench.registry.views import machine_view
+
+    with _open(where) as found:
+        state, decisions = found.machine(machine), found.decisions(machine)
+        outcomes = Queue(found.database).outcomes(machine)
+        if number is not None or out is not None:
+            version = _version(found, machine, number)
+            decisions = tuple(d for d in decisions if number is None or d.number == number)
+            if out is not None:
+                _write(found, version, out)
+    shown = {"machine": state, "decisions": decisions, "logs": outcomes}
+    emit(shown, as_json, lambda: machine_view(state, decisions, outcomes))
+
+
+@command.command(epilog="Example: workbench registry diff bench-a 1 2")
+@click.argument("machine")
+@click.argument("first", type=click.IntRange(min=1), required=False)
+@click.argument("second", type=click.IntRange(min=1), required=False)
+@registry_options
+def diff(
+    machine: str, first: int | None, second: int | None, where: str | None, as_json: bool
+) -> None:
+    """Show the parameters of two versions side by side, with units and 95 % intervals.
+
+    FIRST: by default the version before SECOND; SECOND: by default the one in force.
+    """
+    from workbench.registry.difference import difference
+    from workbench.registry.errors import BadRegistry
+    from workbench.registry.views import difference_view
+
+    with _open(where) as found:
+        after = _version(found, machine, second)
+        if first is None and after.number == 1:
+            raise BadRegistry(
+                f"{machine}: no version before {after.number}; name two versions to compare"
+            )
+        before = found.version(machine, first if first is not None else after.number - 1)
+        lines = difference(_documents(found, before), _documents(found, after))
+    names = (f"version {before.number}", f"version {after.number}")
+    result = {"machine": machine, "versions": [before, after], "parameters": lines}
+    emit(result, as_json, lambda: difference_view(lines, names))
+
+
+@command.command(
+    epilog="Example: workbench registry add bench-a model.json design.json --promote --reason first"
+)
+@click.argument("machine")
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.argument("design_file", metavar="[DESIGN]", required=False,
+                type=click.Path(path_type=Path))  # fmt: skip
+@click.option("--validation", type=click.Path(path_type=Path), metavar="FILE",
+              help="validation.json of the design.")  # fmt: skip
+@click.option("--promote", is_flag=True, help="Put it in force as well.")
+@effects_option
+@decision_options
+@registry_options
+def add(
+    machine: str,
+    model_file: Path,
+    design_file: Path | None,
+    validation: Path | None,
+    promote: bool,
+    effects: tuple[Path, ...],
+    reason: str,
+    by: str | None,
+    where: str | None,
+    as_json: bool,
+) -> None:
+    """Add a model, with its design, as a new version of a machine; a new machine is made.
+
+    What is in force stays in force unless --promote is given. The same files again are the same
+    version.
+    """
+    from workbench.design_values import read_design
+    from workbench.model import read_model
+    from workbench.own_effects import library
+    from workbench.reading import read_document
+    from workbench.registry.values import Candidate
+
+    read_model(model_file, library(effects))
+    if design_file is not None:
+        read_design(design_file)
+    candidate = Candidate(
+        read_document(model_file),
+        None if design_file is None else read_document(design_file),
+        None if validation is None else read_document(validation, "validation/1"),
+    )
+    who, now = by or getpass.getuser(), datetime.now(UTC)
+    with _open(where, create=True) as found:
+        version = found.add(machine, candidate, reason=reason, by=who, now=now)
+        current = found.in_force(machine)
+        if promote and (current is None or current.number != version.number):
+            found.promote(machine, version.number, reason=reason, by=who, now=now)
+    state = "in force" if promote else "not in force yet: 'workbench registry promote'"
+    emit(version, as_json, lambda: f"{machine}: version {version.number}, {state}")
+
+
+@command.command(epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'")
+@click.argument("machine")
+@click.argument("number", type=click.IntRange(min=1))
+@decision_options
+@registry_options
+def promote(
+    machine: str, number: int, reason: str, by: str | None, where: str | None, as_json: bool
+) -> None:
+    """Put a version of a machine in force."""
+    who, now = by or getpass.getuser(), datetime.now(UTC)
+    with _open(where) as found:
+        decision = found.promote(machine, number, reason=reason, by=who, now=now)
+    emit(decision, as_json, lambda: _said(decision))
+
+
+@command.command(epilog="Example: workbench registry rollback bench-a --reason 'it hunts'")
+@click.argument("machine")
+@decision_options
+@registry_options
+def rollback(machine: str, reason: str, by: str | None, where: str | None, as_json: bool) -> None:
+    """Put the version in force that was before the present one; again goes one further back."""
+    who, now = by or getpass.getuser(), datetime.now(UTC)
+    with _open(where) as found:
+        decision = found.rollback(machine, reason=reason, by=who, now=now)
+    emit(decision, as_json, lambda: _said(decision))
+
+
+@command.command(epilog="Example: workbench registry retry bench-a --reason 'card corrected'")
+@click.argument("machine")
+@click.argument("logs", nargs=-1, metavar="[LOG...]")
+@decision_options
+@registry_options
+def retry(
+    machine: str,
+    logs: tuple[str, ...],
+    reason: str,
+    by: str | None,
+    where: str | None,
+    as_json: bool,
+) -> None:
+    """Have logs judged again by the next pass; their earlier results stay on record.
+
+    LOG: a file name or the beginning of a fingerprint; by default all that were set aside.
+    """  # fmt: skip
+    from workbench.registry.queue import Queue
+
+    who, now = by or getpass.getuser(), datetime.now(UTC)
+    with _open(where) as found:
+        files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
+    said = (
+        f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none set aside"
+    )
+    emit({"machine": machine, "logs": files}, as_json, lambda: said)
+
+
+def _open(where: str | None, *, create: bool = False) -> "Registry":
+    from workbench.registry.database import location
+    from workbench.registry.store import Registry
+
+    return Registry(location(where), create=create)
+
+
+def _version(found: "Registry", machine: str, number: int | None) -> "Version":
+    """The version of that number, by default the one in force."""
+    from workbench.registry.errors import BadRegistry
+
+    found.machine(machine)
+    version = found.in_force(machine) if number is None else found.version(machine, number)
+    if version is None:
+        raise BadRegistry(f"{machine}: no version in force; name a version's number")
+    return version
+
+
+def _documents(found: "Registry", version: "Version") -> dict[str, dict[str, Any] | None]:
+    return {
+        kind: found.document(version, kind) if getattr(version, kind) else None  # type: ignore[arg-type]
+        for kind in KINDS
+    }
+
+
+def _write(found: "Registry", version: "Version", out: Path) -> None:
+    with OutputFolder("registry", out, now=datetime.now()) as folder:
+        for kind, document in _documents(found, version).items():
+            if document is not None:
+                folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
+
+
+def _said(decision: "Decision") -> str:
+    return f"{decision.machine}: version {decision.number} in force ({decision.reason})"

@@ -1,0 +1,64 @@
+"""`workbench reidentify`: one pass over the machines that have new logs."""
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from workbench.jobs.options import JobOptions, job_options, worker
+from workbench.output import emit
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from workbench.jobs.passes import PassReport
+
+
+@click.command(epilog="Example: workbench reidentify machines --registry fleet.db")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@job_options
+def command(as_json: bool, **given: Any) -> int:
+    """Judge each new log of each machine once; where friction has drifted, re-tune.
+
+    ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
+    tested against the model in force ('workbench registry add' puts the first there); on drift a
+    new model and design are made, which replace the old only if they win on held-out data and in
+    simulation. Safe to run at any time and many at once; what a killed run left, the next does.
+    Progress is told as JSON lines on standard error. Exit status 1: an alarm (drift, a log set
+    aside); 2: a machine could not be handled, or the registry is away.
+    """
+    from workbench.jobs.alarms import ALARMING
+
+    with worker(JobOptions(**given)) as found:
+        done = found.once()
+    emit(done, as_json, lambda: pass_view(done))
+    if done.failed:
+        for name, line in done.failed.items():
+            click.echo(f"error: {name}: {line}", err=True)
+        return 2
+    return 1 if any(one.verdict in ALARMING for one in done.outcomes) else 0
+
+
+def pass_view(done: "PassReport") -> "Group":
+    """What a pass did, for a terminal."""
+    from rich.console import Group, RenderableType
+
+    from workbench.registry.views import outcomes_view
+
+    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"
+    parts: list[RenderableType] = [judged, *remarks(done)]
+    if done.outcomes:
+        parts.append(outcomes_view(done.outcomes))
+    return Group(*parts)
+
+
+def remarks(done: "PassReport") -> Sequence[str]:
+    """What a pass left for a later one, in words."""
+    out = []
+    if done.growing:
+        out.append(f"{done.growing} file(s) still being written (--settle), left for later")
+    if done.busy:
+        out.append(f"in another worker's hands: {', '.join(done.busy)}")
+    for name in done.without_model:
+        out.append(f"{name}: no model in force; 'workbench registry add {name} ...', or --first")
+    return out

@@ -1,0 +1,78 @@
+"""`workbench watch`: pass after pass, by schedule and on new files, until it is stopped."""
+
+import signal
+import threading
+from contextlib import ExitStack
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from workbench.jobs.options import JobOptions, clock, job_options, worker
+
+if TYPE_CHECKING:
+    from workbench.jobs.options import Worker
+
+
+@click.command(epilog="Example: workbench watch machines --cron '0 * * * *' --port 9400")
+@click.option("--cron", default="*/5 * * * *", show_default=True, metavar="EXPR",
+              help="When to pass, beside every change of a log file.")  # fmt: skip
+@click.option("--port", type=click.IntRange(1, 65535), metavar="N",
+              help="Serve Prometheus metrics by HTTP.")  # fmt: skip
+@click.option("--address", default="127.0.0.1", show_default=True, help="Where to serve them.")
+@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
+@job_options
+def command(cron: str, port: int | None, address: str, as_json: bool, **given: Any) -> None:
+    """Do what 'workbench reidentify' does on a schedule, and soon after a log file appears.
+
+    ROOT as there. Ends on SIGTERM or Ctrl-C after the log in hand. A registry that is away is
+    tried again with every pass.
+    """
+    from workbench.jobs.watching import watch_machines
+
+    options, stop = JobOptions(**given), threading.Event()
+    with ExitStack() as held:
+        found = held.enter_context(worker(options, stop.is_set))
+        if port is not None:
+            held.enter_context(_served(found, address, port))
+        for number in (signal.SIGTERM, signal.SIGINT):
+            before = signal.signal(number, lambda _number, _frame: stop.set())
+            held.callback(signal.signal, number, before)
+        found.report("watching", root=str(options.root), cron=cron, port=port)
+        watch_machines(
+            options.root,
+            lambda: _once(found),
+            cron=cron,
+            settle=timedelta(seconds=options.settle),
+            clock=clock,
+            stop=stop,
+        )
+        found.report("stopped")
+
+
+def _once(found: "Worker") -> bool:
+    """One pass; whether it has to come again soon. What it dies of is told, and tried again."""
+    from identification.errors import UserError
+
+    try:
+        done = found.once()
+    except (UserError, OSError, MemoryError) as error:
+        found.report("pass_failed", reason=" ".join(str(error).split()))
+        return False
+    found.report("pass_done", judged=len(done.outcomes), growing=done.growing, busy=done.busy,
+                 failed=dict(done.failed))  # fmt: skip
+    return done.growing > 0
+
+
+def _served(found: "Worker", address: str, port: int) -> ExitStack:
+    """The metrics served until the stack is closed; raises OSError where the port is taken."""
+    from prometheus_client import start_http_server
+
+    from workbench.jobs.metrics import collected
+
+    server, thread = start_http_server(port, address, registry=collected(found.figures))
+    held = ExitStack()
+    held.callback(thread.join)
+    held.callback(server.server_close)
+    held.callback(server.shutdown)
+    return held

@@ -1,0 +1,63 @@
+"""A claim kept alive while a worker is busy, and patience with a database that is away."""
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from typing import ParamSpec, TypeVar
+
+from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
+
+from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.queue import Queue
+from workbench.registry.values import Claim
+
+P = ParamSpec("P")
+T = TypeVar("T")
+Clock = Callable[[], datetime]
+SHARE = 3.0  # renewals in one lease
+
+
+@dataclass(frozen=True)
+class Patience:
+    """Tries again for `seconds` what fails because the database is away; then raises it."""
+
+    seconds: float = 60.0
+    longest_wait: float = 5.0
+
+    def __call__(self, call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
+        """What the call gives; raises RegistryAway once patience has ended."""
+        again = Retrying(
+            retry=retry_if_exception_type(RegistryAway),
+            stop=stop_after_delay(self.seconds),
+            wait=wait_random_exponential(multiplier=0.1, max=self.longest_wait),
+            reraise=True,
+        )
+        return again(call, *args, **kwargs)
+
+
+@contextmanager
+def kept_alive(queue: Queue, claim: Claim, lease: timedelta, clock: Clock) -> Iterator[None]:
+    """Renews the claim from a thread until the block ends.
+
+    What goes wrong there is not raised here: a result is recorded only where the claim holds.
+    """
+    done = threading.Event()
+
+    def renew() -> None:
+        while not done.wait(lease.total_seconds() / SHARE):
+            try:
+                queue.renew(claim, lease=lease, now=clock())
+            except RegistryAway:
+                continue  # the next renewal comes before the lease ends, or the claim is lost
+            except LostClaim:
+                return
+
+    thread = threading.Thread(target=renew, name="lease", daemon=True)
+    thread.start()
+    try:
+        yield
+    finally:
+        done.set()
+        thread.join()

@@ -1,0 +1,75 @@
+"""Metrics in Prometheus' text format, read from the registry: every worker shows the same."""
+
+from collections.abc import Iterator
+from datetime import datetime
+from pathlib import Path
+
+from prometheus_client import CollectorRegistry, write_to_textfile
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+
+from workbench.registry.errors import RegistryAway
+from workbench.registry.queue import Queue
+from workbench.registry.store import Registry
+
+PREFIX = "servo_workbench"
+
+
+class Figures(Collector):
+    """Figures of all machines at the moment they are asked for; `passed` adds those of a pass."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+        self._last: tuple[datetime, int] | None = None
+
+    def passed(self, at: datetime, failed: int) -> None:
+        """Note when a pass has ended, and how many machines it could not handle."""
+        self._last = (at, failed)
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """The figures; `up` 0 and no others of the registry where it is away."""
+        try:
+            found = list(_of_machines(self._registry))
+        except RegistryAway:
+            yield _gauge("registry_up", "Whether the registry answers.", 0.0)
+        else:
+            yield _gauge("registry_up", "Whether the registry answers.", 1.0)
+            yield from found
+        if self._last is not None:
+            at, failed = self._last
+            yield _gauge("last_pass_timestamp_seconds", "End of the last pass.", at.timestamp())
+            yield _gauge("machines_failed", "Machines that the last pass could not handle.", failed)
+
+
+def collected(figures: Figures) -> CollectorRegistry:
+    """The figures as a registry of the Prometheus client, of their own."""
+    out = CollectorRegistry(auto_describe=False)
+    out.register(figures)
+    return out
+
+
+def write_metrics(path: Path, figures: Figures) -> None:
+    """Write them for the node exporter's textfile collector, whole or not at all."""
+    write_to_textfile(str(path), collected(figures))
+
+
+def _of_machines(registry: Registry) -> Iterator[GaugeMetricFamily]:
+    machines = registry.machines()
+    version = _family("version_in_force", "Number of the version in force.", "machine")
+    waiting = _family("logs_waiting", "Logs that wait for a result.", "machine")
+    for one in machines:
+        if one.in_force is not None:
+            version.add_metric([one.name], one.in_force.number)
+        waiting.add_metric([one.name], one.waiting)
+    judged = _family("logs_judged", "Logs by what they led to.", "machine", "verdict")
+    for labels, count in sorted(Queue(registry.database).verdicts().items()):
+        judged.add_metric(list(labels), count)
+    yield from (version, waiting, judged)
+
+
+def _family(name: str, meaning: str, *labels: str) -> GaugeMetricFamily:
+    return GaugeMetricFamily(f"{PREFIX}_{name}", meaning, labels=labels)
+
+
+def _gauge(name: str, meaning: str, value: float) -> GaugeMetricFamily:
+    return GaugeMetricFamily(f"{PREFIX}_{name}", meaning, value=value)

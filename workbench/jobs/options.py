@@ -1,0 +1,136 @@
+"""Options that `reidentify` and `watch` share, and the worker that they make of them."""
+
+import os
+import secrets
+import socket
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from workbench.options import POSITIVE, effects_option
+
+if TYPE_CHECKING:
+    from workbench.jobs.alarms import Webhook
+    from workbench.jobs.metrics import Figures
+    from workbench.jobs.passes import PassReport, Report
+    from workbench.registry.store import Registry
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """What the command line says; times in s, margin relative."""
+
+    root: Path
+    where: str | None
+    first: bool
+    settle: float
+    lease: float
+    patience: float
+    margin: float
+    seed: int
+    webhook: str | None
+    metrics: Path | None
+    effects: tuple[Path, ...]
+
+
+def job_options(command: Command) -> Command:
+    """ROOT and the options of `JobOptions`, by the names of its fields."""
+    options = (
+        click.argument("root", type=click.Path(path_type=Path)),
+        click.option("--registry", "where", metavar="FILE|URL", help="SQLite file or "
+                     "postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]"),
+        click.option("--first", is_flag=True,
+                     help="Give a machine without a model its first from its first log."),
+        click.option("--settle", type=click.FloatRange(min=0), default=10.0, show_default=True,
+                     metavar="S", help="Take a file that has not changed for this long."),
+        click.option("--lease", type=POSITIVE, default=120.0, show_default=True, metavar="S",
+                     help="Take a silent worker's machine over after this long."),
+        click.option("--patience", type=click.FloatRange(min=0), default=60.0, show_default=True,
+                     metavar="S", help="Wait this long for a database that is away."),
+        click.option("--margin", type=click.FloatRange(0, 1, max_open=True), default=0.1,
+                     show_default=True, help="Relative fall of a held-out error that wins."),
+        click.option("--webhook", metavar="URL", help="Send alarms there, as JSON by POST."),
+        click.option("--metrics", type=click.Path(path_type=Path), metavar="FILE",
+                     help="Write Prometheus metrics there after each pass."),
+        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
+        effects_option,
+        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
+    )  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True)
+class Worker:
+    """One worker: `once` is a pass with its alarms and metrics."""
+
+    options: JobOptions
+    registry: "Registry"
+    webhook: "Webhook | None"
+    report: "Report"
+    owner: str
+    figures: "Figures"
+    stop: Callable[[], bool]
+
+    def once(self) -> "PassReport":
+        """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
+        from workbench.challenge import Terms
+        from workbench.jobs.alarms import send_alarms
+        from workbench.jobs.lease import Patience
+        from workbench.jobs.metrics import write_metrics
+        from workbench.jobs.passes import Pass, Settings
+        from workbench.judging import Chain
+        from workbench.own_effects import library
+        from workbench.registry.queue import Queue
+
+        given = self.options
+        settings = Settings(
+            owner=self.owner,
+            lease=timedelta(seconds=given.lease),
+            settle=timedelta(seconds=given.settle),
+            first=given.first,
+            patience=Patience(given.patience),
+        )
+        terms = Terms(held_out=given.margin)
+        judge = Chain(terms=terms, seed=given.seed, library=library(given.effects))
+        done = Pass(self.registry, judge, settings, clock, self.report, self.stop).run(given.root)
+        if self.webhook is not None:
+            queue = Queue(self.registry.database)
+            send_alarms(queue, self.webhook, now=clock(), report=self.report)
+        self.figures.passed(clock(), len(done.failed))
+        if given.metrics is not None:
+            write_metrics(given.metrics, self.figures)
+        return done
+
+
+@contextmanager
+def worker(options: JobOptions, stop: Callable[[], bool] = lambda: False) -> Iterator[Worker]:
+    """A worker on the registry of the options; raises BadRoot, BadRegistry, RegistryAway."""
+    from workbench.jobs.alarms import Webhook
+    from workbench.jobs.events import reporter
+    from workbench.jobs.lease import Patience
+    from workbench.jobs.metrics import Figures
+    from workbench.jobs.scan import machine_folders
+    from workbench.registry.database import location
+    from workbench.registry.store import Registry
+
+    machine_folders(options.root)
+    webhook = None if options.webhook is None else Webhook(options.webhook)
+    name = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    with Patience(options.patience)(Registry, location(options.where)) as registry:
+        report = reporter(sys.stderr, name)
+        yield Worker(options, registry, webhook, report, name, Figures(registry), stop)
+
+
+def clock() -> datetime:
+    """The time now, in UTC."""
+    return datetime.now(UTC)

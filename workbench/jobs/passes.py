@@ -1,0 +1,260 @@
+"""One pass over the machines that have new logs; safe to run at any time, in any number.
+
+A pass looks for complete files, notes their fingerprints, and claims one machine after the other.
+Whatever it dies of, a log either has its result, with all that belongs to it, or waits for the
+next pass.
+"""
+
+import errno
+import traceback
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from datetime import timedelta
+from pathlib import Path
+from typing import Any, Protocol
+
+from identification.errors import BadCard, BadLog, BadModel, UserError
+from workbench.jobs.lease import Clock, Patience, kept_alive
+from workbench.jobs.scan import MachineFolder, Scan, machine_folders, scan, unchanged
+from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.queue import Queue
+from workbench.registry.store import Registry
+from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Version
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One log of one machine to be judged: where it lies, and the model and design in force.
+
+    model, design: documents, None where there is none. previous: what was found of the log before
+    under the same version in force (`Judgement.evidence`), for tests that look at several logs.
+    """
+
+    machine: str
+    card: Path
+    path: Path
+    log: SeenLog
+    version: Version | None
+    model: Mapping[str, Any] | None
+    design: Mapping[str, Any] | None
+    previous: Mapping[str, Any] | None
+
+
+class Judge(Protocol):
+    """What a worker makes of a log.
+
+    Raises BadLog where the file cannot be judged: it is set aside. BadCard and BadModel say that
+    the machine has to be looked after: its logs wait.
+    """
+
+    def __call__(self, task: Task) -> Judgement:
+        """The judgement; nothing is written."""
+        ...
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a pass works.
+
+    lease: time after which a silent worker counts as dead; settle: how long a file must not have
+    changed; attempts: after how many starts without a result a log is set aside; first: whether a
+    machine without a model gets its first from its log. owner: name of the worker.
+    """
+
+    owner: str
+    lease: timedelta = timedelta(minutes=2)
+    settle: timedelta = timedelta(seconds=10)
+    attempts: int = 20
+    first: bool = False
+    patience: Patience = field(default_factory=Patience)
+
+
+@dataclass(frozen=True)
+class PassReport:
+    """What a pass did.
+
+    busy: machines in another worker's hands; failed: machine and why it could not be handled;
+    growing: files that are still being written; without_model: machines whose logs wait for one.
+    """
+
+    machines: int
+    outcomes: tuple[Outcome, ...]
+    busy: tuple[str, ...]
+    failed: Mapping[str, str]
+    growing: int
+    without_model: tuple[str, ...]
+
+
+Report = Callable[..., None]  # event, then what belongs to it by name
+
+
+class Pass:
+    """One worker's way through the machines of a folder."""
+
+    def __init__(
+        self,
+        registry: Registry,
+        judge: Judge,
+        settings: Settings,
+        clock: Clock,
+        report: Report,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> None:
+        self._registry = registry
+        self._queue = Queue(registry.database)
+        self._judge = judge
+        self._settings = settings
+        self._clock = clock
+        self._report = report
+        self._stop = stop
+
+    def run(self, root: Path) -> PassReport:
+        """What the pass did; raises BadRoot, and RegistryAway once its patience has ended."""
+        folders = machine_folders(root)
+        done = PassReport(len(folders), (), (), {}, 0, ())
+        outcomes: list[Outcome] = []  # kept also of a machine that fails half-way
+        for folder in folders:
+            if self._stop():
+                break
+            try:
+                done = self._machine(folder, done, outcomes)
+            except RegistryAway:
+                raise
+            except (UserError, OSError, MemoryError) as error:
+                line = " ".join(str(error).split()) or type(error).__name__
+                self._report("machine_failed", machine=folder.name, reason=line)
+                done = replace(done, failed={**done.failed, folder.name: line})
+        return replace(done, outcomes=tuple(outcomes))
+
+    def _machine(
+        self, folder: MachineFolder, done: PassReport, outcomes: list[Outcome]
+    ) -> PassReport:
+        name, settings, retry = folder.name, self._settings, self._settings.patience
+        known = retry(self._queue.known, name)
+        found = scan(folder, known, settle=settings.settle, now=self._clock())
+        done = replace(done, growing=done.growing + found.growing)
+        for file in found.later:
+            self._report("log_from_the_future", machine=name, file=file)
+        seen = set(known.values())
+        logs = [log for _, log in found.complete.values() if log.sha256 not in seen]
+        new = retry(self._queue.announce, name, logs, now=self._clock())
+        if new:
+            self._report("logs_found", machine=name, count=new)
+        if not any(self._ready(log, found) for log, _ in retry(self._queue.waiting, name)):
+            return done
+        if retry(self._registry.in_force, name) is None and not settings.first:
+            self._report("no_model_in_force", machine=name)
+            return replace(done, without_model=(*done.without_model, name))
+        claim = retry(
+            self._queue.claim, name, owner=settings.owner, lease=settings.lease, now=self._clock()
+        )
+        if claim is None:
+            return replace(done, busy=(*done.busy, name))
+        try:
+            with kept_alive(self._queue, claim, settings.lease, self._clock):
+                self._logs(folder, found, claim, outcomes)
+        except LostClaim as error:
+            self._report("claim_lost", machine=name, reason=str(error))
+            return replace(done, busy=(*done.busy, name))
+        except RegistryAway:
+            raise  # no use to ask it to release: the lease ends by itself
+        except BaseException:
+            self._queue.release(claim)
+            raise
+        retry(self._queue.release, claim)
+        return done
+
+    def _ready(self, log: SeenLog, found: Scan) -> bool:
+        """Whether a waiting log can be judged now: it is there, or something else in its place."""
+        return log.sha256 in found.complete or _replaced(log, found)
+
+    def _logs(
+        self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[Outcome]
+    ) -> None:
+        """Judge the machine's logs; what is waiting is asked again, now that it is ours."""
+        for log, begun in self._settings.patience(self._queue.waiting, folder.name):
+            if self._stop():
+                break
+            if not self._ready(log, found):
+                continue
+            outcome = self._log(folder, found, claim, log, begun)
+            if outcome is not None:
+                outcomes.append(outcome)
+
+    def _log(
+        self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
+    ) -> Outcome | None:
+        """The log's result; None where its file has changed in the meantime."""
+        retry, settings = self._settings.patience, self._settings
+        if _replaced(log, found):
+            judgement = Judgement(
+                "set_aside", f"{log.file}: changed before it was judged; what it holds now counts"
+            )
+        elif begun >= settings.attempts:
+            judgement = Judgement(
+                "set_aside", f"{log.file}: begun {begun} times, and no worker has come to its end"
+            )
+        else:
+            path, here = found.complete[log.sha256]
+            retry(self._queue.begin, claim, log, now=self._clock())
+            self._report("log_begun", machine=folder.name, file=log.file, sha256=log.sha256)
+            judgement = self._judged(self._task(folder, path, here))
+            if not unchanged(path, here):
+                return None
+        outcome = retry(
+            self._queue.finish, claim, log, judgement, by=settings.owner, now=self._clock()
+        )
+        self._report(
+            "log_judged", machine=folder.name, file=log.file, sha256=log.sha256,
+            verdict=outcome.verdict, reason=outcome.reason,
+        )  # fmt: skip
+        return outcome
+
+    def _judged(self, task: Task) -> Judgement:
+        """The judgement; "set_aside" for a bad log, "not_judged" for one that tells too little."""
+        file = task.log.file
+        try:
+            return self._judge(task)
+        except (BadCard, BadModel, RegistryAway, LostClaim, MemoryError):
+            raise
+        except BadLog as error:
+            return Judgement("set_aside", str(error))
+        except UserError as error:
+            return Judgement("not_judged", str(error))
+        except OSError as error:
+            if error.errno in FULL:
+                raise
+            return Judgement("set_aside", f"{file}: {error.strerror or error}")
+        except Exception as error:  # a fault of ours on one log must not stop the others
+            shown = traceback.format_exc()
+            self._report("fault_of_ours", machine=task.machine, file=file, traceback=shown)
+            said = f"{type(error).__name__}: {error}"
+            return Judgement("set_aside", f"{file}: fault of ours: {said}")
+
+    def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
+        retry, registry = self._settings.patience, self._registry
+        version = retry(registry.in_force, folder.name)
+        documents = {
+            kind: retry(registry.document, version, kind)
+            for kind in ("model", "design")
+            if version is not None and getattr(version, kind) is not None
+        }
+        return Task(
+            machine=folder.name,
+            card=folder.card,
+            path=path,
+            log=log,
+            version=version,
+            model=documents.get("model"),
+            design=documents.get("design"),
+            previous=None if version is None else retry(self._queue.last_evidence, version),
+        )
+
+
+def _replaced(log: SeenLog, found: Scan) -> bool:
+    """Whether a complete file of the same name holds something else now."""
+    if log.sha256 in found.complete:
+        return False
+    return any(here.file == log.file for _, here in found.complete.values())

@@ -1,0 +1,147 @@
+"""Machine folders and the log files in them that are complete.
+
+ROOT/<machine>/card.toml says how ROOT/<machine>/logs/* are read. A file counts as complete when
+nobody has it open for writing, as far as the system tells, and it has not changed for a while.
+"""
+
+import hashlib
+import os
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+
+from identification.errors import UserError
+from workbench.registry.values import SeenLog
+
+CARD, LOGS = "card.toml", "logs"
+SUFFIXES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".h5", ".hdf5", ".json")
+Known = Mapping[tuple[str, int, int], str]
+
+
+class BadRoot(UserError):
+    """A folder of machines that is none."""
+
+
+@dataclass(frozen=True)
+class MachineFolder:
+    """A machine's name, its card and the folder of its logs."""
+
+    name: str
+    card: Path
+    logs: Path
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Complete log files by fingerprint, and how many are still being written.
+
+    later: files whose time of change lies in the future, by the clock here.
+    """
+
+    complete: Mapping[str, tuple[Path, SeenLog]]
+    growing: int
+    later: tuple[str, ...]
+
+
+def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
+    """The folders of `root` that hold a card, by name; raises BadRoot where `root` is no folder."""
+    if not root.is_dir():
+        raise BadRoot(
+            f"{root}: no such folder; one with {'<machine>/' + CARD} and <machine>/{LOGS} needed"
+        )
+    found = sorted(path.parent for path in root.glob(f"*/{CARD}"))
+    return tuple(MachineFolder(p.name, p / CARD, p / LOGS) for p in found if _plain(p.name))
+
+
+def scan(folder: MachineFolder, known: Known, *, settle: timedelta, now: datetime) -> Scan:
+    """The log files of a machine; those in `known` by name, size and time are not read again."""
+    complete: dict[str, tuple[Path, SeenLog]] = {}
+    growing, later = 0, []
+    for path in _files(folder.logs):
+        try:
+            before = path.stat()
+        except FileNotFoundError:
+            continue
+        age = now.timestamp() - before.st_mtime
+        if age < 0:
+            later.append(path.name)
+        if age < settle.total_seconds() or open_for_writing(path):
+            growing += 1
+            continue
+        found = _seen(path, before, known)
+        if found is None:
+            growing += 1
+        else:
+            complete.setdefault(found.sha256, (path, found))
+    return Scan(complete, growing, tuple(later))
+
+
+def unchanged(path: Path, log: SeenLog) -> bool:
+    """Whether the file still is what its fingerprint was taken of."""
+    try:
+        now = path.stat()
+    except OSError:
+        return False
+    return (now.st_size, now.st_mtime_ns) == (log.size, log.mtime_ns)
+
+
+def open_for_writing(path: Path) -> bool:
+    """Whether a process has the file open for writing; False where the system does not tell."""
+    if not hasattr(os, "O_CLOEXEC") or not (lease := _lease()):
+        return False
+    try:
+        handle = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+    except OSError:
+        return False  # what cannot be opened is refused when it is read, with the reason
+    try:
+        return lease(handle)
+    finally:
+        os.close(handle)
+
+
+def _lease() -> Callable[[int], bool] | None:
+    """A test by a read lease, which Linux grants on files that nobody writes; None elsewhere."""
+    import fcntl
+
+    request = getattr(fcntl, "F_SETLEASE", None)
+    if request is None:
+        return None
+
+    def refused(handle: int) -> bool:
+        try:
+            fcntl.fcntl(handle, request, fcntl.F_RDLCK)
+        except BlockingIOError:
+            return True
+        except OSError:  # another's file, or a file system without leases
+            return False
+        fcntl.fcntl(handle, request, fcntl.F_UNLCK)
+        return False
+
+    return refused
+
+
+def _files(folder: Path) -> Iterator[Path]:
+    if not folder.is_dir():
+        return
+    for path in sorted(folder.iterdir()):
+        if _plain(path.name) and path.suffix.lower() in SUFFIXES and path.is_file():
+            yield path
+
+
+def _plain(name: str) -> bool:
+    return not name.startswith((".", "_")) and not name.endswith("~")
+
+
+def _seen(path: Path, before: os.stat_result, known: Known) -> SeenLog | None:
+    """The file's fingerprint; None where it changes while it is read, or is gone."""
+    size, mtime = before.st_size, before.st_mtime_ns
+    digest = known.get((path.name, size, mtime))
+    if digest is None:
+        try:
+            with path.open("rb") as file:
+                digest = hashlib.file_digest(file, "sha256").hexdigest()
+        except FileNotFoundError:
+            return None
+    found = SeenLog(digest, path.name, size, mtime)
+    return found if unchanged(path, found) else None

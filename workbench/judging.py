@@ -1,0 +1,161 @@
+"""What a worker makes of a log: drift test, and where it has drifted the whole chain anew."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable
+from identification.library import Library
+from identification.log import Log
+from workbench.challenge import Contender, Terms, challenge, contest_document
+from workbench.design_values import Design, design_document, read_design
+from workbench.drift_verdict import Drift, DriftTest, drift_by_refit
+from workbench.identifying import Source
+from workbench.jobs.passes import Task
+from workbench.model import Model, model_document, read_model
+from workbench.pipeline import identify_sources
+from workbench.registry.values import Candidate, Judgement
+from workbench.sources import Sources, read_sources
+from workbench.tuning import design
+from workbench.validating import validate, validation_document
+
+HELD_OUT = 0.35  # of a log's time that a challenger is not fitted on
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A judge (`workbench.jobs.passes.Judge`): drift test, identification, design, contest.
+
+    The model is fitted on the first 65 % of each run; the rest is held out. Logs on which the
+    model in force was fitted do not judge it. library: the effects that models may name, by
+    default all but a user's own files.
+    """
+
+    drift: DriftTest = drift_by_refit
+    terms: Terms = field(default_factory=Terms)
+    seed: int = 0
+    library: Library | None = None
+
+    def __call__(self, task: Task) -> Judgement:
+        """The judgement of one log; raises as `Judge` says."""
+        sources = read_sources([str(task.path)], str(task.card))
+        if task.model is None:
+            return self._first(sources)
+        champion = _contender(task, self.library)
+        if any(entry.sha256 == task.log.sha256 for entry in champion.model.log):
+            return Judgement("none", "the model in force was fitted on this log")
+        rng = np.random.default_rng(self.seed)
+        state = (task.previous or {}).get("state", {})
+        found = self.drift(champion.model, sources, rng, state)
+        evidence = {"drift": _without_state(found), "state": found.state}
+        if found.verdict != "drift":
+            return Judgement(found.verdict, found.reason, evidence=evidence)
+        return self._challenge(champion, sources, found, evidence)
+
+    def _first(self, sources: Sources) -> Judgement:
+        """A machine's first model, where its design keeps every limit in simulation."""
+        challenger, candidate, refused = self._made(sources)
+        if refused or challenger is None:
+            return Judgement("refused", f"no first model: {refused}", candidate)
+        return Judgement("promoted", "the machine's first model; its design passes", candidate)
+
+    def _challenge(
+        self, champion: Contender, sources: Sources, found: Drift, evidence: Mapping[str, Any]
+    ) -> Judgement:
+        """A model of the machine as it is now, against the one in force."""
+        train, held_out = divided(sources)
+        challenger, candidate, refused = self._made(train)
+        if challenger is None:
+            return Judgement("refused", f"{found.reason}; {refused}", candidate, evidence)
+        rng = np.random.default_rng(self.seed)
+        contest = challenge(champion, challenger, held_out, rng, self.terms)
+        evidence = {**evidence, "contest": contest_document(contest)}
+        reason = f"{found.reason}; {contest.reason}"
+        if contest.won:
+            return Judgement("promoted", reason, candidate, evidence)
+        kept = self._kept(champion, challenger) if contest.model_won else None
+        if kept is None or candidate is None:
+            return Judgement("refused", reason, candidate, evidence)
+        said = f"{reason}; so the model is replaced and the controllers stay"
+        return Judgement("promoted", said, kept, evidence, (candidate, reason))
+
+    def _kept(self, champion: Contender, challenger: Contender) -> Candidate | None:
+        """The new model with the controllers in force, where they pass on it.
+
+        The compensator holds the friction of the new model, as of any design made for it.
+        """
+        if champion.design is None:
+            return None
+        fresh = (
+            champion.design.compensator
+            if challenger.design is None
+            else (challenger.design.compensator)
+        )
+        made = replace(champion.design, compensator=fresh)
+        model, rng = challenger.model, np.random.default_rng(self.seed)
+        checked, _ = validate(model, made, rng)
+        if not checked.passed:
+            return None
+        return Candidate(model_document(model), design_document(made), validation_document(checked))
+
+    def _made(self, sources: Sources) -> tuple[Contender | None, Candidate | None, str]:
+        """Model, design and validation of the sources, and what speaks against them."""
+        try:
+            model = identify_sources(sources, seed=self.seed).model
+        except NotIdentifiable as error:
+            return None, None, f"no model: {error}"
+        try:
+            made = design(model)
+        except (BadSpecification, NotIdentifiable) as error:
+            return Contender(model, None), Candidate(model_document(model)), f"no design: {error}"
+        checked, _ = validate(model, made, np.random.default_rng(self.seed))
+        candidate = Candidate(
+            model_document(model), design_document(made), validation_document(checked)
+        )
+        missed = checked.figures[checked.judged]["model"].missed
+        refused = "; ".join(missed) if missed else ""
+        if made.recommended == "none":
+            refused = "no controller keeps its goals"
+        return Contender(model, made), candidate, refused
+
+
+def divided(sources: Sources) -> tuple[Sources, list[Log]]:
+    """The first part of every run to fit on, and the rest, which no fit has seen."""
+    train: list[Source] = []
+    rest: list[Log] = []
+    for source in sources.runs:
+        cut = round((1.0 - HELD_OUT) * len(source.log))
+        train.append(replace(source, log=source.log.part(0, cut), rows=cut))
+        rest.append(source.log.part(cut, len(source.log)))
+    if not any(log.duration > 0 for log in rest):
+        raise BadLog("the log is too short to hold a part of it out; log a longer run")
+    return replace(sources, runs=tuple(train)), rest
+
+
+def _contender(task: Task, library: Library | None) -> Contender:
+    """The model and design in force, read as from their files."""
+    with TemporaryDirectory(prefix="workbench-") as name:
+        folder = Path(name)
+        try:
+            found: Model = read_model(_written(folder / "model.json", task.model), library)
+            made: Design | None = None
+            if task.design is not None:
+                made = read_design(_written(folder / "design.json", task.design))
+        except BadModel as error:
+            said = str(error).replace(f"{folder}/", "")
+            raise BadModel(f"{task.machine}: in force: {said}") from None
+    return Contender(found, made)
+
+
+def _written(path: Path, document: Mapping[str, Any] | None) -> Path:
+    path.write_text(json.dumps(document), encoding="utf-8")
+    return path
+
+
+def _without_state(found: Drift) -> dict[str, Any]:
+    return {key: value for key, value in asdict(found).items() if key != "state"}

@@ -1,0 +1,1 @@
+"""The registry: models, designs, validations, logs and decisions of machines, append-only."""

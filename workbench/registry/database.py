@@ -1,0 +1,178 @@
+"""The registry's database: SQLite by path or PostgreSQL by URL, the same for all that use it."""
+
+import os
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy.exc import (
+    ArgumentError,
+    DatabaseError,
+    DBAPIError,
+    IntegrityError,
+    InterfaceError,
+    InternalError,
+    NoSuchModuleError,
+    OperationalError,
+    TimeoutError,
+)
+from sqlalchemy.orm import Session
+
+from workbench.registry.errors import BadRegistry, RegistryAway
+from workbench.registry.migrate import upgrade
+
+VARIABLE = "WORKBENCH_REGISTRY"
+DEFAULT = "registry.db"
+BUSY = 30.0  # s that SQLite waits for another process to end its transaction
+CONNECT = 10  # s that a PostgreSQL server may take to answer
+READING = "registry_reading"
+
+
+class Database:
+    """Sessions on the registry's database, its layout up to date.
+
+    where: a file, or a URL such as postgresql://user:password@host/name. create: make what is not
+    there. Raises BadRegistry where it is none of ours, RegistryAway where it does not answer.
+    """
+
+    def __init__(self, where: str, *, create: bool = True) -> None:
+        url = _url(where)
+        self.where = url.database if url.drivername == "sqlite" else url.render_as_string()
+        if url.drivername == "sqlite" and not create:
+            _refuse_missing(Path(str(url.database)))
+        self._engine = _engine(url, str(self.where))
+        try:
+            with self._guarded(), self._engine.begin() as connection:
+                upgrade(connection, str(self.where))
+        except BaseException:
+            self.close()
+            raise
+
+    @property
+    def dialect(self) -> str:
+        """ "sqlite" or "postgresql"."""
+        return self._engine.dialect.name
+
+    @contextmanager
+    def reading(self) -> Iterator[Session]:
+        """A session that reads one state of the database and writes nothing."""
+        options: dict[str, Any] = {READING: True}
+        if self._engine.dialect.name == "postgresql":
+            options["isolation_level"] = "REPEATABLE READ"
+        engine = self._engine.execution_options(**options)
+        with self._guarded(), Session(engine) as session, session.begin():
+            yield session
+
+    @contextmanager
+    def writing(self) -> Iterator[Session]:
+        """A session whose changes are all kept when the block ends, or none."""
+        with self._guarded(), Session(self._engine) as session, session.begin():
+            yield session
+
+    def close(self) -> None:
+        """Give every connection back."""
+        self._engine.dispose()
+
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """What the driver says of a database away or full, as RegistryAway in one line."""
+        try:
+            yield
+        except IntegrityError:
+            raise
+        except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
+            raise RegistryAway(_away(str(self.where), error)) from error
+        except DatabaseError as error:
+            if isinstance(error.orig, sqlite3.DatabaseError):
+                raise BadRegistry(
+                    f"registry {self.where}: {error.orig}; name a registry's file, or a new one"
+                ) from None
+            raise
+
+
+def location(given: str | None) -> str:
+    """Where the registry is: what was given, else WORKBENCH_REGISTRY, else registry.db here."""
+    return given or os.environ.get(VARIABLE) or DEFAULT
+
+
+def _url(where: str) -> URL:
+    if "://" not in where:
+        return URL.create("sqlite", database=str(Path(where)))
+    try:
+        url = make_url(where)
+    except ArgumentError:
+        raise BadRegistry(
+            "registry: the URL cannot be read; as in postgresql://user:password@host:5432/name"
+        ) from None
+    backend = url.get_backend_name()
+    if backend == "sqlite" and url.database:
+        return URL.create("sqlite", database=url.database)
+    if backend in ("postgresql", "postgres"):
+        return url.set(drivername="postgresql+psycopg")
+    raise BadRegistry(
+        f"registry: a URL of {backend!r}, a file or postgresql://user:password@host/name needed"
+    )
+
+
+def _refuse_missing(path: Path) -> None:
+    if not path.exists():
+        raise BadRegistry(
+            f"registry {path}: no such file; 'workbench registry add' makes one, or name it by"
+            f" --registry or {VARIABLE}"
+        )
+
+
+def _engine(url: URL, where: str) -> Engine:
+    if url.drivername == "sqlite":
+        path = Path(str(url.database))
+        if path.is_dir():
+            raise BadRegistry(f"registry {path}: is a folder; name a file in it")
+        if not path.absolute().parent.is_dir():
+            raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
+        engine = create_engine(url, connect_args={"timeout": BUSY})
+        event.listen(engine, "connect", _prepare_sqlite)
+        event.listen(engine, "begin", _begin_sqlite)
+        return engine
+    try:
+        return create_engine(
+            url,
+            pool_pre_ping=True,
+            connect_args={"connect_timeout": CONNECT, "application_name": "workbench"},
+        )
+    except (ImportError, NoSuchModuleError):
+        raise BadRegistry(
+            f"registry {where}: PostgreSQL needs a driver that is not installed; install"
+            " 'servo-workbench[postgres]'"
+        ) from None
+
+
+def _prepare_sqlite(connection: Any, _record: object) -> None:
+    """A write-ahead log, so that readers and the one writer do not wait for each other.
+
+    isolation_level None leaves BEGIN to us: the driver's own comes too late to hold a lock.
+    """
+    connection.isolation_level = None
+    for setting in ("journal_mode = WAL", "synchronous = FULL", "foreign_keys = ON"):
+        connection.execute(f"PRAGMA {setting}").close()
+
+
+def _begin_sqlite(connection: Connection) -> None:
+    """A writer takes its lock at once: a reader that would write later meets "locked" at once."""
+    reading = connection.get_execution_options().get(READING, False)
+    connection.exec_driver_sql("BEGIN" if reading else "BEGIN IMMEDIATE")
+
+
+def _away(where: str, error: Exception) -> str:
+    said = error.orig if isinstance(error, DBAPIError) else error
+    line = " ".join(str(said).split())
+    advice = "nothing is lost; look after the database and run again"
+    if "full" in line or "I/O" in line:
+        advice = "nothing is lost; free some space on its disk and run again"
+    elif "locked" in line:
+        advice = "another process holds it; run again"
+    elif "readonly" in line or "unable to open" in line:
+        advice = "check the rights of the file and of its folder"
+    return f"registry {where}: {line}; {advice}"

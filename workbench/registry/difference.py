@@ -1,0 +1,99 @@
+"""Two versions side by side: every number of model and design, with its unit and interval."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+MODEL_PARTS = ("friction", "actuator", "effects")
+DESIGN_PARTS = ("recommended", "force", "rst", "pid", "compensator")
+LEFT_OUT = ("compensator.friction",)  # the model's own nine
+
+
+@dataclass(frozen=True)
+class Number:
+    """A parameter as a document has it; value None with a reason where the logs do not tell it."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+    reason: str | None
+
+
+@dataclass(frozen=True)
+class Line:
+    """One parameter of two versions; change relative to the first, None where there is none.
+
+    apart: whether the two 95 % intervals have nothing in common; None where one has none.
+    """
+
+    part: str
+    name: str
+    unit: str
+    before: Number | str | None
+    after: Number | str | None
+    change: float | None
+    apart: bool | None
+
+
+def difference(
+    before: Mapping[str, Mapping[str, Any] | None], after: Mapping[str, Mapping[str, Any] | None]
+) -> tuple[Line, ...]:
+    """The parameters of two versions, each given as documents by kind ("model", "design")."""
+    out: list[Line] = []
+    for part, keys in (("model", MODEL_PARTS), ("design", DESIGN_PARTS)):
+        one = dict(_entries(before.get(part), keys))
+        other = dict(_entries(after.get(part), keys))
+        for name in dict.fromkeys((*one, *other)):
+            out.append(_line(part, name, one.get(name), other.get(name)))
+    return tuple(out)
+
+
+def _entries(
+    document: Mapping[str, Any] | None, keys: tuple[str, ...]
+) -> Iterator[tuple[str, tuple[str, Number | str]]]:
+    for key in keys:
+        found = (document or {}).get(key)
+        if isinstance(found, str):
+            yield key, ("", found)
+        elif isinstance(found, Mapping):
+            prefix = "" if key == "friction" or key == "actuator" else f"{key}."
+            yield from _numbers(found, prefix)
+
+
+def _numbers(
+    found: Mapping[str, Any], prefix: str
+) -> Iterator[tuple[str, tuple[str, Number | str]]]:
+    """Everything below that has a value and a unit, by its path."""
+    for key, entry in found.items():
+        name = f"{prefix}{key}"
+        if not isinstance(entry, Mapping) or name in LEFT_OUT:
+            continue
+        if "unit" in entry and "value" in entry:
+            low, high, reason = (entry.get(k) for k in ("low", "high", "reason"))
+            yield name, (str(entry["unit"]), Number(entry["value"], low, high, reason))
+        else:
+            yield from _numbers(entry, f"{name}.")
+
+
+def _line(
+    part: str,
+    name: str,
+    one: tuple[str, Number | str] | None,
+    other: tuple[str, Number | str] | None,
+) -> Line:
+    unit = next((found[0] for found in (other, one) if found is not None), "")
+    before, after = (None if found is None else found[1] for found in (one, other))
+    change = apart = None
+    same_unit = one is not None and other is not None and one[0] == other[0]
+    if same_unit and isinstance(before, Number) and isinstance(after, Number):
+        if before.value and after.value is not None:
+            change = (after.value - before.value) / abs(before.value)
+        if None not in (before.low, before.high, after.low, after.high):
+            apart = _apart(before, after)
+    return Line(part, name, unit, before, after, change, apart)
+
+
+def _apart(one: Number, other: Number) -> bool:
+    assert one.low is not None and one.high is not None
+    assert other.low is not None and other.high is not None
+    return one.high < other.low or other.high < one.low

@@ -1,0 +1,342 @@
+"""New logs and who has them in hand: one result a log, however many workers and whatever dies.
+
+A machine's logs are judged one after the other, since a result may change what the next is judged
+against. So a worker claims a machine, for the time of a lease that it renews. Every result is one
+transaction that holds only while the claim does: a worker that has been taken for dead and comes
+back finds another's token, and its result is dropped.
+"""
+
+import json
+import secrets
+from collections.abc import Iterator, Sequence
+from datetime import datetime, timedelta
+from typing import Any
+
+from sqlalchemy import and_, delete, func, select
+from sqlalchemy.orm import Session
+
+from workbench.output import dumps
+from workbench.registry.database import Database
+from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.rows import (
+    add_version,
+    decide,
+    judged_now,
+    lock_machine,
+    need_machine,
+    turn,
+    version_in_force,
+)
+from workbench.registry.tables import (
+    AttemptRow,
+    ClaimRow,
+    LogRow,
+    NoticeRow,
+    OutcomeRow,
+    ReopeningRow,
+    VersionRow,
+)
+from workbench.registry.values import (
+    Candidate,
+    Claim,
+    DecisionKind,
+    Judgement,
+    Outcome,
+    SeenLog,
+    Verdict,
+    Version,
+)
+
+OFTEN = 5
+
+
+class Queue:
+    """The logs of machines that wait for a result, and the claims on them."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def known(self, machine: str) -> dict[tuple[str, int, int], str]:
+        """Fingerprints of the logs seen, by file name, size and modification time."""
+        query = select(LogRow).where(LogRow.machine == machine)
+        with self._database.reading() as session:
+            rows = session.scalars(query)
+            return {(row.file, row.size, row.mtime_ns): row.sha256 for row in rows}
+
+    def announce(self, machine: str, logs: Sequence[SeenLog], *, now: datetime) -> int:
+        """How many of the logs are new; they wait from now on."""
+        if not logs:
+            return 0
+        with self._database.writing() as session:
+            lock_machine(session, machine, now)
+            query = select(LogRow.sha256).where(LogRow.machine == machine)
+            have = set(session.scalars(query))
+            new: dict[str, SeenLog] = {}
+            for log in logs:
+                if log.sha256 not in have:
+                    new.setdefault(log.sha256, log)
+            session.add_all(_log_row(machine, log, now) for log in new.values())
+            return len(new)
+
+    def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
+        """The machine for this worker until the lease ends; None while another has it."""
+        with self._database.writing() as session:
+            lock_machine(session, machine, now)
+            row = session.get(ClaimRow, machine)
+            if row is not None and row.until > now:
+                return None
+            found = Claim(machine, secrets.token_hex(16), owner, now + lease)
+            if row is None:
+                session.add(ClaimRow(**vars(found)))
+            else:
+                row.token, row.owner, row.until = found.token, owner, found.until
+            return found
+
+    def renew(self, claim: Claim, *, lease: timedelta, now: datetime) -> None:
+        """Lengthen the lease; raises LostClaim where another has taken over."""
+        with self._database.writing() as session:
+            _hold(session, claim, now).until = now + lease
+
+    def release(self, claim: Claim) -> None:
+        """Give the machine back; nothing where another has taken over."""
+        with self._database.writing() as session:
+            session.execute(
+                delete(ClaimRow).where(
+                    ClaimRow.machine == claim.machine, ClaimRow.token == claim.token
+                )
+            )
+
+    def waiting(self, machine: str) -> tuple[tuple[SeenLog, int], ...]:
+        """Logs without a result and how often each was begun; oldest first.
+
+        One begun `OFTEN` times comes last: it may be what its workers die of.
+        """
+        begun = func.count(AttemptRow.id)
+        now = and_(AttemptRow.log_id == LogRow.id, AttemptRow.turn == turn())
+        query = (
+            select(LogRow, begun)
+            .select_from(LogRow)
+            .outerjoin(OutcomeRow, judged_now())
+            .outerjoin(AttemptRow, now)
+            .where(LogRow.machine == machine, OutcomeRow.log_id.is_(None))
+            .group_by(LogRow.id)
+            .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
+        )
+        with self._database.reading() as session:
+            found = [(_seen(row), int(count)) for row, count in session.execute(query)]
+        return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
+
+    def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
+        """Note that the worker begins with a log; raises LostClaim."""
+        with self._database.writing() as session:
+            _hold(session, claim, now)
+            row = _log(session, claim.machine, log)
+            session.add(
+                AttemptRow(
+                    log_id=row.id,
+                    turn=_turn(session, row),
+                    token=claim.token,
+                    owner=claim.owner,
+                    at=now,
+                )
+            )
+
+    def finish(
+        self, claim: Claim, log: SeenLog, judgement: Judgement, *, by: str, now: datetime
+    ) -> Outcome:
+        """Record a log's result, with its candidate and the decision on it, all or nothing.
+
+        A second call with the same claim gives the first's: a commit may have been kept although
+        its answer was lost. Raises LostClaim where another has taken over.
+        """
+        with self._database.writing() as session:
+            lock_machine(session, claim.machine, now)
+            row = _log(session, claim.machine, log)
+            now_turn = _turn(session, row)
+            done = session.get(OutcomeRow, (row.id, now_turn))
+            if done is not None and done.token == claim.token:
+                return _outcome(session, row, done)
+            _hold(session, claim, now)
+            current = version_in_force(session, claim.machine)
+            for kind, candidate, reason in _decided(judgement):
+                version, _ = add_version(session, claim.machine, candidate, now)
+                decide(
+                    session,
+                    kind,
+                    version,
+                    reason=reason,
+                    by=by,
+                    now=now,
+                    evidence=judgement.evidence,
+                    log_id=row.id,
+                )
+            done = OutcomeRow(
+                log_id=row.id,
+                turn=now_turn,
+                version_id=None if current is None else current.id,
+                verdict=judgement.verdict,
+                reason=judgement.reason,
+                evidence=dumps(judgement.evidence),
+                token=claim.token,
+                at=now,
+            )
+            session.add(done)
+            session.flush()
+            return _outcome(session, row, done)
+
+    def reopen(
+        self, machine: str, logs: Sequence[str], *, reason: str, by: str, now: datetime
+    ) -> tuple[str, ...]:
+        """Files that wait again from now on; their earlier results stay.
+
+        logs: names or beginnings of fingerprints of logs with a result, none: all that were set
+        aside. Raises BadRegistry where one is not there or waits anyhow.
+        """
+        with self._database.writing() as session:
+            need_machine(session, machine, lock=True)
+            query = select(LogRow, OutcomeRow).join(OutcomeRow, judged_now())
+            found = session.execute(query.where(LogRow.machine == machine).order_by(LogRow.id))
+            judged = [(row, done.verdict) for row, done in found]
+            chosen = [row for row, verdict in judged if not logs and verdict == "set_aside"]
+            for name in dict.fromkeys(logs):
+                own = [r for r, _ in judged if r.file == name or r.sha256.startswith(name)]
+                if not own:
+                    raise BadRegistry(
+                        f"{machine}: no log {name!r} with a result; 'workbench registry show"
+                        f" {machine}' names them"
+                    )
+                chosen += [row for row in own if row not in chosen]
+            for row in chosen:
+                session.add(ReopeningRow(log_id=row.id, reason=reason, made_by=by, at=now))
+            return tuple(row.file for row in chosen)
+
+    def last_evidence(self, version: Version) -> dict[str, Any] | None:
+        """Evidence of the latest result against this version; None where there is none yet."""
+        query = (
+            select(OutcomeRow.evidence)
+            .join(VersionRow, VersionRow.id == OutcomeRow.version_id)
+            .where(
+                VersionRow.machine == version.machine,
+                VersionRow.number == version.number,
+                OutcomeRow.verdict != "set_aside",
+            )
+            .order_by(OutcomeRow.at.desc(), OutcomeRow.log_id.desc())
+            .limit(1)
+        )
+        with self._database.reading() as session:
+            text = session.scalar(query)
+        if text is None:
+            return None
+        found: dict[str, Any] = json.loads(text)
+        return found
+
+    def outcomes(self, machine: str) -> tuple[Outcome, ...]:
+        """Results of a machine's logs, in the order of their files."""
+        query = (
+            select(LogRow, OutcomeRow)
+            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+            .where(LogRow.machine == machine)
+            .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id, OutcomeRow.turn)
+        )
+        with self._database.reading() as session:
+            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
+
+    def unsent(self, verdicts: Sequence[Verdict], *, since: datetime) -> tuple[Outcome, ...]:
+        """Results of these verdicts from `since` on that no webhook has taken, oldest first."""
+        told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
+        query = (
+            select(LogRow, OutcomeRow)
+            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
+            .outerjoin(NoticeRow, told)
+            .where(
+                OutcomeRow.verdict.in_(verdicts),
+                OutcomeRow.at >= since,
+                NoticeRow.log_id.is_(None),
+            )
+            .order_by(OutcomeRow.at, LogRow.id)
+        )
+        with self._database.reading() as session:
+            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
+
+    def sent(self, outcome: Outcome, *, now: datetime) -> None:
+        """Note that a webhook has taken the alarm; nothing where it is noted already."""
+        with self._database.writing() as session:
+            lock_machine(session, outcome.machine, now)
+            row = _log(session, outcome.machine, outcome.log)
+            if session.get(NoticeRow, (row.id, outcome.turn)) is None:
+                session.add(NoticeRow(log_id=row.id, turn=outcome.turn, at=now))
+
+    def verdicts(self) -> dict[tuple[str, str], int]:
+        """How many logs have each verdict, by machine and verdict."""
+        query = (
+            select(LogRow.machine, OutcomeRow.verdict, func.count())
+            .join(OutcomeRow, judged_now())
+            .group_by(LogRow.machine, OutcomeRow.verdict)
+        )
+        with self._database.reading() as session:
+            return {(name, verdict): count for name, verdict, count in session.execute(query)}
+
+
+def _decided(judgement: Judgement) -> Iterator[tuple[DecisionKind, Candidate, str]]:
+    """The decisions that a judgement means, the one that may move the pointer last."""
+    if judgement.rival is not None:
+        yield "refused", *judgement.rival
+    if judgement.candidate is not None:
+        kind: DecisionKind = "promoted" if judgement.verdict == "promoted" else "refused"
+        yield kind, judgement.candidate, judgement.reason
+
+
+def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
+    """The claim's row, locked; raises LostClaim where it is another's by now."""
+    lock_machine(session, claim.machine, now)
+    row = session.scalar(
+        select(ClaimRow).where(
+            and_(ClaimRow.machine == claim.machine, ClaimRow.token == claim.token)
+        )
+    )
+    if row is None:
+        raise LostClaim(
+            f"{claim.machine}: the lease has ended and another worker has taken over; its result"
+            " counts"
+        )
+    return row
+
+
+def _turn(session: Session, row: LogRow) -> int:
+    query = select(func.count(ReopeningRow.id)).where(ReopeningRow.log_id == row.id)
+    return session.scalar(query) or 0
+
+
+def _log(session: Session, machine: str, log: SeenLog) -> LogRow:
+    query = select(LogRow).where(LogRow.machine == machine, LogRow.sha256 == log.sha256)
+    return session.scalars(query).one()
+
+
+def _log_row(machine: str, log: SeenLog, now: datetime) -> LogRow:
+    return LogRow(
+        machine=machine,
+        sha256=log.sha256,
+        file=log.file,
+        size=log.size,
+        mtime_ns=log.mtime_ns,
+        seen_at=now,
+    )
+
+
+def _seen(row: LogRow) -> SeenLog:
+    return SeenLog(row.sha256, row.file, row.size, row.mtime_ns)
+
+
+def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> Outcome:
+    number = select(VersionRow.number).where(VersionRow.id == row.version_id)
+    verdict: Any = row.verdict
+    return Outcome(
+        machine=log.machine,
+        log=_seen(log),
+        verdict=verdict,
+        reason=row.reason,
+        number=None if row.version_id is None else session.scalar(number),
+        evidence=json.loads(row.evidence),
+        at=row.at,
+        turn=row.turn,
+    )
