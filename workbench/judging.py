@@ -14,7 +14,8 @@ from identification.library import Library
 from identification.log import Log
 from workbench.challenge import Contender, Terms, challenge, contest_document
 from workbench.design_values import Design, design_document, read_design
-from workbench.drift_verdict import Drift, DriftTest, drift_by_refit
+from workbench.drift_judge import drift_by_chart
+from workbench.drift_verdict import Drift, DriftTest
 from workbench.identifying import Source
 from workbench.jobs.passes import Task
 from workbench.model import Model, model_document, read_model
@@ -36,7 +37,7 @@ class Chain:
     default all but a user's own files.
     """
 
-    drift: DriftTest = drift_by_refit
+    drift: DriftTest = drift_by_chart
     terms: Terms = field(default_factory=Terms)
     seed: int = 0
     library: Library | None = None

@@ -15,6 +15,7 @@ from identification.karnopp import Karnopp
 from tests.chain import CARD, TABLES
 from workbench.card import Card, load_card
 from workbench.challenge import Terms
+from workbench.drift_judge import drift_by_chart
 from workbench.drift_verdict import Drift, drift_by_refit
 from workbench.jobs.passes import Task
 from workbench.judging import Chain, divided
@@ -110,6 +111,21 @@ def test_the_refit_tells_a_changed_machine_from_the_same(
         assert (found.verdict, {one.name for one in found.moved}) == (verdict, names)
     (moved,) = (one for one in found.moved if one.name == "F_cp")
     assert (moved.before, moved.after) == pytest.approx((12.0, 16.0), rel=1e-2)
+
+
+def test_the_chart_goes_on_from_log_to_log(shop: Path, first: Judgement, tmp_path: Path) -> None:
+    model, rng = model_of(first, tmp_path), np.random.default_rng(1)
+    state: Mapping[str, Any] = {}
+    for name, verdict in (("same", "none"), ("drifted", "drift")):
+        sources = read_sources([str(shop / f"{name}.csv")], str(shop / "card.toml"))
+        found = drift_by_chart(model, sources, rng, state)
+        state = found.state
+        assert found.verdict == verdict, found.reason
+        assert state["logs"] >= 1
+    assert {"F_cp", "F_sp"} <= {one.name for one in found.moved}
+    assert found.reason.startswith("moved: ")
+    with pytest.raises(BadModel, match="stored drift state"):
+        drift_by_chart(model, sources, rng, {"logs": "many"})
 
 
 def test_a_drifted_machine_gets_a_new_version(shop: Path, first: Judgement) -> None:

@@ -1,0 +1,68 @@
+"""The drift test over a machine's logs as the judge of new logs takes it.
+
+Its state goes from log to log in the registry, with each log's result.
+"""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError
+from scipy.stats import norm
+
+from identification.drift_chart import DriftState
+from identification.drift_test import DriftTest, Shift
+from identification.errors import BadModel
+from workbench.drift_verdict import Drift, Moved
+from workbench.drifting import Drifted, Stream, drift_of, model_key
+from workbench.model import Model
+from workbench.output import dumps, strict
+from workbench.sources import Sources
+
+
+def drift_by_chart(
+    model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
+) -> Drift:
+    """The verdict on a log alone and by the mean of those since the model is in force.
+
+    Raises BadModel where the stored state is none, or model and card are of different machines.
+    """
+    stream = Stream(_state(state), ()) if state else None
+    seed = int(rng.integers(2**31))
+    found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
+    worst = next(one.test for one in found.tests if one.test.verdict == found.verdict)
+    statistics = [one for one in (worst.single, worst.mean) if one is not None]
+    return Drift(
+        verdict=found.verdict,
+        reason=worst.reason or _said(worst),
+        moved=tuple(_moved(one) for one in worst.moved),
+        p_value=min((one.p_value for one in statistics), default=None),
+        state=_plain(found),
+    )
+
+
+def _said(test: DriftTest) -> str:
+    if not test.moved:
+        return "no parameter has moved"
+    by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
+    moved = (f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved)
+    return f"moved{by}: {', '.join(moved)}"
+
+
+def _state(state: Mapping[str, Any]) -> DriftState:
+    try:
+        return TypeAdapter(DriftState).validate_json(dumps(state), strict=True)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise BadModel(f"stored drift state: {first['loc']}: {first['msg']}") from None
+
+
+def _plain(found: Drifted) -> Mapping[str, Any]:
+    plain = strict(found.stream.state)
+    assert isinstance(plain, dict)
+    return plain
+
+
+def _moved(shift: Shift) -> Moved:
+    p_value = float(2.0 * norm.sf(abs(shift.change) / shift.sd)) if shift.sd > 0 else 0.0
+    return Moved(shift.name, shift.unit, shift.before, shift.after, p_value)
