@@ -19,19 +19,24 @@ _WRONG_SIGN = -0.3
 _SWAPPED = -0.01
 _MUCH_SMOOTHER = 0.7
 _BLOCKS = 10_000
+# A noisy sensor does not repeat one value; a quantised one, or one without noise at rest, does.
+_STUCK_RUN = 50  # samples
+_STUCK_ELSEWHERE = 1e-3  # share of repeats outside such runs, below which they are a fault
+_NOISE_LIKE = 0.3  # share of samples at which the second difference of noise changes its sign
 
 
 def check(log: Log, rig: Rig, first_row: int = 1) -> None:
     """Pass a log that can be what its card says.
 
     Raises BadLog, one line each, where the log is too short, time repeats or goes back, a value
-    is not finite, the position is constant or beyond the stroke, the force has the wrong sign, or
-    force and position are swapped.
+    is not finite, the position is constant, sticks or is beyond the stroke, the force has the
+    wrong sign, or force and position are swapped.
     """
     check_time(log, first_row)
     _check_finite(log, first_row)
     if "y" in log:
         _check_position(log, rig)
+        _check_stuck(log, first_row)
     if "y" in log and "F" in log:
         _check_work(log)
 
@@ -82,6 +87,30 @@ def _check_position(log: Log, rig: Rig) -> None:
             f"{log.name}: position runs from {y.min():g} to {y.max():g} m, the card's stroke is "
             f"{low:g} to {high:g} m; check unit and gain of y, and that y and F are not swapped"
         )
+
+
+def _check_stuck(log: Log, first_row: int) -> None:
+    """Refuse a noisy position that now and then repeats one value for long: the sensor's fault."""
+    y = log["y"]
+    same = np.concatenate(([False], np.diff(y) == 0.0, [False]))
+    edges = np.flatnonzero(np.diff(same.astype(np.int8)))
+    starts, lengths = edges[0::2], edges[1::2] - edges[0::2]
+    long = lengths >= _STUCK_RUN
+    if not np.any(long):
+        return
+    others = len(y) - int(lengths[long].sum())
+    if int(lengths[~long].sum()) > _STUCK_ELSEWHERE * others:
+        return
+    bend = np.diff(y, 2)
+    bend = bend[bend != 0.0]
+    if bend.size < SHORTEST or np.mean(bend[1:] * bend[:-1] < 0.0) < _NOISE_LIKE:
+        return
+    worst = int(np.argmax(lengths))
+    raise BadLog(
+        f"{log.name}: position repeats {y[starts[worst]]:.6g} for {int(lengths[worst]) + 1} samples"
+        f" from row {first_row + int(starts[worst])} ({int(np.count_nonzero(long))} such stretches)"
+        " and never elsewhere: the sensor sticks; cut the log there or repair the sensor"
+    )
 
 
 def _check_work(log: Log) -> None:

@@ -19,6 +19,7 @@ from identification.result import Drive
 from identification.simulate import free_run
 
 BEFORE, AFTER = 30, 25  # samples of rest and of motion that are compared
+EXACT = 1e-12  # m or rad: a position without noise
 GRID = 25  # limits tried between the smallest and the largest force around the breakaway
 NARROWED = 2  # times that the grid is drawn around its best
 MOVED = 20.0  # times the position's noise that a body goes on to move, or it was no breakaway
@@ -88,5 +89,5 @@ def _cost(
     drive: Drive = "command" if one.held else "force"
     plant = Plant(nine, Motor(1.0) if one.held else None)
     run = free_run(plant, part, (level, 0.0, float(part["F"][0])), drive)
-    r: Array = (run.y - part["y"]) / one.noise_y
+    r: Array = (run.y - part["y"]) / max(one.noise_y, EXACT)
     return float(np.mean(np.minimum(r**2, 1e4)))

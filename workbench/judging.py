@@ -1,7 +1,7 @@
-"""What a worker makes of a log: drift test, and where it has drifted the whole chain anew."""
+"""What a worker makes of a log: drift test, then the chain anew, or the trace, and the contest."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -9,7 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable
+from identification.errors import (
+    BadLog,
+    BadModel,
+    BadSpecification,
+    NotIdentifiable,
+    UserError,
+)
 from identification.library import Library
 from identification.log import Log
 from workbench.challenge import Contender, Terms, challenge, contest_document
@@ -19,9 +25,12 @@ from workbench.drift_verdict import Drift, DriftTest
 from workbench.identifying import Source
 from workbench.jobs.passes import Task
 from workbench.model import Model, model_document, read_model
+from workbench.own_effects import library as installed
 from workbench.pipeline import identify_sources
 from workbench.registry.values import Candidate, Judgement
 from workbench.sources import Sources, read_sources
+from workbench.trace_views import sentence
+from workbench.tracing import Traced, trace_sources
 from workbench.tuning import design
 from workbench.validating import validate, validation_document
 
@@ -54,9 +63,15 @@ class Chain:
         state = (task.previous or {}).get("state", {})
         found = self.drift(champion.model, sources, rng, state)
         evidence = {"drift": _without_state(found), "state": found.state}
+        if found.verdict == "structure":
+            return self._traced(champion, sources, found, evidence)
         if found.verdict != "drift":
             return Judgement(found.verdict, found.reason, evidence=evidence)
-        return self._challenge(champion, sources, found, evidence)
+        train, held_out = divided(sources)
+        challenger, candidate, refused = self._made(train)
+        if challenger is None:
+            return Judgement("refused", f"{found.reason}; {refused}", candidate, evidence)
+        return self._challenge(champion, challenger, candidate, held_out, found.reason, evidence)
 
     def _first(self, sources: Sources) -> Judgement:
         """A machine's first model, where its design keeps every limit in simulation."""
@@ -65,25 +80,46 @@ class Chain:
             return Judgement("refused", f"no first model: {refused}", candidate)
         return Judgement("promoted", "the machine's first model; its design passes", candidate)
 
-    def _challenge(
+    def _traced(
         self, champion: Contender, sources: Sources, found: Drift, evidence: Mapping[str, Any]
     ) -> Judgement:
-        """A model of the machine as it is now, against the one in force."""
+        """What the model in force lacks, by the trace; a model that has it, against that one."""
         train, held_out = divided(sources)
-        challenger, candidate, refused = self._made(train)
-        if challenger is None:
-            return Judgement("refused", f"{found.reason}; {refused}", candidate, evidence)
+        library = self.library or installed()
+        try:
+            traced = trace_sources(train, _as_test(train, held_out), library, self.seed)
+        except UserError as error:
+            return Judgement("structure", f"{found.reason}; trace: {error}", evidence=evidence)
+        evidence = {**evidence, "trace": _summary(traced)}
+        reason = f"{found.reason}; {sentence(traced)}"
+        if traced.trace.verdict != "effect":
+            return Judgement("structure", reason, evidence=evidence)
+        challenger, candidate, refused = self._designed(traced.model)
+        if challenger.design is None:
+            return Judgement("refused", f"{reason}; {refused}", candidate, evidence)
+        return self._challenge(champion, challenger, candidate, held_out, reason, evidence)
+
+    def _challenge(
+        self,
+        champion: Contender,
+        challenger: Contender,
+        candidate: Candidate | None,
+        held_out: Sequence[Log],
+        said: str,
+        evidence: Mapping[str, Any],
+    ) -> Judgement:
+        """A model of the machine as it is now, against the one in force; said: why it was made."""
         rng = np.random.default_rng(self.seed)
         contest = challenge(champion, challenger, held_out, rng, self.terms)
         evidence = {**evidence, "contest": contest_document(contest)}
-        reason = f"{found.reason}; {contest.reason}"
+        reason = f"{said}; {contest.reason}"
         if contest.won:
             return Judgement("promoted", reason, candidate, evidence)
         kept = self._kept(champion, challenger) if contest.model_won else None
         if kept is None or candidate is None:
             return Judgement("refused", reason, candidate, evidence)
-        said = f"{reason}; so the model is replaced and the controllers stay"
-        return Judgement("promoted", said, kept, evidence, (candidate, reason))
+        stays = f"{reason}; so the model is replaced and the controllers stay"
+        return Judgement("promoted", stays, kept, evidence, (candidate, reason))
 
     def _kept(self, champion: Contender, challenger: Contender) -> Candidate | None:
         """The new model with the controllers in force, where they pass on it.
@@ -110,6 +146,10 @@ class Chain:
             model = identify_sources(sources, seed=self.seed).model
         except NotIdentifiable as error:
             return None, None, f"no model: {error}"
+        return self._designed(model)
+
+    def _designed(self, model: Model) -> tuple[Contender, Candidate, str]:
+        """Design and validation of a model, and what speaks against them."""
         try:
             made = design(model)
         except (BadSpecification, NotIdentifiable) as error:
@@ -136,6 +176,26 @@ def divided(sources: Sources) -> tuple[Sources, list[Log]]:
     if not any(log.duration > 0 for log in rest):
         raise BadLog("the log is too short to hold a part of it out; log a longer run")
     return replace(sources, runs=tuple(train)), rest
+
+
+def _as_test(train: Sources, held_out: Sequence[Log]) -> Sources:
+    """The held-out parts as test runs of a trace; parts of the same files, so marked as such."""
+    runs = tuple(
+        replace(source, log=log, rows=len(log), sha256=f"{source.sha256}, held out")
+        for source, log in zip(train.runs, held_out, strict=True)
+    )
+    return replace(train, runs=runs, remarks=())
+
+
+def _summary(traced: Traced) -> dict[str, Any]:
+    """Of a trace, what the registry keeps."""
+    found = traced.trace
+    return {
+        "verdict": found.verdict,
+        "effects": {one.effect.key: one.params for one in found.effects},
+        "before": found.before,
+        "after": found.after,
+    }
 
 
 def _contender(task: Task, library: Library | None) -> Contender:

@@ -1,0 +1,249 @@
+"""Three months of one machine: what was noticed, when, and what was done.
+
+    python benchmarks/scenario.py [--seed 0] [--picture docs/timeline.png]
+
+A simulated rig has the friction of the paper's table 2 and wears to that of table 3. Two logs a
+week are judged by the same pass as `workbench reidentify`, on a registry of its own. In between a
+week of files that no one can read, a week in which the position transducer sticks, and from then
+on a spring that nobody declared (a hose that pulls). Prints the timeline.
+"""
+
+import argparse
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from datetime import UTC, datetime, timedelta
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from identification.karnopp import NAMES, Karnopp
+from identification.library import built_in
+from identification.log import Log
+from workbench.card import Card, load_card
+from workbench.fetch import card_path
+from workbench.jobs.passes import Pass, Settings
+from workbench.judging import Chain
+from workbench.recording import as_columns, record
+from workbench.registry.queue import Queue
+from workbench.registry.store import Registry
+from workbench.registry.values import Outcome
+
+START = datetime(2026, 3, 2, 6, 0, tzinfo=UTC)
+STEP = timedelta(days=3.5)
+SPRING = 40.0  # N/m
+CARD = """[card]
+name = "rig"
+
+[rig]
+kind = "force"
+control_limit_v = 5.0
+
+[signals]
+t = { column = "t", unit = "s" }
+r = { column = "r", unit = "m" }
+y = { column = "y", unit = "m" }
+F = { column = "F", unit = "N" }
+u = { column = "u", unit = "V" }
+"""
+
+
+@dataclass(frozen=True)
+class Day:
+    """One log: when, what is true then (wear 0: table 2, 1: table 3), and what is wrong with it."""
+
+    number: int
+    wear: float
+    spring: bool = False
+    fault: str = ""
+
+    @property
+    def at(self) -> datetime:
+        """When the log ends."""
+        return START + self.number * STEP
+
+    @property
+    def week(self) -> float:
+        """Weeks since the start."""
+        return self.number / 2.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """A day's log, what became of it, and the model's F_cp [N] in force after it."""
+
+    day: Day
+    outcome: Outcome
+    true: float
+    in_force: float | None
+
+
+def days() -> Iterator[Day]:
+    """Twelve weeks, two logs each."""
+    for number in range(24):
+        week = number // 2
+        wear = float(np.clip((number - 6) / 14.0, 0.0, 1.0))
+        fault = {3: "unreadable", 6: "transducer sticks"}.get(week, "")
+        yield Day(number, wear, spring=week >= 8, fault=fault)
+
+
+def between(old: Karnopp, new: Karnopp, wear: float) -> Karnopp:
+    """Parameters on the way from old to new."""
+    return Karnopp(*((1.0 - wear) * getattr(old, n) + wear * getattr(new, n) for n in NAMES))
+
+
+def story(
+    root: Path, seed: int, count: int = 24, on_day: Callable[["Told"], None] = lambda _told: None
+) -> list[Told]:
+    """The first `count` logs, one after the other, each judged by a pass of its own."""
+    machine = root / "machines" / "rig"
+    (machine / "logs").mkdir(parents=True)
+    (machine / "card.toml").write_text(CARD, encoding="utf-8")
+    told = []
+    with Registry(str(root / "registry.db")) as registry:
+        for day in list(days())[:count]:
+            write(machine / "logs", day, seed)
+            settings = Settings("scenario", first=True, settle=timedelta(0))
+            now = day.at + timedelta(minutes=5)
+            Pass(registry, Chain(), settings, partial(at, now), silent).run(root / "machines")
+            (outcome,) = (one for one in Queue(registry.database).outcomes("rig") if one.at == now)
+            version = registry.in_force("rig")
+            value = None
+            if version is not None:
+                value = registry.document(version, "model")["friction"]["F_cp"]["value"]
+            told.append(Told(day, outcome, truth(day).F_cp, value))
+            on_day(told[-1])
+    return told
+
+
+def at(now: datetime) -> datetime:
+    """A clock that stands."""
+    return now
+
+
+def truth(day: Day) -> Karnopp:
+    """The machine's parameters on a day."""
+    tables = [shipped(f"paper_table{k}").recipe for k in (2, 3)]
+    old, new = (one.plant.friction for one in tables if one is not None)
+    return between(old, new, day.wear)
+
+
+def shipped(name: str) -> Card:
+    """A shipped card."""
+    return load_card(card_path(name))
+
+
+def write(folder: Path, day: Day, seed: int) -> None:
+    """The day's log, as the machine's logger leaves it."""
+    path = folder / f"{day.at:%Y-%m-%d}.csv"
+    card = shipped("paper_table2")
+    recipe = card.recipe
+    assert recipe is not None
+    spring = built_in()["spring"].acting({"k": SPRING})
+    plant = replace(recipe.plant, friction=truth(day), effects=(spring,) if day.spring else ())
+    recipe = replace(
+        recipe,
+        plant=plant,
+        duration=40.0,
+        h=2e-3,
+        reference=shipped("paper_table1_rich").recipe.reference,  # type: ignore[union-attr]
+    )
+    log = record("rig", recipe, 1000 * seed + day.number, card.rig())
+    if day.fault == "transducer sticks":
+        log = stuck(log)
+    pd.DataFrame(as_columns(log, card)).to_csv(path, index=False, float_format="%.10g")
+    if day.fault == "unreadable":
+        text = path.read_text("utf-8")
+        # A logger that was switched off half-way through a line, and one that lost a column.
+        path.write_text(text[: len(text) // 2] if day.number % 2 else text.replace("F,", "", 1))
+    os.utime(path, (day.at.timestamp(), day.at.timestamp()))
+
+
+def stuck(log: Log) -> Log:
+    """The log with its position held for two seconds now and then."""
+    y = np.array(log["y"])
+    for start in range(len(y) // 8, len(y) - 1000, len(y) // 4):
+        y[start : start + 1000] = y[start]
+    return log.with_signals(y=y)
+
+
+def silent(_event: str, **_more: object) -> None:
+    """A pass's report that goes nowhere."""
+
+
+def line(one: Told) -> str:
+    """One log's line of the timeline."""
+    day, known = one.day, "-" if one.in_force is None else f"{one.in_force:.2f}"
+    about = ", ".join(
+        part for part in (f"wear {100 * day.wear:.0f} %", "spring" if day.spring else "", day.fault)
+        if part
+    )  # fmt: skip
+    return (
+        f"week {day.week:4.1f}  {about:34s} F_cp {one.true:5.2f} true, {known:>5s} in force  "
+        f"{one.outcome.verdict:10s} {one.outcome.reason}"
+    )
+
+
+def picture(told: list[Told], path: Path) -> None:
+    """The timeline as a PNG: F_cp true and in force, and what was made of each log."""
+    from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, label, style
+
+    looks = {
+        "none": ("o", OTHER, "nothing has changed"),
+        "promoted": ("^", MODEL, "new model and design put in force"),
+        "refused": ("v", "#cc79a7", "challenger refused"),
+        "structure": ("s", "#e69f00", "another structure: no model follows"),
+        "set_aside": ("x", "#000000", "log set aside"),
+        "not_judged": ("d", "#999999", "not judged"),
+    }
+    week = [one.day.week for one in told]
+    with style():
+        drawn = figure(9.0, 3.6)
+        axes = drawn.subplots(1, 1)
+        axes.plot(week, [one.true for one in told], color=REFERENCE, label="F_cp, true")
+        known = [np.nan if one.in_force is None else one.in_force for one in told]
+        axes.step(week, known, where="post", color=MODEL, ls="--", label="F_cp in force")
+        for verdict, (marker, colour, words) in looks.items():
+            at = [one for one in told if one.outcome.verdict == verdict]
+            if at:
+                axes.plot(
+                    [one.day.week for one in at], [one.true for one in at], marker,
+                    color=colour, label=words, ms=7,
+                )  # fmt: skip
+        low, high = axes.get_ylim()
+        for first, last, words in spans(told):
+            axes.axvspan(first - 0.2, last + 0.2, color="#eeeeee", zorder=0)
+            axes.text(first - 0.15, low + 0.03 * (high - low), words, fontsize=8)
+        label(axes, "time [weeks]", "Coulomb friction F_cp [N]")
+        drawn.legend(loc="outside right upper")
+        drawn.savefig(path, dpi=130)
+
+
+def spans(told: list[Told]) -> list[tuple[float, float, str]]:
+    """Weeks in which something is wrong with the logs, or undeclared is in the machine."""
+    found: dict[str, list[float]] = {}
+    for one in told:
+        words = one.day.fault or ("spring" if one.day.spring else "")
+        if words:
+            found.setdefault(words, []).append(one.day.week)
+    return [(min(weeks), max(weeks), words) for words, weeks in found.items()]
+
+
+def main() -> None:
+    """The story on a terminal, and its picture where one is asked for."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--count", type=int, default=24)
+    parser.add_argument("--picture", type=Path)
+    given = parser.parse_args()
+    with tempfile.TemporaryDirectory() as name:
+        told = story(Path(name), given.seed, given.count, lambda one: print(line(one), flush=True))
+    if given.picture:
+        picture(told, given.picture)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""A position sensor that sticks; the other refusals are tested with the stages that call them."""
+
+import numpy as np
+import pytest
+
+from identification.check import check
+from identification.errors import BadLog
+from identification.log import Log, Rig
+
+
+def test_a_noisy_position_that_sticks_is_refused() -> None:
+    rng = np.random.default_rng(3)
+    t = 0.01 * np.arange(2000, dtype=np.float64)
+    y = 0.1 * np.sin(t) + 1e-5 * rng.standard_normal(2000)
+    stuck = y.copy()
+    stuck[500:700] = stuck[500]
+    with pytest.raises(BadLog, match=r"for 200 samples from row 501 \(1 such"):
+        check(Log("made", {"t": t, "y": stuck}), Rig("force"))
+    check(Log("made", {"t": t, "y": y}), Rig("force"))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-5])
+def test_a_rest_is_no_fault_without_noise_or_with_counts(noise: float) -> None:
+    rng = np.random.default_rng(3)
+    t = 0.01 * np.arange(2000, dtype=np.float64)
+    y = 0.1 * np.sin(np.maximum(t - 5.0, 0.0)) + noise * rng.standard_normal(2000)
+    if noise:
+        y = 2e-5 * np.round(y / 2e-5)
+    check(Log("made", {"t": t, "y": y}), Rig("force"))
