@@ -125,6 +125,7 @@ def simulate_loop(
     the controller's recursion takes the command as clipped. The plant is stepped exactly: the run
     does not depend on an internal step. Raises BadModel where the parts do not fit together.
     """
+    _refuse_effects([plant])
     loop, p = prepared_loop(
         [plant], controller, force_controller, reference, h, noise, control_limit, start
     )
@@ -167,6 +168,7 @@ def simulate_loops(
 
     noise: (n,) for all plants, or (n, plants). All plants have an Actuator, or all a Motor.
     """
+    _refuse_effects(plants)
     loop, p = prepared_loop(
         plants, controller, force_controller, reference, h, noise, control_limit, start
     )
@@ -202,11 +204,19 @@ def loop_costs(
 
     window: first sample and the one after the last; all samples where it is None.
     """
+    _refuse_effects(plants)
     loop, p = prepared_loop(
         plants, controller, force_controller, reference, h, noise, control_limit, start
     )
     _, costs = _many(p, loop, h, window or (0, len(loop.feed)), record=False)
     return LoopCosts(costs[0, : len(plants)], costs[1, : len(plants)])
+
+
+def _refuse_effects(plants: Sequence[Plant]) -> None:
+    """These kernels know the Karnopp plant alone."""
+    keys = sorted({one.key for plant in plants for one in plant.effects})
+    if keys:
+        raise BadModel(f"plant with effects {', '.join(keys)}: simulate it by simulate_servo")
 
 
 def _many(

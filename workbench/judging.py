@@ -68,7 +68,7 @@ class Chain:
         if found.verdict != "drift":
             return Judgement(found.verdict, found.reason, evidence=evidence)
         train, held_out = divided(sources)
-        challenger, candidate, refused = self._made(train)
+        challenger, candidate, refused = self._anew(champion.model, train, held_out)
         if challenger is None:
             return Judgement("refused", f"{found.reason}; {refused}", candidate, evidence)
         return self._challenge(champion, challenger, candidate, held_out, found.reason, evidence)
@@ -92,10 +92,15 @@ class Chain:
             return Judgement("structure", f"{found.reason}; trace: {error}", evidence=evidence)
         evidence = {**evidence, "trace": _summary(traced)}
         reason = f"{found.reason}; {sentence(traced)}"
-        if traced.trace.verdict != "effect":
+        made: tuple[Contender | None, Candidate | None, str]
+        if traced.trace.verdict == "effect":
+            made = self._designed(traced.model)
+        elif traced.trace.verdict == "none":  # other parameters do, which the test did not find
+            made = self._made(train)
+        else:
             return Judgement("structure", reason, evidence=evidence)
-        challenger, candidate, refused = self._designed(traced.model)
-        if challenger.design is None:
+        challenger, candidate, refused = made
+        if challenger is None or challenger.design is None:
             return Judgement("refused", f"{reason}; {refused}", candidate, evidence)
         return self._challenge(champion, challenger, candidate, held_out, reason, evidence)
 
@@ -139,6 +144,17 @@ class Chain:
         if not checked.passed:
             return None
         return Candidate(model_document(model), design_document(made), validation_document(checked))
+
+    def _anew(
+        self, champion: Model, train: Sources, held_out: Sequence[Log]
+    ) -> tuple[Contender | None, Candidate | None, str]:
+        """A drifted machine's model, with the effects of the one in force where they show."""
+        if champion.acting:
+            known = {one.key: one.effect for one in champion.acting}
+            traced = trace_sources(train, _as_test(train, held_out), known, self.seed)
+            if traced.trace.effects:
+                return self._designed(traced.model)
+        return self._made(train)
 
     def _made(self, sources: Sources) -> tuple[Contender | None, Candidate | None, str]:
         """Model, design and validation of the sources, and what speaks against them."""

@@ -13,6 +13,7 @@ from design.rst import RST
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.karnopp import Karnopp
+from identification.library import built_in
 from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
 from identification.simulate import free_run
@@ -268,3 +269,12 @@ def test_plants_of_one_kind_only() -> None:
     for T_i in (0.0, -1.0, np.nan):
         with pytest.raises(BadModel, match="T_i"):
             ForcePI(0.02, T_i)
+
+
+def test_effects_are_refused_by_the_plain_loops() -> None:
+    sprung = replace(PLANT, effects=(built_in()["spring"].acting({"k": 40.0}),))
+    for simulate in (simulate_loops, loop_costs):
+        with pytest.raises(BadModel, match="spring: simulate it by simulate_servo"):
+            simulate([PLANT, sprung], PID, PI, steps(10), H)
+    with pytest.raises(BadModel, match="simulate_servo"):
+        simulate_loop(sprung, PID, PI, steps(10), H)

@@ -12,6 +12,7 @@ import pytest
 
 from identification.errors import BadCard, BadLog, BadModel
 from identification.karnopp import Karnopp
+from identification.library import built_in
 from tests.chain import CARD, TABLES
 from workbench.card import Card, load_card
 from workbench.challenge import Terms
@@ -164,13 +165,37 @@ def test_a_false_alarm_is_refused_with_its_reason(shop: Path, first: Judgement) 
     assert found.candidate is not None
 
 
-@pytest.mark.parametrize("verdict", ["none", "structure", "not_judged"])
+@pytest.mark.parametrize("verdict", ["none", "not_judged"])
 def test_other_verdicts_are_passed_on_with_their_state(
     shop: Path, first: Judgement, verdict: str
 ) -> None:
     found = Chain(says(verdict))(task(shop, "same", first, {"state": {"mean": 1.5}}))
     assert (found.verdict, found.reason, found.candidate) == (verdict, "said", None)
     assert found.evidence["state"] == {"given": {"mean": 1.5}}
+
+
+def test_another_structure_is_traced_and_the_effect_put_in_force(
+    shop: Path, first: Judgement
+) -> None:
+    card = load_card(shop / "card.toml")
+    assert card.recipe is not None
+    spring = built_in()["spring"].acting({"k": 60.0})
+    plant = replace(card.recipe.plant, effects=(spring,))
+    sprung = record(card.name, replace(card.recipe, plant=plant, duration=20.0), 8, card.rig())
+    pd.DataFrame(as_columns(sprung, card)).to_csv(shop / "sprung.csv", index=False)
+    found = Chain(says("structure"))(task(shop, "sprung", first))
+    assert found.verdict == "promoted", found.reason
+    assert "Missing: spring" in found.reason
+    assert found.candidate is not None
+    (effect,) = found.candidate.model["effects"].values()
+    assert effect["k"]["value"] == pytest.approx(60.0, rel=0.02)
+    assert found.evidence["trace"]["verdict"] == "effect"
+
+
+def test_a_structure_that_no_trace_confirms_has_to_win(shop: Path, first: Judgement) -> None:
+    found = Chain(says("structure"))(task(shop, "same", first))
+    assert found.verdict == "refused"
+    assert "held out" in found.reason
 
 
 def test_the_log_that_made_the_model_does_not_judge_it(shop: Path, first: Judgement) -> None:

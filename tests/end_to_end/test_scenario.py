@@ -1,0 +1,72 @@
+"""Twelve weeks of one machine, from table 2 to table 3: what is noticed, when, and what is done."""
+
+from pathlib import Path
+
+import pytest
+
+from benchmarks.scenario import SPRING, Told, days, picture, story
+from workbench.registry.store import Registry
+
+
+@pytest.fixture(scope="module")
+def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the machine and its registry lie."""
+    return tmp_path_factory.mktemp("scenario")
+
+
+@pytest.fixture(scope="module")
+def told(home: Path) -> list[Told]:
+    """The whole story; its noise is not that of the README's picture."""
+    return story(home, seed=5)
+
+
+def test_every_log_has_one_verdict(told: list[Told]) -> None:
+    assert [one.day for one in told] == list(days())
+    verdicts = [one.outcome.verdict for one in told]
+    assert verdicts[0] == "promoted"
+    assert verdicts[1:6] == ["none"] * 5
+
+
+def test_bad_logs_and_a_sensor_fault_are_set_aside_and_stop_nothing(told: list[Told]) -> None:
+    for one in told:
+        assert (one.outcome.verdict == "set_aside") == bool(one.day.fault), one
+    stuck = [one for one in told if one.day.fault == "transducer sticks"]
+    assert all("sensor sticks" in one.outcome.reason for one in stuck)
+
+
+def test_wear_is_followed(told: list[Told]) -> None:
+    """With at most one log's wear behind: 0.3 N of F_cp."""
+    for one in told:
+        if not one.day.fault:
+            assert one.in_force == pytest.approx(one.true, abs=0.35), one
+    moved = [one for one in told if one.outcome.reason.startswith("moved:")]
+    assert len(moved) >= 5
+    assert told[-1].in_force == pytest.approx(12.54, abs=0.1)
+
+
+def test_the_undeclared_spring_is_named_when_it_comes_and_stays(
+    told: list[Told], home: Path
+) -> None:
+    first = next(one for one in told if one.day.spring)
+    assert first.outcome.verdict == "promoted"
+    assert "Missing: spring" in first.outcome.reason
+    assert not any("spring" in one.outcome.reason for one in told if not one.day.spring)
+    with Registry(str(home / "registry.db")) as registry:
+        version = registry.in_force("rig")
+        assert version is not None
+        effects = registry.document(version, "model")["effects"]
+    assert list(effects) == ["spring"]
+    assert effects["spring"]["k"]["value"] == pytest.approx(SPRING, rel=0.05)
+
+
+def test_nothing_is_lost(told: list[Told], home: Path) -> None:
+    with Registry(str(home / "registry.db")) as registry:
+        state = registry.machine("rig")
+        assert (state.logs, state.waiting, state.set_aside) == (24, 0, 4)
+        promoted = [one for one in registry.decisions("rig") if one.kind == "promoted"]
+    assert len(promoted) == sum(one.outcome.verdict == "promoted" for one in told)
+
+
+def test_the_timeline_is_drawn(told: list[Told], tmp_path: Path) -> None:
+    picture(told, tmp_path / "timeline.png")
+    assert (tmp_path / "timeline.png").stat().st_size > 10_000
