@@ -8,6 +8,7 @@ drives) in windows, with the regression's estimates as a prior. No global search
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Literal
 
@@ -40,6 +41,7 @@ LOOSE = 3.0  # times its standard deviation that the regression is trusted as a 
 STEP = 1e-4
 TRIES = 6  # of the damping in one step
 ENOUGH = 1e-5  # share of the cost below which a step is the last
+LITTLE = 1e-3  # the same, where more than noise is left
 BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
@@ -47,11 +49,16 @@ CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The plant refined, standard deviations by name (effects as key.name), and its misfit."""
+    """The plant refined and its misfit; deviations: gives what `sd` is, which takes many runs."""
 
     plant: Plant
-    sd: dict[str, float]
     misfit: float
+    deviations: Callable[[], dict[str, float]]
+
+    @cached_property
+    def sd(self) -> dict[str, float]:
+        """Standard deviations by name (effects as key.name)."""
+        return self.deviations()
 
 
 def names_of(plant: Plant, drive: Drive) -> list[str]:
@@ -193,9 +200,7 @@ def refit(
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 
-    def refined(
-        x: Array, seconds: float, tie: bool, part: float = 0.0
-    ) -> tuple[Array, Array, float]:
+    def refined(x: Array, seconds: float, tie: bool, part: float = 0.0) -> Minimum:
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds)
         # While most is far off, what is far off must still pull.
@@ -207,40 +212,42 @@ def refit(
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
     if effort == "whole":
-        x, J, cost = refined(x, FIRST, True, MOST)
-    x, J, cost = refined(x, SECONDS, True, HALF)
+        x = refined(x, FIRST, True, MOST).x
+    at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
     rounds = [] if quick else [SECONDS]
     if drive == "command" and not slow and not quick:
         rounds.append(LONG if plant_is_motor(plant) else WHOLE)
     for seconds in rounds:
-        again = refined(x, seconds, False)
-        if again[2] / len(again[1]) < FOLLOWED:
-            x, J, cost = again
-    found = misfit(plant_with(plant, names, full(x)), logs, drive)
+        again = refined(at.x, seconds, False)
+        at = again if again.followed else at
+    found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
     for _ in range(RESCUES if effort == "whole" and not slow else 0):
         if found <= COMPLETE:
             break
         # Band and stick limits have narrow minima, and many: another one of either direction.
-        other = by_side(plant_with(plant, names, full(x)), logs, drive)
-        at = values_of(other, names)[open_] / unit[open_]
-        trial = refined(at, SECONDS, False)
+        other = by_side(plant_with(plant, names, full(at.x)), logs, drive)
+        trial = refined(values_of(other, names)[open_] / unit[open_], SECONDS, False)
         if drive == "command":
-            longer = refined(trial[0], LONG if plant_is_motor(plant) else WHOLE, False)
-            trial = longer if longer[2] / len(longer[1]) < FOLLOWED else trial
-        better = misfit(plant_with(plant, names, full(trial[0])), logs, drive)
+            longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
+            trial = longer if longer.followed else trial
+        better = misfit(plant_with(plant, names, full(trial.x)), logs, drive)
         if better > SAME * found:
             break
-        (x, J, cost), found = trial, better
-    best = plant_with(plant, names, full(x))
-    spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * cost / len(J))
-    if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
-        spread = spread * np.sqrt(SECONDS / logs[0].log.h)
-    sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
-    if found > FOLLOWED:
-        sd |= {name: max(sd[name], prior.get(name, 0.0)) for name in sd}
-    return Refit(best, sd, found)
+        at, found = trial, better
+    best = plant_with(plant, names, full(at.x))
+
+    def deviations() -> dict[str, float]:
+        spread = at.spread()
+        if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
+            spread = spread * np.sqrt(SECONDS / logs[0].log.h)
+        sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
+        if found > FOLLOWED:
+            sd |= {name: max(sd[name], prior.get(name, 0.0)) for name in sd}
+        return sd
+
+    return Refit(best, found, deviations)
 
 
 def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
@@ -264,8 +271,27 @@ def plant_is_motor(plant: Plant) -> bool:
     return isinstance(plant.actuator, Motor)
 
 
-def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[Array, Array, float]:
-    """Minimum of the square sum of `fun` near x, its Jacobian there and the square sum.
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Minimum of the square sum of `fun` at x (k,), and its mean square over the rows of `fun`."""
+
+    fun: Callable[[Array], Array]
+    x: Array
+    mean: float
+
+    @property
+    def followed(self) -> bool:
+        """Whether hardly more than noise is left."""
+        return self.mean < FOLLOWED
+
+    def spread(self) -> Array:
+        """Standard deviations of x, (k,), for residuals that are noise of this mean square."""
+        J = jacobian(self.fun, self.x)
+        return np.sqrt(np.maximum(np.diag(np.linalg.pinv(J.T @ J)), 0.0) * self.mean)
+
+
+def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> Minimum:
+    """Minimum of the square sum of `fun` near x.
 
     Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
     """
@@ -283,11 +309,12 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[A
                 break
             damping *= 10.0
         else:
-            return x, J, cost
-        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
-        if gained < ENOUGH * cost:
             break
-    return x, jacobian(fun, x), cost
+        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
+        # What is left of much more than noise need not be known to its last digits.
+        if gained < (ENOUGH if cost < FOLLOWED * len(r) else LITTLE) * cost:
+            break
+    return Minimum(fun, x, cost / len(r))
 
 
 def jacobian(fun: Callable[[Array], Array], x: Array, r: Array | None = None) -> Array:

@@ -23,7 +23,7 @@ from identification.simulate import FreeRun, free_run
 SECONDS = 2.0  # of a window
 REACH = 0.45  # of a window, within which a rest is looked for
 LATER = 2.0  # windows by which a start is put off until there is a rest
-COARSE = 2e-4  # s, sub-step of a bristle: enough for a search
+COARSE = 4e-4  # s, sub-step of a bristle: errs by a tenth of the noise, enough for a search
 LEAST_REST = 24  # samples
 SURE = 3.0  # deviations of the velocity from which a body creeps
 WIDEST = 50  # samples on either side by which a creep is seen
