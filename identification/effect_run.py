@@ -6,11 +6,9 @@ from identification.arrays import Array, IntArray
 from identification.compiled import call_value, compiled
 from identification.effect_step import (
     ACTUATOR,
-    AWAY,
     BRISTLE,
     DELAY,
     VALUE,
-    State,
     acting_command,
     delayed,
     effect_step,
@@ -18,18 +16,15 @@ from identification.effect_step import (
     start_states,
 )
 from identification.stepping import (
-    DV_N,
-    DV_P,
     K1,
     K2,
     SLIP_N,
     SLIP_P,
     STUCK,
-    Parameters,
     parameters,
 )
 
-EVEN = 1e-4  # of a bristle's force, by which it changes in a sample that is stepped roughly
+CALM = (STUCK, SLIP_P, SLIP_N)  # modes in which a sample may pass without a switch
 
 
 @compiled
@@ -84,21 +79,6 @@ def shown_run(
             start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k], k > 0)
             window += 1
         out[3, k] = shown_position(h, codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
-
-
-@compiled
-def calm(
-    p: Parameters, bristle: int, mode: int, state: State, v_0: float, z_0: Array, z: Array
-) -> bool:
-    """Whether a sample from mode and v_0 to `state` held no switch, so that few sub-steps do.
-
-    Of a bristle (states z_0 before and z after): whether it was dragged along, bent as it was.
-    """
-    if bristle < 0:
-        return mode == state[3] and mode in (STUCK, SLIP_P, SLIP_N)
-    slowest, fastest = min(v_0, state[1]), max(v_0, state[1])
-    fast = slowest > AWAY * p[DV_P] or fastest < AWAY * p[DV_N]
-    return fast and abs(z[bristle] - z_0[bristle]) <= EVEN * abs(z[bristle])
 
 
 @compiled
@@ -163,7 +143,7 @@ def effect_run_kernel(
         state = effect_step(
             plant, few, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k], g, h
         )
-        if few < count and not calm(plant, bristle, mode, state, v, z_0, z):
+        if few < count and (state[3] != mode or mode not in CALM):
             z[:] = z_0
             state = effect_step(
                 plant, count, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k],

@@ -51,7 +51,6 @@ LONGEST = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
 LONGEST_CALM = 5e-4  # s, of these while no switch is near
 LONGEST_BRISTLE = 1e-4  # s
-DRAGGED = 2.0  # times that, while a bristle is dragged along
 SHORTEST_WAY = 1e-9  # m, over which a force's slope is still sure
 VALUE, EVOLVE, INITIAL = range(3)
 AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to rest
@@ -121,12 +120,11 @@ def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> in
 
 
 def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
-    """Of `count` sub-steps, those that a sample without a switch needs."""
+    """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
     states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
     longest = LONGEST_CALM if np.any(states) else LONGEST
-    if np.any(table.codes == BRISTLE):
-        longest = min(longest, DRAGGED * bristle)
-    return max(1, math.ceil(count * table.longest(bristle) / longest - 1e-9))
+    short = min(table.longest(bristle) / longest, 1.0)
+    return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))
 
 
 @compiled_inline

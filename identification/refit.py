@@ -168,13 +168,14 @@ def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
 
 def refit(
     plant: Plant, logs: Sequence[Moving], drive: Drive, *, prior: dict[str, float],
-    band: float = 0.0, effort: Effort = "whole",
+    band: float = 0.0, effort: Effort = "whole", rescues: int = RESCUES,
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
-    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first.
+    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first,
+    and so many times (rescues) for another band where more than noise is left.
     """
     quick = effort == "quick"
     if effort == "whole":
@@ -223,7 +224,7 @@ def refit(
         again = refined(at.x, seconds, False)
         at = again if again.followed else at
     found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
-    for _ in range(RESCUES if effort == "whole" and not slow else 0):
+    for _ in range(rescues if effort == "whole" and not slow else 0):
         if found <= COMPLETE:
             break
         # Band and stick limits have narrow minima, and many: another one of either direction.
