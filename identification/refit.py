@@ -23,7 +23,7 @@ from identification.starts import SECONDS, WHOLE, freed, left, starts
 
 FIRST = 1.0  # s, of the windows in which the search begins
 RESCUES = 3  # searches beside, of a run that leaves more than noise
-SAME = 0.95  # of the misfit, above which another search is of no use
+SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
@@ -234,9 +234,11 @@ def refit(
             longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
             trial = longer if longer.followed else trial
         better = misfit(plant_with(plant, names, full(trial.x)), logs, drive)
-        if better > SAME * found:
+        before = found
+        if better < found:
+            at, found = trial, better
+        if better > SAME * before:
             break
-        at, found = trial, better
     best = plant_with(plant, names, full(at.x))
 
     def deviations() -> dict[str, float]:
