@@ -193,8 +193,9 @@ def picture(told: list[Told], path: Path) -> None:
 
     looks = {
         "none": ("o", OTHER, "nothing has changed"),
-        "promoted": ("^", MODEL, "new model and design put in force"),
-        "refused": ("v", "#cc79a7", "challenger refused"),
+        "promoted": ("^", MODEL, "drift: new model put in force"),
+        "effect": ("*", "#cc79a7", "missing effect named and added"),
+        "refused": ("v", "#56b4e9", "challenger refused"),
         "structure": ("s", "#e69f00", "another structure: no model follows"),
         "set_aside": ("x", "#000000", "log set aside"),
         "not_judged": ("d", "#999999", "not judged"),
@@ -207,19 +208,26 @@ def picture(told: list[Told], path: Path) -> None:
         known = [np.nan if one.in_force is None else one.in_force for one in told]
         axes.step(week, known, where="post", color=MODEL, ls="--", label="F_cp in force")
         for verdict, (marker, colour, words) in looks.items():
-            at = [one for one in told if one.outcome.verdict == verdict]
+            at = [one for one in told if look_of(one) == verdict]
             if at:
                 axes.plot(
                     [one.day.week for one in at], [one.true for one in at], marker,
-                    color=colour, label=words, ms=7,
+                    color=colour, label=words, ms=11 if marker == "*" else 7,
                 )  # fmt: skip
         low, high = axes.get_ylim()
-        for first, last, words in spans(told):
+        for row, (first, last, words) in enumerate(spans(told)):
             axes.axvspan(first - 0.2, last + 0.2, color="#eeeeee", zorder=0)
-            axes.text(first - 0.15, low + 0.03 * (high - low), words, fontsize=8)
+            height = low + (0.03 + 0.07 * (row % 2)) * (high - low)
+            axes.text(first - 0.15, height, words, fontsize=8)
         label(axes, "time [weeks]", "Coulomb friction F_cp [N]")
         drawn.legend(loc="outside right upper")
         drawn.savefig(path, dpi=130)
+
+
+def look_of(one: Told) -> str:
+    """What the picture shows of a log: its verdict, "effect" where the trace named one."""
+    named = one.outcome.verdict == "promoted" and "Missing: " in one.outcome.reason
+    return "effect" if named else one.outcome.verdict
 
 
 def spans(told: list[Told]) -> list[tuple[float, float, str]]:

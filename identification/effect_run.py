@@ -15,7 +15,16 @@ from identification.effect_step import (
     shown_position,
     start_states,
 )
-from identification.stepping import K1, K2, STUCK, parameters
+from identification.stepping import (
+    K1,
+    K2,
+    SLIP_N,
+    SLIP_P,
+    STUCK,
+    parameters,
+)
+
+CALM = (STUCK, SLIP_P, SLIP_N)  # modes in which a sample may pass without a switch
 
 
 @compiled
@@ -47,9 +56,36 @@ def effective_commands(
 
 
 @compiled
+def shown_run(
+    p: Array,
+    h: float,
+    codes: IntArray,
+    addresses: IntArray,
+    q: Array,
+    s: Array,
+    t: Array,
+    u: Array,
+    at: IntArray,
+    out: Array,
+) -> None:
+    """Position that the transducer shows, into out[3], of a run whose y, v, F are out[:3]."""
+    plant = parameters(p, 0)
+    z = np.zeros(len(codes))
+    window = 0
+    for k in range(len(u)):
+        now, s_k = t[k] - t[0], s[:, k]
+        y, v, F = out[0, k], out[1, k], out[2, k]
+        if window < len(at) and k == at[window]:
+            start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k], k > 0)
+            window += 1
+        out[3, k] = shown_position(h, codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
+
+
+@compiled
 def effect_run_kernel(
     p: Array,
     h: float,
+    rough: int,
     count: int,
     codes: IntArray,
     addresses: IntArray,
@@ -73,10 +109,12 @@ def effect_run_kernel(
 
     As `simulate.run_kernel`, with effects codes (k,), addresses (k, 3), q (k, P), signals
     s (k, n, S); k_a: a motor's, whose force is k_a times the command that reaches it, or 0.
+    rough, count: sub-steps of a sample without a switch (one of a body that stays at rest), and of
+    one with a switch in it.
     """
     plant = parameters(p, 0)
     k1, k2 = plant[K1], plant[K2]
-    z = np.zeros(len(codes))
+    z, z_0 = np.zeros(len(codes)), np.zeros(len(codes))
     if held:  # a measured force has its losses in it
         codes = np.where(codes == ACTUATOR, -1, codes)
     bristle = place_of(codes, BRISTLE)
@@ -100,8 +138,16 @@ def effect_run_kernel(
             start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k], k > 0)
         shown = shown_position(h, codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, F, shown
+        few = 1 if mode == STUCK and v == 0.0 and bristle < 0 else rough
+        z_0[:] = z
         state = effect_step(
-            plant, count, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k], g, h
+            plant, few, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k], g, h
         )
+        if few < count and (state[3] != mode or mode not in CALM):
+            z[:] = z_0
+            state = effect_step(
+                plant, count, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k],
+                g, h,
+            )  # fmt: skip
         modes[k] = mode if v == 0.0 or mode != STUCK else state[3]
         y, v, F, mode, a = state

@@ -33,6 +33,7 @@ from identification.stepping import (
     STUCK,
     M,
     Parameters,
+    glided,
     resolve,
     settled_mode,
 )
@@ -45,8 +46,10 @@ CODES = dict(
         range(9), strict=True,
     )
 )  # fmt: skip
+OUTSIDE = (COMMAND, DELAY, SENSOR)
 LONGEST = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
+LONGEST_CALM = 5e-4  # s, of these while no switch is near
 LONGEST_BRISTLE = 1e-4  # s
 SHORTEST_WAY = 1e-9  # m, over which a force's slope is still sure
 VALUE, EVOLVE, INITIAL = range(3)
@@ -56,6 +59,7 @@ AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to 
 MICRO_DAMPING = 0.5
 ITERATIONS = 8  # most, of a bristle's mean slope within a sub-step
 SHARE = 1e-3  # of the level, by which the slope of a bristle is differentiated
+STATES = 1 << 9  # beside the bits of the codes
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]
 
@@ -105,9 +109,28 @@ def signal_table(acting: tuple[Acting, ...], log: Log) -> Array:
     return out
 
 
+def outside(codes: IntArray) -> bool:
+    """Whether the effects change only what reaches the actuator and what the transducer shows."""
+    return bool(np.all(np.isin(codes, OUTSIDE)))
+
+
 def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> int:
     """Number of sub-steps in a sample of `h` [s]; bristle: longest of a plant with one [s]."""
     return max(1, math.ceil(h / table.longest(bristle) - 1e-9))
+
+
+def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
+    """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
+    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
+    longest = LONGEST_CALM if np.any(states) else LONGEST
+    short = min(table.longest(bristle) / longest, 1.0)
+    return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))
+
+
+@compiled_inline
+def row_at(x: Array, i: int) -> int:
+    """Address of row i; a row itself would be counted in and out."""
+    return x.ctypes.data + i * x.strides[0]
 
 
 @compiled_inline
@@ -120,7 +143,7 @@ def level(p: Parameters, d: float, v: float, rest: bool) -> tuple[float, float]:
     return coulomb, coulomb + (p[F_VP] if d > 0.0 else p[F_VN]) * abs(v)
 
 
-@compiled
+@compiled_inline
 def total(
     code: int,
     codes: IntArray,
@@ -139,12 +162,23 @@ def total(
 ) -> float:
     """Sum of what the effects of this code give; s (k, MAX_SIGNALS), z (k,)."""
     out = 0.0
-    c, f = level(p, d, v, rest)
     for i in range(len(codes)):
         both = codes[i] == FRICTION and code in (SLIP, STICTION)
         if codes[i] == code or both:
+            c, f = level(p, d, v, rest)
             x = (t, y, v, F, u, d, z[i], c, f)
-            out += call_value(addresses[i, VALUE], x, s[i].ctypes.data, q[i].ctypes.data)
+            out += call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i))
+    return out
+
+
+@compiled_inline
+def at_hand(codes: IntArray, addresses: IntArray) -> int:
+    """A bit for each code among the effects, and one for states; the rest adds up to nothing."""
+    out = 0
+    for i in range(len(codes)):
+        if codes[i] >= 0:
+            out |= (1 << SLIP) | (1 << STICTION) if codes[i] == FRICTION else 1 << codes[i]
+            out |= STATES if addresses[i, EVOLVE] != 0 and codes[i] != SENSOR else 0
     return out
 
 
@@ -162,7 +196,7 @@ def carried(level: float, viscous: float, speed: float) -> tuple[float, float]:
     return 0.0, max(viscous + level / speed, 0.0)
 
 
-@compiled
+@compiled_inline
 def evolve_states(
     sensor: bool,
     dt: float,
@@ -186,10 +220,10 @@ def evolve_states(
             d = 0.0 if rest else way
             c, f = level(p, way, v, rest)
             x = (dt, t, y, v, F, u, d, z[i], c, f)
-            z[i] = call_evolve(addresses[i, EVOLVE], x, s[i].ctypes.data, q[i].ctypes.data)
+            z[i] = call_evolve(addresses[i, EVOLVE], x, row_at(s, i), row_at(q, i))
 
 
-@compiled
+@compiled_inline
 def start_states(
     codes: IntArray,
     addresses: IntArray,
@@ -214,10 +248,10 @@ def start_states(
             d = direction(v, F)
             c, f = level(p, d, v, rest)
             x = (t, y, v, F, u, d, 0.0, c, f)
-            z[i] = call_value(addresses[i, INITIAL], x, s[i].ctypes.data, q[i].ctypes.data)
+            z[i] = call_value(addresses[i, INITIAL], x, row_at(s, i), row_at(q, i))
 
 
-@compiled
+@compiled_inline
 def shown_position(
     h: float,
     codes: IntArray,
@@ -240,9 +274,9 @@ def shown_position(
             c, f = level(p, d, v, v == 0.0)
             if addresses[i, EVOLVE] != 0:
                 step = (h, t, shown, v, F, u, d, z[i], c, f)
-                z[i] = call_evolve(addresses[i, EVOLVE], step, s[i].ctypes.data, q[i].ctypes.data)
+                z[i] = call_evolve(addresses[i, EVOLVE], step, row_at(s, i), row_at(q, i))
             x = (t, shown, v, F, u, d, z[i], c, f)
-            shown = call_value(addresses[i, VALUE], x, s[i].ctypes.data, q[i].ctypes.data)
+            shown = call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i))
     return shown
 
 
@@ -305,7 +339,7 @@ def bristle_step(
     return y + moved, v_next, F + g * dt - k2 * moved, z + stiffness * moved
 
 
-@compiled
+@compiled_inline
 def effect_step(
     p: Parameters,
     count: int,
@@ -324,6 +358,7 @@ def effect_step(
     """State after `h` [s] in `count` sub-steps; g: k1 u, or the force's slope with k2 = 0."""
     y, v, F, mode, a = state
     dt = h / count
+    acts = at_hand(codes, addresses)
     for j in range(count):
         now = t + (j + 0.5) * dt
         rest = mode == STUCK and bristle < 0
@@ -332,21 +367,27 @@ def effect_step(
             vm = 0.0
         ym = y + 0.5 * dt * v
         way = direction(v, F)
-        early = total(ACTUATOR, codes, addresses, q, s, z, p, now, y, v, F, u, way, rest)
+        early = 0.0
+        if acts & (1 << ACTUATOR):
+            early = total(ACTUATOR, codes, addresses, q, s, z, p, now, y, v, F, u, way, rest)
         Fm = F + 0.5 * dt * (g + early - p[K2] * v)
         way = direction(v, Fm)
         still = mode == STUCK
-        evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
+        if acts & STATES:
+            evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
         # Along the way the forces are a straight line in position, which is stepped exactly too.
         way_on = 2.0 * (ym - y)
-        extra = total(FORCE, codes, addresses, q, s, z, p, now, y, vm, Fm, u, way, rest)
-        k_e = 0.0
-        if abs(way_on) > SHORTEST_WAY:
+        extra, k_e = 0.0, 0.0
+        if acts & (1 << FORCE):
+            extra = total(FORCE, codes, addresses, q, s, z, p, now, y, vm, Fm, u, way, rest)
+        if acts & (1 << FORCE) and abs(way_on) > SHORTEST_WAY:
             end = y + way_on
             ahead = total(FORCE, codes, addresses, q, s, z, p, now, end, vm, Fm, u, way, rest)
             k_e = max((extra - ahead) / way_on, -p[K2])
             extra = 0.5 * (extra + ahead + k_e * way_on)
-        g_now = g + total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
+        g_now = g
+        if acts & (1 << ACTUATOR):
+            g_now += total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
         y_0, before, F_0 = y, v, F
         if bristle >= 0:
             # In place of the band: a level that falls from the stick limit as LuGre's does.
@@ -354,8 +395,10 @@ def effect_step(
             edge = p[DV_P] if d > 0.0 else p[DV_N]
             low, _ = level(p, d, vm, False)
             high, _ = level(p, d, vm, True)
-            high += total(STICTION, codes, addresses, q, s, z, p, now, ym, 0.0, Fm, u, d, True)
-            low += total(SLIP, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, d, False)
+            if acts & (1 << STICTION):
+                high += total(STICTION, codes, addresses, q, s, z, p, now, ym, 0.0, Fm, u, d, True)
+            if acts & (1 << SLIP):
+                low += total(SLIP, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, d, False)
             low, viscous = carried(low, p[F_VP] if d > 0.0 else p[F_VN], abs(vm))
             c = max(low + (max(high, 0.0) - low) * math.exp(-((vm / edge) ** 2)), 1e-9)
             at = (now, ym, vm, Fm, u, d)
@@ -369,11 +412,11 @@ def effect_step(
             slow_p, slow_n = slowest < AWAY * p[DV_P], fastest > AWAY * p[DV_N]
             up = down = high_p = high_n = 0.0
             wp, wn = max(vm, 0.0), min(vm, 0.0)
-            if slow_n:
+            if slow_n and acts & (1 << SLIP):
                 up = total(SLIP, codes, addresses, q, s, z, p, now, ym, wp, Fm, u, 1.0, False)
-            if slow_p:
+            if slow_p and acts & (1 << SLIP):
                 down = total(SLIP, codes, addresses, q, s, z, p, now, ym, wn, Fm, u, -1.0, False)
-            if slow_p and slow_n:
+            if slow_p and slow_n and acts & (1 << STICTION):
                 x = (now, ym, 0.0, Fm, u)
                 high_p = total(STICTION, codes, addresses, q, s, z, p, *x, 1.0, True)
                 high_n = total(STICTION, codes, addresses, q, s, z, p, *x, -1.0, True)
@@ -394,11 +437,16 @@ def effect_step(
             )
             mode = settled_mode(shifted, v, F + extra)
             v = 0.0 if mode == STUCK else v
-            y, v, _, mode = resolve(shifted, y, v, F + extra, mode, g_now, dt)
+            moved, after, on = glided(shifted, v, F + extra, mode, g_now, dt)
+            if on:
+                y, v = y + moved, after
+            else:
+                y, v, _, mode = resolve(shifted, y, v, F + extra, mode, g_now, dt)
             F += g_now * dt - p[K2] * (y - y_0)
         a = (v - before) / dt
         ym, vm, Fm, still = 0.5 * (y_0 + y), 0.5 * (before + v), 0.5 * (F_0 + F), mode == STUCK
-        evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
+        if acts & STATES:
+            evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
     return y, v, F, mode, a
 
 
@@ -411,7 +459,7 @@ def acting_command(
         if codes[i] == COMMAND:
             d = 1.0 if u >= 0.0 else -1.0
             x = (t, 0.0, 0.0, 0.0, u, d, z[i], 0.0, 0.0)
-            u = float(call_value(addresses[i, VALUE], x, s[i].ctypes.data, q[i].ctypes.data))
+            u = float(call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i)))
     return u
 
 

@@ -43,6 +43,7 @@ NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 SHORT = 15.0  # s of each log in which all are tried first
 SHOWN = 3  # rivals of an effect taken that are tried in its place
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
+WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist
 LARGER = 3  # starts of a play, from the best up
@@ -107,13 +108,14 @@ def contest(
     """The best structure of one effect more, or of another in an effect's place, if decisive."""
     tried = list(_structures(choice, model, setting))
     screened = []
+    enough = max(NEAR, PROMISING * model.misfit)
     for i, one in enumerate(tried):
-        contender = _screened(one, setting)
+        contender = _screened(one, setting, enough)
         if contender is not None:
             screened.append(contender)
         report("judging", (i + 1) / len(tried))
     screened.sort(key=lambda one: one.misfit)
-    if not screened or screened[0].misfit > max(NEAR, PROMISING * model.misfit):
+    if not screened or screened[0].misfit > enough:
         return None
     best: tuple[Refit, Contender] | None = None
     for finalist in screened[:FINALISTS]:
@@ -212,8 +214,11 @@ def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) ->
     return shape_grid(effect, p, logs)
 
 
-def _screened(trial: Trial, setting: Setting) -> Contender | None:
-    """The effect at the best of its starts, refined a little on the short logs."""
+def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None:
+    """The effect at the best of its starts, refined a little on the short logs.
+
+    enough: misfit from which it may be the best; far above it no other start is tried.
+    """
     plants = []
     for values in trial.values:
         try:
@@ -231,10 +236,13 @@ def _screened(trial: Trial, setting: Setting) -> Contender | None:
         at = int(np.argmin(costs))
         # The plain parameters are bent to do without it: a larger size may be the better start.
         more = LARGER if trial.effect.acts == "sensor" and len(trial.effect.params) == 1 else 1
-        tries = [_near(one, trial.effect, setting) for one in plants[at : at + more]]
+        found = _near(plants[at], trial.effect, setting)
+        for one in plants[at + 1 : at + more]:
+            if found.misfit > WORTH * enough:
+                break
+            found = min(found, _near(one, trial.effect, setting), key=lambda x: x.misfit)
     except UserError:  # two effects of a kind that a plant takes one of
         return None
-    found = min(tries, key=lambda one: one.misfit)
     return Contender(trial.steps, trial.effect, found.plant, found.misfit)
 
 

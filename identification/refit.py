@@ -5,9 +5,10 @@ the body starts and stops. All are refined together on the position (and force, 
 drives) in windows, with the regression's estimates as a prior. No global search is needed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from typing import Literal
 
@@ -22,7 +23,7 @@ from identification.starts import SECONDS, WHOLE, freed, left, starts
 
 FIRST = 1.0  # s, of the windows in which the search begins
 RESCUES = 3  # searches beside, of a run that leaves more than noise
-SAME = 0.95  # of the misfit, above which another search is of no use
+SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
@@ -40,6 +41,7 @@ LOOSE = 3.0  # times its standard deviation that the regression is trusted as a 
 STEP = 1e-4
 TRIES = 6  # of the damping in one step
 ENOUGH = 1e-5  # share of the cost below which a step is the last
+LITTLE = 1e-3  # the same, where more than noise is left
 BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
@@ -47,16 +49,29 @@ CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
 @dataclass(frozen=True, eq=False)
 class Refit:
-    """The plant refined, standard deviations by name (effects as key.name), and its misfit.
+    """The plant refined and its misfit.
 
-    names (d,): parameters that were free, in the order of `covariance` (d, d).
+    names (d,): parameters that were free; prior: their deviations from the regression, where they
+    have one; spread: gives `covariance` (d, d), which takes many runs.
     """
 
     plant: Plant
-    sd: dict[str, float]
     misfit: float
     names: tuple[str, ...]
-    covariance: Array
+    prior: Mapping[str, float]
+    spread: Callable[[], Array]
+
+    @cached_property
+    def covariance(self) -> Array:
+        """Of the errors of `names`, (d, d)."""
+        return self.spread()
+
+    @cached_property
+    def sd(self) -> dict[str, float]:
+        """Standard deviations by name (effects as key.name)."""
+        deviations = np.sqrt(np.maximum(np.diag(self.covariance), 0.0)).tolist()
+        least = self.prior if self.misfit > FOLLOWED else {}
+        return {n: max(s, least.get(n, 0.0)) for n, s in zip(self.names, deviations, strict=True)}
 
 
 def names_of(plant: Plant, drive: Drive) -> list[str]:
@@ -166,13 +181,14 @@ def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
 
 def refit(
     plant: Plant, logs: Sequence[Moving], drive: Drive, *, prior: dict[str, float],
-    band: float = 0.0, effort: Effort = "whole",
+    band: float = 0.0, effort: Effort = "whole", rescues: int = RESCUES,
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
-    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first.
+    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first,
+    and so many times (rescues) for another band where more than noise is left.
     """
     quick = effort == "quick"
     if effort == "whole":
@@ -198,9 +214,7 @@ def refit(
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 
-    def refined(
-        x: Array, seconds: float, tie: bool, part: float = 0.0
-    ) -> tuple[Array, Array, float]:
+    def refined(x: Array, seconds: float, tie: bool, part: float = 0.0) -> Minimum:
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds)
         # While most is far off, what is far off must still pull.
@@ -212,42 +226,40 @@ def refit(
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
     if effort == "whole":
-        x, J, cost = refined(x, FIRST, True, MOST)
-    x, J, cost = refined(x, SECONDS, True, HALF)
+        x = refined(x, FIRST, True, MOST).x
+    at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
     rounds = [] if quick else [SECONDS]
     if drive == "command" and not slow and not quick:
         rounds.append(LONG if plant_is_motor(plant) else WHOLE)
     for seconds in rounds:
-        again = refined(x, seconds, False)
-        if again[2] / len(again[1]) < FOLLOWED:
-            x, J, cost = again
-    found = misfit(plant_with(plant, names, full(x)), logs, drive)
-    for _ in range(RESCUES if effort == "whole" and not slow else 0):
+        again = refined(at.x, seconds, False)
+        at = again if again.followed else at
+    found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
+    for _ in range(rescues if effort == "whole" and not slow else 0):
         if found <= COMPLETE:
             break
         # Band and stick limits have narrow minima, and many: another one of either direction.
-        other = by_side(plant_with(plant, names, full(x)), logs, drive)
-        at = values_of(other, names)[open_] / unit[open_]
-        trial = refined(at, SECONDS, False)
+        other = by_side(plant_with(plant, names, full(at.x)), logs, drive)
+        trial = refined(values_of(other, names)[open_] / unit[open_], SECONDS, False)
         if drive == "command":
-            longer = refined(trial[0], LONG if plant_is_motor(plant) else WHOLE, False)
-            trial = longer if longer[2] / len(longer[1]) < FOLLOWED else trial
-        better = misfit(plant_with(plant, names, full(trial[0])), logs, drive)
-        if better > SAME * found:
+            longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
+            trial = longer if longer.followed else trial
+        better = misfit(plant_with(plant, names, full(trial.x)), logs, drive)
+        before = found
+        if better < found:
+            at, found = trial, better
+        if better > SAME * before:
             break
-        (x, J, cost), found = trial, better
-    best = plant_with(plant, names, full(x))
-    inverse = np.linalg.pinv(J.T @ J) * cost / len(J)
-    if found > FOLLOWED:  # what is left is no noise: a window counts as one sample
-        inverse = inverse * SECONDS / logs[0].log.h
-    spread = np.sqrt(np.maximum(np.diag(inverse), 0.0))
-    sd = {names[i]: float(s * unit[i]) for i, s in zip(open_, spread, strict=True)}
-    if found > FOLLOWED:
-        sd |= {name: max(sd[name], prior.get(name, 0.0)) for name in sd}
-    covariance = inverse * np.outer(unit[open_], unit[open_])
-    return Refit(best, sd, found, tuple(names[i] for i in open_), covariance)
+    best = plant_with(plant, names, full(at.x))
+
+    def spread() -> Array:
+        # Where what is left is no noise, a window counts as one sample.
+        factor = SECONDS / logs[0].log.h if found > FOLLOWED else 1.0
+        return factor * at.covariance() * np.outer(unit[open_], unit[open_])
+
+    return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
 
 
 def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
@@ -271,8 +283,27 @@ def plant_is_motor(plant: Plant) -> bool:
     return isinstance(plant.actuator, Motor)
 
 
-def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[Array, Array, float]:
-    """Minimum of the square sum of `fun` near x, its Jacobian there and the square sum.
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Minimum of the square sum of `fun` at x (k,), and its mean square over the rows of `fun`."""
+
+    fun: Callable[[Array], Array]
+    x: Array
+    mean: float
+
+    @property
+    def followed(self) -> bool:
+        """Whether hardly more than noise is left."""
+        return self.mean < FOLLOWED
+
+    def covariance(self) -> Array:
+        """Of x, (k, k), for residuals that are noise of this mean square."""
+        J = jacobian(self.fun, self.x)
+        return np.asarray(np.linalg.pinv(J.T @ J) * self.mean, dtype=np.float64)
+
+
+def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> Minimum:
+    """Minimum of the square sum of `fun` near x.
 
     Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
     """
@@ -290,11 +321,12 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> tuple[A
                 break
             damping *= 10.0
         else:
-            return x, J, cost
-        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
-        if gained < ENOUGH * cost:
             break
-    return x, jacobian(fun, x), cost
+        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
+        # What is left of much more than noise need not be known to its last digits.
+        if gained < (ENOUGH if cost < FOLLOWED * len(r) else LITTLE) * cost:
+            break
+    return Minimum(fun, x, cost / len(r))
 
 
 def jacobian(fun: Callable[[Array], Array], x: Array, r: Array | None = None) -> Array:

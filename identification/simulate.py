@@ -6,8 +6,15 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
-from identification.effect_run import effect_run_kernel
-from identification.effect_step import LONGEST_BRISTLE, effect_table, pieces, signal_table
+from identification.effect_run import effect_run_kernel, effective_commands, shown_run
+from identification.effect_step import (
+    LONGEST_BRISTLE,
+    effect_table,
+    fewer,
+    outside,
+    pieces,
+    signal_table,
+)
 from identification.errors import BadModel
 from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
@@ -146,29 +153,29 @@ def free_run(
     at_f = np.concatenate([[start[2]], at_f[1:]])
     out = np.zeros((4, len(log)))
     modes = np.zeros(len(log), dtype=np.int64)
-    common = (
-        log["u"] if "u" in log else np.zeros(len(log)),
-        force,
-        np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False),
-        log["y"],
-        at,
-        np.concatenate([[start[0]], at_y[keep]]),
-        np.concatenate([[start[1]], at_v[keep]]),
-        at_f,
-        out,
-        modes,
-    )
+    u = log["u"] if "u" in log else np.zeros(len(log))
+    slope = np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False)
+    at_y, at_v = np.append(start[0], at_y[keep]), np.append(start[1], at_v[keep])
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
-    if plant.effects:
-        table = effect_table(plant.effects)
-        by_command = isinstance(plant.actuator, Motor) and drive == "command"
-        effect_run_kernel(
-            p, log.h, pieces(table, log.h, bristle_step), table.codes, table.addresses, table.p,
-            signal_table(plant.effects, log), held, k_a if by_command else 0.0, log["t"], *common,
-        )  # fmt: skip
-    else:
-        run_kernel(p, log.h, held, *common)
+    if not plant.effects:
+        run_kernel(p, log.h, held, u, force, slope, log["y"], at, at_y, at_v, at_f, out, modes)
         out[3] = out[0]
+    else:
+        table, signals = effect_table(plant.effects), signal_table(plant.effects, log)
+        own = (table.codes, table.addresses, table.p, signals)
+        if outside(table.codes):  # the body moves as that of the plain plant, stepped exactly
+            acting = effective_commands(*own, np.zeros(len(table.codes)), log["t"], u, log.h)
+            force = k_a * acting if k_a != 0.0 else force
+            more = (slope, log["y"], at, at_y, at_v, at_f, out, modes)
+            run_kernel(p, log.h, held, acting, force, *more)
+            shown_run(p, log.h, *own, log["t"], u, at, out)
+        else:
+            count = pieces(table, log.h, bristle_step)
+            few = fewer(table, count, bristle_step)
+            effect_run_kernel(
+                p, log.h, few, count, *own, held, k_a, log["t"], u, force, slope, log["y"], at,
+                at_y, at_v, at_f, out, modes,
+            )  # fmt: skip
     if not np.all(np.isfinite(out[0])):
         lost = float(log["t"][int(np.argmin(np.isfinite(out[0])))])
         raise BadModel(

@@ -23,7 +23,7 @@ from identification.simulate import FreeRun, free_run
 SECONDS = 2.0  # of a window
 REACH = 0.45  # of a window, within which a rest is looked for
 LATER = 2.0  # windows by which a start is put off until there is a rest
-COARSE = 2e-4  # s, sub-step of a bristle: enough for a search
+COARSE = 5e-4  # s, sub-step of a bristle: errs by a tenth of the noise, enough for a search
 LEAST_REST = 24  # samples
 SURE = 3.0  # deviations of the velocity from which a body creeps
 WIDEST = 50  # samples on either side by which a creep is seen
@@ -31,6 +31,7 @@ AROUND = 8  # samples of a rest whose mean is the position
 WHOLE = np.inf  # seconds of a window that is the whole log
 WALKS = 6  # runs by which the walk of a measured force's noise is seen
 RETURNS = 2  # runs until the body's place behind a transducer has settled
+SETTLED = 1e-3  # of the position's noise, by which that place may still change
 STEP = 0.3  # of a state's deviation, by which the change with it is taken
 
 
@@ -99,9 +100,12 @@ def window_run(
     # A play is as wide open as the motion before has left it.
     at = begun.at - (1 if any(one.evolve is not None for one in sensors) else 0)
     try:
-        run = run_from(y)
+        run, shift = run_from(y), np.zeros(len(y))
         for _ in range(RETURNS if sensors else 0):  # what was measured is what is shown
-            run = run_from(y - (run.shown - run.y)[np.maximum(at, 0)])
+            before, shift = shift, (run.shown - run.y)[np.maximum(at, 0)]
+            if np.all(np.abs(shift - before) <= SETTLED * one.noise_y):
+                break
+            run = run_from(y - shift)
         return run
     except BadModel:
         return None

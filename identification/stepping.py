@@ -29,6 +29,7 @@ Row = tuple[
 ]
 ORDER = 11  # degree of the power series; with RATE_STEP the remainder is below 1e-14
 RATE_STEP = 0.35  # longest stretch of one series, in units of the fastest rate
+BRIEF = 0.1  # the same, of a shorter series
 # Within a quarter of an oscillation acceleration rises while it is negative, and the force in the
 # band does not fall below its limit and come back; in longer samples every step is followed.
 QUARTER = 1.5
@@ -343,6 +344,34 @@ def resolve(
             v, mode = _after_exit(mode, p, force, found)
     # More switches than any machine makes: no answer is better than one with time missing.
     return (y if left <= 0.0 else np.nan), v, force, mode
+
+
+@compiled_inline
+def glided(
+    p: Parameters, v: float, force: float, mode: int, g: float, h: float
+) -> tuple[float, float, bool]:
+    """Distance and velocity after a short `h` [s] of sliding, and whether that is what happens.
+
+    A shorter series than `resolve` takes, where it errs by less than 1e-10 and v stays beyond the
+    band: v + h v'(0) bounds a dip in between (see QUARTER).
+    """
+    side, coulomb, viscous, edge = 1.0, p[F_CP], p[F_VP], p[DV_P]
+    if mode == SLIP_N:
+        side, coulomb, viscous, edge = -1.0, p[F_CN], p[F_VN], -p[DV_N]
+    w = 1.0 / p[M]
+    alpha, beta, speed = viscous * w, p[K2] * w, side * v
+    c1 = w * (side * force - coulomb) - alpha * speed
+    c2 = 0.5 * (w * side * g - beta * speed - alpha * c1)
+    c3 = _term(3, alpha, beta, c1, c2)
+    c4 = _term(4, alpha, beta, c2, c3)
+    c5 = _term(5, alpha, beta, c3, c4)
+    c6 = _term(6, alpha, beta, c4, c5)
+    after = speed + h * (c1 + h * (c2 + h * (c3 + h * (c4 + h * (c5 + h * c6)))))
+    moved = h * (c1 / 2 + h * (c2 / 3 + h * (c3 / 4 + h * (c4 / 5 + h * (c5 / 6 + h * c6 / 7)))))
+    moved = h * (speed + moved)
+    brief = alpha * h < BRIEF and abs(beta) * h * h < BRIEF * BRIEF
+    on = min(speed, speed + c1 * h, after) > edge and mode in (SLIP_P, SLIP_N)
+    return side * moved, side * after, brief and on
 
 
 @compiled

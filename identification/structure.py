@@ -12,9 +12,9 @@ from identification.effects._base import Effect
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
 from identification.log import Rig
-from identification.outcome import Outcome
+from identification.outcome import Outcome, spread
 from identification.plant import Actuator, Motor, Plant
-from identification.refit import COMPLETE, refit
+from identification.refit import COMPLETE, RESCUES, refit
 from identification.result import Drive
 from identification.stage import Stage
 
@@ -23,6 +23,7 @@ OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
+MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -82,11 +83,15 @@ def model_of(
     plant = Plant(nine, drives, tuple(acting))
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior, True)
-    done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior)
+    # Where sliding itself is not explained, no other band of a plant with effects will do.
+    missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
+    rescues = 0 if steps and missing else RESCUES
+    done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior, rescues=rescues)
     if near is not None and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
         beside = replace(plant, friction=replace(nine, **same))
-        other = refit(beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior)
+        wide = max(near.dv_p, -near.dv_n)
+        other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 

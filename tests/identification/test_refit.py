@@ -65,6 +65,6 @@ def test_least_squares_of_a_curved_valley() -> None:
     def rosenbrock(x: Array) -> Array:
         return np.array([10.0 * (x[1] - x[0] ** 2), 1.0 - x[0]])
 
-    x, J, cost = gauss_newton(rosenbrock, np.array([-1.2, 1.0]), 100)
-    assert x == pytest.approx([1.0, 1.0], abs=1e-4)
-    assert J.shape == (2, 2) and cost < 1e-8
+    found = gauss_newton(rosenbrock, np.array([-1.2, 1.0]), 100)
+    assert found.x == pytest.approx([1.0, 1.0], abs=1e-4)
+    assert found.covariance().shape == (2, 2) and found.mean < 1e-8

@@ -19,6 +19,7 @@ from identification.stepping import (
     SLIP_P,
     STUCK,
     Parameters,
+    glided,
     kernel_parameters,
     parameters,
     resolve,
@@ -253,3 +254,23 @@ def test_friction_never_drives(nine: Karnopp, k2: float, seed: int) -> None:
     stuck = modes == STUCK
     assert np.all(v[stuck] == 0.0)
     assert np.all((force[stuck] <= nine.F_sp + 1e-9) & (force[stuck] >= nine.F_sn - 1e-9))
+
+
+@pytest.mark.parametrize("mode", [SLIP_P, SLIP_N, BAND_P])
+def test_a_short_glide_is_the_exact_step_or_none(mode: int) -> None:
+    p = parameters(kernel_parameters(table(1).array, 0.0, COUPLING)[None], 0)
+    side = -1.0 if mode == SLIP_N else 1.0
+    taken = 0
+    drawn = np.random.default_rng(0).uniform((0.0, -40.0, -2e4), (0.3, 80.0, 2e4), (500, 3))
+    for v, force, g in drawn:
+        at = side * float(v), side * float(force), mode, side * float(g), 2.5e-4
+        moved, after, on = glided(p, *at)
+        y, exact, _, ends = resolve(p, 0.0, *at)
+        if on:
+            assert moved == pytest.approx(y, abs=1e-13)
+            assert after == pytest.approx(exact, abs=1e-11)
+            assert ends == mode
+        elif mode != BAND_P and v > 0.0:  # a body that slides away from the band glides
+            assert min(abs(after), v) < 0.08
+        taken += on
+    assert (taken == 0) == (mode == BAND_P)
