@@ -11,6 +11,7 @@ from workbench.model import versions
 
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS", "NUMBA", "NUMEXPR")}
 NEEDED = "workbench fleet needs Dask, which is not installed; install 'servo-workbench[fleet]'"
+GATHERED = 10.0  # s that a result may take from its worker to here
 Work = Callable[[Item], Result]
 
 
@@ -50,17 +51,26 @@ class Cluster:
         except Exception as error:  # the futures of a scheduler that is gone are cancelled
             raise _gone(error) from error
 
-    def result(self, future: Any) -> Result | str:
-        """What an ended future has led to; a line where its workers died or it cannot be read."""
+    def result(self, future: Any) -> Result | str | None:
+        """What an ended future has led to; a line where its workers died or it cannot be read.
+
+        None: the worker that held the result has died, and another makes it anew.
+        """
+        from concurrent.futures import CancelledError
+
         from distributed import KilledWorker
 
-        if future.status in ("cancelled", "lost"):
-            raise _gone(RuntimeError(f"a task was {future.status}"))
+        if future.status in ("lost", "pending"):
+            return None
         try:
-            found: Result = future.result()
+            found: Result = future.result(timeout=GATHERED)
+        except CancelledError as error:
+            raise _gone(error) from error
         except KilledWorker as error:
             count = error.allowed_failures + 1
             return f"{count} worker(s) died of it, one after the other; it is not tried again"
+        except TimeoutError:
+            return None
         except Exception as error:  # of the cluster: `work` itself raises none
             return f"the worker gave no result ({type(error).__name__}: {said(error)})"
         return found

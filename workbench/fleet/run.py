@@ -152,8 +152,10 @@ class Run:
                 else:
                     hands[given] = log
             for future in self._cluster.wait(list(hands), LOOK) if hands else ():
-                log = hands.pop(future)
                 found = self._cluster.result(future)
+                if found is None:
+                    continue
+                log = hands.pop(future)
                 future.release()
                 if isinstance(found, str):
                     found = Result(log, "failed", f"{log.name}: {found}")
