@@ -1,16 +1,16 @@
 """A Dask cluster: processes of this computer, or any by its address."""
 
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from workbench.fleet.finding import said
-from workbench.fleet.values import BadCluster, Item, Result
+from workbench.fleet.values import NEEDED, BadCluster, Item, Result
 from workbench.model import versions
 
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS", "NUMBA", "NUMEXPR")}
-NEEDED = "workbench fleet needs Dask, which is not installed; install 'servo-workbench[fleet]'"
 GATHERED = 10.0  # s that a result may take from its worker to here
 Work = Callable[[Item], Result]
 
@@ -19,13 +19,11 @@ Work = Callable[[Item], Result]
 class Cluster:
     """Workers behind a Dask client.
 
-    spare: logs handed over beyond one a thread; attempts: workers that a log may cost, None where
-    the cluster's own settings say it.
+    spare: logs handed over beyond one a thread, so that none waits for the next, a thread.
     """
 
     client: Any
-    spare: int
-    attempts: int | None = None
+    spare: float
 
     def threads(self) -> int:
         """Threads of all workers that are there now."""
@@ -33,6 +31,11 @@ class Cluster:
             return sum(self.client.nthreads().values())
         except (OSError, TimeoutError, ValueError) as error:
             raise _gone(error) from error
+
+    def limit(self) -> int:
+        """Logs that may be in the cluster's hands at a time; 0 while it has no worker."""
+        threads = self.threads()
+        return threads + math.ceil(self.spare * threads)
 
     def submit(self, work: Work, item: Item) -> Any:
         """A future of the log's result."""
@@ -100,13 +103,13 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
                 n_workers=workers,
                 threads_per_worker=1,
                 processes=True,
-                dashboard_address=None,
+                dashboard_address="127.0.0.1:0",  # a free port: many may run here
                 silence_logs=logging.CRITICAL,
             )
         except (OSError, RuntimeError, TimeoutError) as error:
             raise BadCluster(f"local workers do not start ({said(error)})") from error
         with made, Client(made, set_as_default=False) as client:
-            yield Cluster(client, workers, attempts)
+            yield Cluster(client, 1.0)
 
 
 @contextmanager
@@ -135,7 +138,7 @@ def cluster_at(address: str, timeout: float) -> Iterator[Cluster]:
                 f" worker {address}'"
             ) from None
         _check_workers(client, address)
-        yield Cluster(client, 0)
+        yield Cluster(client, 0.1)
 
 
 def _check_workers(client: Any, address: str) -> None:

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from workbench.fleet.values import BadLogs, LogFile
+from workbench.fleet.values import NEEDED, BadLogs, LogFile
 
 SUFFIX = ".parquet"
 CARD = "card.toml"
@@ -44,8 +44,10 @@ def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
 
 def file_system(url: str) -> tuple[Any, str]:
     """fsspec's file system of the URL and the path in it; raises BadLogs."""
-    from fsspec.core import url_to_fs
-
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise BadLogs(NEEDED) from None
     try:
         system, root = url_to_fs(url)
     except Exception as error:  # a protocol without its package, an archive that is none

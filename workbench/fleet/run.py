@@ -136,12 +136,11 @@ class Run:
         ready = deque(machines)
         hands: dict[Any, LogFile] = {}
         seen = self._clock()
-        limit = 0
         while ready or hands:
             now = self._clock()
-            threads = self._cluster.threads()
-            if threads:
-                seen, limit = now, threads + self._cluster.spare
+            limit = self._cluster.limit()
+            if limit:
+                seen = now
             self._refuse_empty(now - seen)
             while ready and len(hands) < limit:
                 log = machines[ready.popleft()].popleft()

@@ -62,6 +62,7 @@ class ResultStore:
         self._parts = folder / RESULTS
         self._rows: list[dict[str, Any]] = []
         self._oldest: datetime | None = None
+        self._noted: dict[tuple[str, int, int], str] = {}  # lines of results that are no rows yet
         self.done: set[tuple[str, int, int]] = set()
 
     def __enter__(self) -> Self:
@@ -108,18 +109,22 @@ class ResultStore:
             except ValidationError:
                 continue  # the line that was being written as the run was killed
             if result.log.key not in self.done:
+                self._noted[result.log.key] = line
                 found.append(result)
         return tuple(found)
 
     def note(self, result: Result) -> None:
         """Keep the result against a kill; it lasts once this returns."""
-        self._journal.write(json.dumps(strict(asdict(result)), allow_nan=False) + "\n")
+        line = json.dumps(strict(asdict(result)), allow_nan=False) + "\n"
+        self._noted[result.log.key] = line
+        self._journal.write(line)
         self._journal.flush()
         os.fsync(self._journal.fileno())
 
     def add(self, result: Result, *, now: datetime) -> None:
         """The result as a row of the next part."""
         self._rows.append(row_of(result, now))
+        self._noted.pop(result.log.key, None)
         self.done.add(result.log.key)
         self._oldest = self._oldest or now
 
@@ -129,13 +134,16 @@ class ResultStore:
             self.flush()
 
     def flush(self) -> None:
-        """Write the rows that wait as a part, and begin the journal anew."""
+        """Write the rows that wait as a part; the journal keeps what is no row yet."""
         if self._rows:
             last = max((int(p.stem[5:]) for p in self._parts.glob("part-*.parquet")), default=0)
             _write_whole(self._parts / f"part-{last + 1:06d}.parquet", self._rows)
             self._rows, self._oldest = [], None
-        self._journal.seek(0)
-        self._journal.truncate()
+        self._journal.close()
+        fresh = self.folder / f"{JOURNAL}.tmp"
+        _write(fresh, "".join(self._noted.values()).encode())
+        fresh.replace(self.folder / JOURNAL)
+        self._journal = (self.folder / JOURNAL).open("a+", encoding="utf-8")
 
 
 def row_of(result: Result, now: datetime) -> dict[str, Any]:
@@ -180,13 +188,20 @@ def _keys(path: Path) -> list[tuple[str, int, int]]:
 def _write_whole(path: Path, rows: list[dict[str, Any]]) -> None:
     """The part under its name once all of it is on the disk."""
     part = path.with_name(f".{path.name}.tmp")
-    with part.open("wb") as file:
-        pq.write_table(pa.Table.from_pylist(rows, SCHEMA), file)
-        file.flush()
-        os.fsync(file.fileno())
+    buffer = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_pylist(rows, SCHEMA), buffer)
+    _write(part, buffer.getvalue())
     part.replace(path)
     folder = os.open(path.parent, os.O_RDONLY)
     try:
         os.fsync(folder)
     finally:
         os.close(folder)
+
+
+def _write(path: Path, content: Any) -> None:
+    """The bytes in the file, on the disk once this returns."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())

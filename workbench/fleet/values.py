@@ -32,6 +32,9 @@ JUDGED: Mapping[Verdict, Judged] = MappingProxyType(
 GOOD: tuple[Verdict, ...] = ("identified", "none")
 
 
+NEEDED = "workbench fleet needs Dask, which is not installed; install 'servo-workbench[fleet]'"
+
+
 class BadLogs(UserError):
     """A place that holds no logs, or cannot be read."""
 

@@ -23,8 +23,9 @@ from workbench.fleet.cluster import Cluster, Work, local_cluster
 from workbench.fleet.recording import LEASE, InRegistry, NoRegistry, Recorder
 from workbench.fleet.run import Report, Run, Settings
 from workbench.fleet.store import RESULTS, ResultStore
-from workbench.fleet.values import BadLogs, LogFile
+from workbench.fleet.values import BadLogs, LogFile, Result
 from workbench.jobs.lease import Patience
+from workbench.registry.errors import RegistryAway
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 
@@ -153,7 +154,32 @@ def test_a_machine_in_anothers_hands_is_left(
     assert set(verdicts(tmp_path)) == {"m0", "m2"}
     queue.release(claim)
     again = run(cluster, tmp_path, recorder=recorder, logs=LOGS[:3])
-    assert (again.before, again.verdicts) == (2, {"identified": 1})
+    assert (again.before, again.later) == (3, 0)  # its result was noted, and is recorded now
+    assert registry.in_force("m1") is not None
+    assert len(verdicts(tmp_path)) == 3
+
+
+class Away(NoRegistry):
+    """A recorder whose database goes away after some results."""
+
+    def __init__(self, results: int) -> None:
+        self.left = results
+
+    def record(self, result: Result) -> bool:
+        self.left -= 1
+        if self.left < 0:
+            raise RegistryAway("away")
+        return True
+
+
+def test_a_database_that_goes_away_loses_nothing(cluster: Cluster, tmp_path: Path) -> None:
+    with pytest.raises(RegistryAway):
+        run(cluster, tmp_path, recorder=Away(2))
+    assert len(verdicts(tmp_path)) == 2
+    again = run(cluster, tmp_path)
+    # The third result was noted as the database went away, so it is not made again.
+    assert (again.before, again.verdicts) == (3, {"identified": 3})
+    assert len(verdicts(tmp_path)) == 6
 
 
 def test_a_result_against_a_version_that_is_gone_is_left(registry: Registry) -> None:
