@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pyarrow.parquet as pq
 import pytest
+from distributed import LocalCluster
 
 from tests.workbench.fleet.values import (
     DEADLY,
@@ -16,14 +17,15 @@ from tests.workbench.fleet.values import (
     die_once,
     fault,
     log_of,
+    other_versions,
     result_of,
     slow,
 )
-from workbench.fleet.cluster import Cluster, Work, local_cluster
+from workbench.fleet.cluster import Cluster, Work, cluster_at, local_cluster
 from workbench.fleet.recording import LEASE, InRegistry, NoRegistry, Recorder
 from workbench.fleet.run import Report, Run, Settings
 from workbench.fleet.store import RESULTS, ResultStore
-from workbench.fleet.values import BadLogs, LogFile, Result
+from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
 from workbench.jobs.lease import Patience
 from workbench.registry.errors import RegistryAway
 from workbench.registry.queue import Queue
@@ -194,3 +196,33 @@ def test_logs_without_any_card_are_refused(cluster: Cluster, tmp_path: Path) -> 
         found = Run(cluster, store, NoRegistry(), Settings(str(tmp_path)), clock, work=answer)
         with pytest.raises(BadLogs, match=r"no card.toml .* --card"):
             found(LOGS)
+
+
+def test_a_cluster_by_its_address(cluster: Cluster, tmp_path: Path) -> None:
+    address = cluster.client.scheduler.address
+    with cluster_at(address, 10.0) as found:
+        assert found.threads() == 2
+        assert run(found, tmp_path).verdicts == {"identified": 6}
+
+
+def test_a_cluster_of_another_version_is_refused(
+    cluster: Cluster, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    address = cluster.client.scheduler.address
+    monkeypatch.setattr("workbench.fleet.cluster.versions", other_versions)
+    with (
+        pytest.raises(BadCluster, match=r"servo-workbench 9.9.* here; install the same"),
+        cluster_at(address, 10.0),
+    ):
+        pass
+
+
+def test_a_scheduler_without_workers_is_refused() -> None:
+    with (
+        LocalCluster(
+            n_workers=0, processes=False, dashboard_address="127.0.0.1:0", protocol="tcp://"
+        ) as empty,
+        pytest.raises(BadCluster, match=r"has no workers after 0\.5 s"),
+        cluster_at(empty.scheduler_address, 0.5),
+    ):
+        pass

@@ -78,3 +78,8 @@ def fault(item: Item) -> Result:
 def card_text(duration: float = 8.0) -> str:
     """The card of the simulated machines."""
     return CARD.replace("duration_s = 6.0", f"duration_s = {duration}")
+
+
+def other_versions() -> dict[str, str]:
+    """Versions that are another in every process."""
+    return {"servo-workbench": f"9.9+{os.getpid()}"}
