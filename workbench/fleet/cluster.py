@@ -81,7 +81,7 @@ class Cluster:
 
 @contextmanager
 def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
-    """Processes of this computer, one thread each; a log may cost `attempts` of them.
+    """Processes of this computer, a core each; a log may cost `attempts` of them.
 
     Raises BadCluster where Dask is not installed or they do not start.
     """
@@ -98,6 +98,8 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
 
         from distributed import Client, LocalCluster
 
+        from workbench.fleet.pinning import OneCore, cores
+
         try:
             made = LocalCluster(
                 n_workers=workers,
@@ -109,6 +111,7 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
         except (OSError, RuntimeError, TimeoutError) as error:
             raise BadCluster(f"local workers do not start ({said(error)})") from error
         with made, Client(made, set_as_default=False) as client:
+            client.register_plugin(OneCore(cores()))
             yield Cluster(client, 1.0)
 
 

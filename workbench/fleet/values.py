@@ -86,8 +86,8 @@ class Result:
 
     sha256: of the log's bytes, empty where they were not read. model: model.json of this log.
     made: model, design, validation that the registry gets; rival: those that are refused, and
-    why. seconds: of the worker's processor; memory: the worker's largest resident size so far
-    [bytes].
+    why. seconds: of the processor, all threads of the worker; memory: the worker's largest
+    resident size so far [bytes].
     """
 
     log: LogFile

@@ -27,7 +27,7 @@ def work(item: Item) -> Result:
 
     The log is read here, so that it does not pass through the scheduler.
     """
-    begin = time.thread_time()
+    begin = time.process_time()
     try:
         with local_copy(item.url, item.log) as path, TemporaryDirectory(prefix="card-") as folder:
             card = Path(folder) / "card.toml"
@@ -36,7 +36,7 @@ def work(item: Item) -> Result:
     except BadLogs as error:
         found = Result(item.log, "set_aside", str(error))
     return replace(
-        found, seconds=time.thread_time() - begin, memory=peak_memory(), versions=versions()
+        found, seconds=time.process_time() - begin, memory=peak_memory(), versions=versions()
     )
 
 

@@ -13,6 +13,7 @@ from tests.workbench.fleet.values import (
     DEADLY,
     answer,
     clock,
+    core_of,
     die_of_some,
     die_once,
     fault,
@@ -67,6 +68,14 @@ def verdicts(folder: Path) -> dict[str, str]:
     found = {row["log"]: row["verdict"] for row in rows}
     assert len(found) == len(rows)
     return {name.partition("/")[0]: verdict for name, verdict in found.items()}
+
+
+def test_a_worker_has_one_core(cluster: Cluster) -> None:
+    futures = cluster.client.map(core_of, range(8), pure=False)
+    found = {pid: cores for pid, cores in cluster.client.gather(futures)}
+    assert all(len(cores) == 1 for cores in found.values())
+    if len(os.sched_getaffinity(0)) > 1 and len(found) == 2:
+        assert len({min(cores) for cores in found.values()}) == 2
 
 
 def test_a_run_a_second_run_and_new_logs(cluster: Cluster, tmp_path: Path) -> None:

@@ -4,6 +4,7 @@ import hashlib
 import os
 import signal
 import time
+from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -83,3 +84,10 @@ def card_text(duration: float = 8.0) -> str:
 def other_versions() -> dict[str, str]:
     """Versions that are another in every process."""
     return {"servo-workbench": f"9.9+{os.getpid()}"}
+
+
+def core_of(_number: int) -> tuple[int, set[int]]:
+    """The process, and the cores that a thread started by its task may use."""
+    time.sleep(0.05)
+    with ThreadPoolExecutor(1) as pool:
+        return os.getpid(), pool.submit(os.sched_getaffinity, 0).result()
