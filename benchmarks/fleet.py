@@ -4,7 +4,8 @@
 
 Each machine has parameters of its own, 25 % around table 1's, and a log of --seconds at 500 Hz in
 Parquet. First the same --pair logs go to one worker and to two, in turn, twice; then all machines
-to two workers (a core each), registry included; then a log forty times as long, for the workers' memory.
+to two workers, registry included; then a log forty times as long, for the workers' memory. A worker
+has one core for all its threads.
 
 The computer may be shared, so each run tells beside the wall time the share of it that the workers
 had a processor; `1 to 2` is the wall time of one worker over that of two, and `shared out` the same
