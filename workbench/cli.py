@@ -26,6 +26,7 @@ COMMANDS = {
     "registry": "Show and change what is in force on each machine.",
     "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",
+    "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
 }
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141

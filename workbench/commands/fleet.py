@@ -1,0 +1,182 @@
+"""`workbench fleet`: the logs of many machines on a Dask cluster."""
+
+import os
+import secrets
+import socket
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from workbench.options import POSITIVE
+from workbench.output import dumps, emit, progress
+
+if TYPE_CHECKING:
+    from rich.console import Group
+
+    from workbench.fleet.recording import Recorder
+    from workbench.fleet.run import Report
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+SHOWN = 20  # results to look at that a terminal shows; --json has the first 1000
+
+
+def fleet_options(command: Command) -> Command:
+    """The options of the command, by the names of its arguments."""
+    options = (
+        click.option("--card", help="Card of all machines: a path, or the name of a shipped one.  "
+                     "[default: the nearest card.toml at or above each log]"),
+        click.option("--cluster", "address", metavar="ADDRESS", help="Scheduler of a Dask cluster, "
+                     "as tcp://host:8786.  [default: processes of this computer]"),
+        click.option("--workers", type=click.IntRange(min=1), metavar="N",
+                     help="Processes of this computer.  [default: one a core]"),
+        click.option("--attempts", type=click.IntRange(min=1), default=3, show_default=True,
+                     help="Workers that may die of a log before it has failed; a cluster at an "
+                     "ADDRESS has a setting of its own."),
+        click.option("--timeout", type=POSITIVE, default=30.0, show_default=True, metavar="S",
+                     help="Wait this long for a cluster's answer."),
+        click.option("--registry", "where", metavar="FILE|URL", help="SQLite file or "
+                     "postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]"),
+        click.option("--no-registry", is_flag=True, help="Write Parquet only."),
+        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
+        click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
+                     default=Path("fleet"), show_default=True,
+                     help="Folder of the results; the same again goes on there."),
+        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
+    )  # fmt: skip
+    for option in reversed(options):
+        command = option(command)
+    return command
+
+
+@click.command(epilog="Example: workbench fleet logs --card card.toml --out fleet --workers 2")
+@click.argument("logs", metavar="LOGS")
+@fleet_options
+def command(
+    logs: str,
+    card: str | None,
+    address: str | None,
+    workers: int | None,
+    attempts: int,
+    timeout: float,
+    where: str | None,
+    no_registry: bool,
+    seed: int,
+    out: Path,
+    as_json: bool,
+) -> int:
+    """Identify the logs of many machines, or judge them by the models in force.
+
+    LOGS is a folder, a file, a pattern or any fsspec URL of Parquet logs, <machine>/*.parquet or
+    <machine>.parquet. A machine without a model in force gets its first (without a design) where it
+    leaves only noise; else the log is judged as by 'workbench reidentify'. Results go into the
+    registry and DIR/results/*.parquet while the run goes on. A run that was killed goes on where it
+    was; logs that are done are skipped. Exit status 1: some logs were refused, failed or give
+    an alarm.
+    """
+    from workbench.fleet.finding import find_logs
+    from workbench.fleet.run import Run, Settings
+    from workbench.fleet.store import ResultStore
+
+    if address is not None and workers is not None:
+        raise click.UsageError(
+            "--workers is for processes of this computer; leave one of both out."
+        )
+    text = None if card is None else _card_text(card)
+    found = find_logs(logs, leave_out=out)
+    with ExitStack() as held:
+        store = held.enter_context(ResultStore(out))
+        recorder = held.enter_context(_recorder(None if no_registry else (where or "")))
+        cluster = held.enter_context(_cluster(address, workers, attempts, timeout))
+        advance = held.enter_context(progress("fleet", float(len(found)), as_json=as_json))
+        settings = Settings(logs, text, seed)
+        done = Run(cluster, store, recorder, settings, clock, advance=advance)(found)
+    result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
+    (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
+    emit(result, as_json, lambda: fleet_view(done, out))
+    return 1 if done.bad or done.later else 0
+
+
+def clock() -> datetime:
+    """The time now, in UTC."""
+    return datetime.now(UTC)
+
+
+def fleet_view(done: "Report", out: Path) -> "Group":
+    """What a run did, for a terminal."""
+    from rich.console import Group
+    from rich.table import Table
+
+    from workbench.fleet.run import per_core
+
+    counted = ", ".join(f"{count} {name}" for name, count in sorted(done.verdicts.items()))
+    parts: list[Any] = [f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before"]
+    if done.later:
+        parts.append(f"{done.later} log(s) left: their machines are in another worker's hands")
+    if done.bad:
+        table = Table("machine", "verdict", "reason", box=None)
+        for one in done.bad[:SHOWN]:
+            table.add_row(one.log.machine, one.verdict, one.reason)
+        parts.append(table)
+        if len(done.bad) > SHOWN:
+            parts.append(f"and {len(done.bad) - SHOWN} more: --json")
+    each = per_core(done)
+    if each is not None:
+        parts.append(
+            f"{done.seconds:.1f} s, {each:.2f} processor seconds a log,"
+            f" at most {done.memory / 2**20:.0f} MiB a worker"
+        )
+    parts.append(f"results: {out / 'results'}")
+    return Group(*parts)
+
+
+def _bad(one: Any) -> dict[str, Any]:
+    """A result to look at, as JSON has it."""
+    return {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
+            "reason": one.reason}  # fmt: skip
+
+
+def _card_text(name: str) -> str:
+    """The text of a card that is sound; raises BadCard."""
+    from workbench.card import load_card
+    from workbench.fetch import card_path
+
+    path = card_path(name)
+    load_card(path, with_recipe=False)
+    return path.read_text(encoding="utf-8-sig")
+
+
+@contextmanager
+def _recorder(where: str | None) -> "Iterator[Recorder]":
+    """The registry at `where`, "": the default one, None: none."""
+    from workbench.fleet.recording import InRegistry, NoRegistry
+    from workbench.jobs.lease import Patience
+    from workbench.registry.database import location
+    from workbench.registry.store import Registry
+
+    if where is None:
+        yield NoRegistry()
+        return
+    owner = f"fleet:{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    with Patience()(Registry, location(where or None)) as registry:
+        yield InRegistry(registry, owner, clock)
+
+
+def _cluster(address: str | None, workers: int | None, attempts: int, timeout: float) -> Any:
+    from workbench.fleet.cluster import cluster_at, local_cluster
+
+    if address is not None:
+        return cluster_at(address, timeout)
+    return local_cluster(workers or _cores(), attempts)
+
+
+def _cores() -> int:
+    """Cores that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

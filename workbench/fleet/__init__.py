@@ -1,0 +1,1 @@
+"""Fleets: many machines' logs identified on a Dask cluster, into the registry and Parquet."""

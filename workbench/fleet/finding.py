@@ -1,0 +1,144 @@
+"""Where a fleet's logs are: a folder, a file, a pattern or any URL that fsspec reads."""
+
+import tempfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+from workbench.fleet.values import NEEDED, BadLogs, LogFile
+
+SUFFIX = ".parquet"
+CARD = "card.toml"
+TIMES = ("mtime", "LastModified", "last_modified", "modified", "updated", "created", "date_time")
+
+
+def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
+    """The Parquet logs at the URL, by machine and name.
+
+    A log's machine is the first folder below the URL ("machine=a" is "a"), or else the file's
+    name. leave_out: a local folder that holds no logs. Raises BadLogs.
+    """
+    system, root = file_system(url)
+    try:
+        found = _listed(system, root)
+    except Exception as error:  # every file system has errors of its own
+        raise BadLogs(f"{url}: cannot be listed ({said(error)}); check the address") from error
+    base = PurePosixPath(_base(root, found))
+    logs = []
+    for path, info in found.items():
+        name = PurePosixPath(path).relative_to(base) if base.parts else PurePosixPath(path)
+        hidden = any(part.startswith((".", "_")) for part in name.parts)
+        if name.suffix.lower() != SUFFIX or hidden or _inside(system, path, leave_out):
+            continue
+        size, time = int(info.get("size") or 0), _time(info)
+        logs.append(LogFile(_machine(name), str(name), path, size, time))
+    if not logs:
+        raise BadLogs(
+            f"{url}: no logs (*{SUFFIX}) there; give a folder, a file or an fsspec URL with logs as"
+            f" <machine>/*{SUFFIX} or <machine>{SUFFIX}"
+        )
+    return tuple(sorted(logs, key=lambda log: (log.machine, log.mtime_ns, log.name)))
+
+
+def file_system(url: str) -> tuple[Any, str]:
+    """fsspec's file system of the URL and the path in it; raises BadLogs."""
+    try:
+        from fsspec.core import url_to_fs
+    except ImportError:
+        raise BadLogs(NEEDED) from None
+    try:
+        system, root = url_to_fs(url)
+    except Exception as error:  # a protocol without its package, an archive that is none
+        raise BadLogs(f"{url}: cannot be opened ({said(error)}); check the address") from error
+    return system, str(root)
+
+
+def card_text(url: str, log: LogFile) -> str | None:
+    """The nearest card.toml at or above the log, down from the URL's folder; None without one."""
+    system, _ = file_system(url)
+    folder, depth = PurePosixPath(log.path).parent, len(PurePosixPath(log.name).parts)
+    for _ in range(depth):
+        path = str(folder / CARD) if folder.parts else CARD
+        try:
+            if system.isfile(path):
+                return str(system.cat_file(path).decode("utf-8-sig"))
+        except Exception as error:
+            raise BadLogs(f"{path}: cannot be read ({said(error)})") from error
+        folder = folder.parent
+    return None
+
+
+@contextmanager
+def local_copy(url: str, log: LogFile) -> Iterator[Path]:
+    """The log as a file here: where it lies, or else a copy that is gone after the block.
+
+    Raises BadLogs where it cannot be read.
+    """
+    system, _ = file_system(url)
+    if _is_local(system):
+        yield Path(log.path)
+        return
+    with tempfile.TemporaryDirectory(prefix="workbench-") as folder:
+        target = Path(folder) / PurePosixPath(log.name).name
+        try:
+            system.get_file(log.path, str(target))
+        except Exception as error:
+            raise BadLogs(f"{log.name}: cannot be fetched ({said(error)})") from error
+        yield target
+
+
+def said(error: BaseException) -> str:
+    """What an error says, in one line of bounded length."""
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 200 else f"{text[:200]}..."
+
+
+def _listed(system: Any, root: str) -> Mapping[str, Mapping[str, Any]]:
+    if "*" in root or "?" in root:
+        found: Mapping[str, Mapping[str, Any]] = system.glob(root, detail=True)
+        return {path: info for path, info in found.items() if info.get("type") != "directory"}
+    listed: Mapping[str, Mapping[str, Any]] = system.find(root, detail=True)
+    return listed
+
+
+def _base(root: str, found: Mapping[str, Any]) -> str:
+    """The folder below which names are taken."""
+    parts = PurePosixPath(root).parts
+    for number, part in enumerate(parts):
+        if "*" in part or "?" in part:
+            return str(PurePosixPath(*parts[:number])) if number else ""
+    if root in found:
+        parent = PurePosixPath(root).parent
+        return str(parent) if parent.parts else ""
+    return root
+
+
+def _machine(name: PurePosixPath) -> str:
+    return name.parts[0].removeprefix("machine=") if len(name.parts) > 1 else name.stem
+
+
+def _is_local(system: Any) -> bool:
+    protocol = system.protocol
+    names = (protocol,) if isinstance(protocol, str) else tuple(protocol)
+    return "file" in names
+
+
+def _inside(system: Any, path: str, folder: Path | None) -> bool:
+    if folder is None or not _is_local(system):
+        return False
+    return Path(path).is_relative_to(folder.absolute())
+
+
+def _time(info: Mapping[str, Any]) -> int:
+    """Modification time [ns]; 0 where the file system does not tell it."""
+    for key in TIMES:
+        found = info.get(key)
+        if isinstance(found, int | float):
+            return round(found * 1e9)
+        if isinstance(found, tuple) and len(found) == 6:  # of zip archives
+            return round(datetime(*found, tzinfo=UTC).timestamp() * 1e9)
+        if isinstance(found, datetime):
+            return round(found.timestamp() * 1e9)
+    return 0

@@ -1,0 +1,207 @@
+"""Results as Parquet parts, each written whole, and a journal of those that are in no part yet.
+
+DIR/results/part-<number>.parquet are read as one table while the run goes on. A result is first a
+line of DIR/.journal.jsonl; where a run is killed, the next one takes it from there.
+"""
+
+import fcntl
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from datetime import datetime, timedelta
+from pathlib import Path
+from types import TracebackType
+from typing import IO, Any, Self
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+from pydantic import TypeAdapter, ValidationError
+
+from identification.karnopp import NAMES
+from workbench.fleet.values import Result
+from workbench.output import BadOutput, strict
+
+RESULTS, JOURNAL, LOCK = "results", ".journal.jsonl", ".lock"
+ROWS = 500  # of a part
+AGE = timedelta(seconds=10)  # a result that waits for its part for longer makes one
+PARAMETERS = (*NAMES, "k1", "k2", "k_a")
+FIT = ("chi_square", "adequate", "force_rms")
+SCHEMA = pa.schema(
+    [
+        ("machine", pa.string()),
+        ("log", pa.string()),
+        ("sha256", pa.string()),
+        ("size", pa.int64()),
+        ("mtime_ns", pa.int64()),
+        ("verdict", pa.string()),
+        ("reason", pa.string()),
+        ("against_version", pa.int64()),
+        *((name + end, pa.float64()) for name in PARAMETERS for end in ("", "_sd")),
+        ("chi_square", pa.float64()),
+        ("adequate", pa.bool_()),
+        ("force_rms", pa.float64()),
+        ("duration", pa.float64()),
+        ("seconds", pa.float64()),
+        ("worker_memory", pa.int64()),
+        ("versions", pa.string()),
+        ("model", pa.string()),
+        ("at", pa.timestamp("us", tz="UTC")),
+    ]
+)
+
+
+class ResultStore:
+    """The results of a fleet in one folder, for one process at a time.
+
+    Raises BadOutput where the folder cannot be used, or another process writes there.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self._parts = folder / RESULTS
+        self._rows: list[dict[str, Any]] = []
+        self._oldest: datetime | None = None
+        self._noted: dict[tuple[str, int, int], str] = {}  # lines of results that are no rows yet
+        self.done: set[tuple[str, int, int]] = set()
+
+    def __enter__(self) -> Self:
+        if self.folder.exists() and not self.folder.is_dir():
+            raise BadOutput(f"--out {self.folder} is a file; name a folder, new or existing")
+        self._parts.mkdir(parents=True, exist_ok=True)
+        self._lock: IO[str] = (self.folder / LOCK).open("w")
+        try:
+            fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._lock.close()
+            raise BadOutput(
+                f"--out {self.folder}: another run writes there; wait for it, or name another"
+            ) from None
+        try:
+            for path in self._parts.glob(".*.tmp"):
+                path.unlink()
+            self.done = {
+                key for path in sorted(self._parts.glob("*.parquet")) for key in _keys(path)
+            }
+            self._journal: IO[str] = (self.folder / JOURNAL).open("a+", encoding="utf-8")
+        except BaseException:
+            self._lock.close()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._journal.close()
+        self._lock.close()
+
+    def journalled(self) -> tuple[Result, ...]:
+        """Results that an earlier run has noted and not brought into a part."""
+        self._journal.seek(0)
+        adapter = TypeAdapter(Result)
+        found = []
+        for line in self._journal:
+            try:
+                result = adapter.validate_json(line)
+            except ValidationError:
+                continue  # the line that was being written as the run was killed
+            if result.log.key not in self.done:
+                self._noted[result.log.key] = line
+                found.append(result)
+        return tuple(found)
+
+    def note(self, result: Result) -> None:
+        """Keep the result against a kill; it lasts once this returns."""
+        line = json.dumps(strict(asdict(result)), allow_nan=False) + "\n"
+        self._noted[result.log.key] = line
+        self._journal.write(line)
+        self._journal.flush()
+        os.fsync(self._journal.fileno())
+
+    def add(self, result: Result, *, now: datetime) -> None:
+        """The result as a row of the next part."""
+        self._rows.append(row_of(result, now))
+        self._noted.pop(result.log.key, None)
+        self.done.add(result.log.key)
+        self._oldest = self._oldest or now
+
+    def tick(self, *, now: datetime) -> None:
+        """Write a part where enough rows wait, or one of them for long."""
+        if self._oldest and (len(self._rows) >= ROWS or now - self._oldest >= AGE):
+            self.flush()
+
+    def flush(self) -> None:
+        """Write the rows that wait as a part; the journal keeps what is no row yet."""
+        if self._rows:
+            last = max((int(p.stem[5:]) for p in self._parts.glob("part-*.parquet")), default=0)
+            _write_whole(self._parts / f"part-{last + 1:06d}.parquet", self._rows)
+            self._rows, self._oldest = [], None
+        self._journal.close()
+        fresh = self.folder / f"{JOURNAL}.tmp"
+        _write(fresh, "".join(self._noted.values()).encode())
+        fresh.replace(self.folder / JOURNAL)
+        self._journal = (self.folder / JOURNAL).open("a+", encoding="utf-8")
+
+
+def row_of(result: Result, now: datetime) -> dict[str, Any]:
+    """The row of a result, by the columns of `SCHEMA`."""
+    log, model = result.log, result.model or {}
+    runs = model.get("log") or ()
+    numbers = {**model.get("friction", {}), **(model.get("actuator") or {})}
+    row: dict[str, Any] = {
+        "machine": log.machine,
+        "log": log.name,
+        "sha256": result.sha256,
+        "size": log.size,
+        "mtime_ns": log.mtime_ns,
+        "verdict": result.verdict,
+        "reason": result.reason,
+        "against_version": result.against,
+        "duration": sum(run["duration"] for run in runs) if runs else None,
+        "seconds": result.seconds,
+        "worker_memory": result.memory,
+        "versions": json.dumps(dict(result.versions)),
+        "model": json.dumps(strict(model), allow_nan=False) if model else None,
+        "at": now,
+    }
+    row |= {key: (model.get("fit") or {}).get(key) for key in FIT}
+    for name in PARAMETERS:
+        found: Mapping[str, Any] = numbers.get(name) or {}
+        row[name], row[f"{name}_sd"] = found.get("value"), found.get("sd")
+    return row
+
+
+def _keys(path: Path) -> list[tuple[str, int, int]]:
+    """What tells the logs of a part."""
+    try:
+        table = pq.read_table(path, columns=["log", "size", "mtime_ns"])
+    except (pa.ArrowException, OSError, KeyError) as error:
+        text = " ".join(str(error).split())[:120]
+        raise BadOutput(f"{path}: is no part of a fleet's results ({text}); move it away") from None
+    columns = (table.column(name).to_pylist() for name in ("log", "size", "mtime_ns"))
+    return list(zip(*columns, strict=True))
+
+
+def _write_whole(path: Path, rows: list[dict[str, Any]]) -> None:
+    """The part under its name once all of it is on the disk."""
+    part = path.with_name(f".{path.name}.tmp")
+    buffer = pa.BufferOutputStream()
+    pq.write_table(pa.Table.from_pylist(rows, SCHEMA), buffer)
+    _write(part, buffer.getvalue())
+    part.replace(path)
+    folder = os.open(path.parent, os.O_RDONLY)
+    try:
+        os.fsync(folder)
+    finally:
+        os.close(folder)
+
+
+def _write(path: Path, content: Any) -> None:
+    """The bytes in the file, on the disk once this returns."""
+    with path.open("wb") as file:
+        file.write(content)
+        file.flush()
+        os.fsync(file.fileno())
