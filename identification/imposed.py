@@ -6,7 +6,7 @@ those that only a free body shows (mass in slow motion, stick limits, band) are 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -195,7 +195,8 @@ def _estimates(
     out: dict[str, Estimate] = {}
     for key, value in zip(NAMES, nine, strict=True):
         if key in told:
-            out[key] = told[key]
+            one = told[key]  # not told: what is assumed has the sign that a friction has
+            out[key] = one if one.value is not None else replace(one, assumed=float(value))
             continue
         kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
         reason = f"{name}: " + WHY_NOT[kind].format(share=fit.share)

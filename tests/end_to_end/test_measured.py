@@ -57,6 +57,17 @@ def test_imposed_motion_gives_friction_but_no_design(
     assert not (tmp_path / "d").exists()
 
 
+def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) -> None:
+    assert data.is_dir()
+    log, out = "O-ring257_3bar.csv", tmp_path / "id"
+    assert main(["identify", log, "--card", "pneumatic_seals", "--out", str(out)]) == 0
+    friction = read(out / "model.json")["friction"]
+    assert isinstance(friction, dict)
+    assert friction["F_vp"]["value"] is None
+    assert "wrong sign" in friction["F_vp"]["reason"]
+    assert friction["F_vp"]["assumed"] >= 0.0
+
+
 def test_a_servo_without_a_force_is_refused(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
