@@ -49,7 +49,6 @@ CODES = dict(
 OUTSIDE = (COMMAND, DELAY, SENSOR)
 LONGEST = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
-LONGEST_CALM = 5e-4  # s, of these while no switch is near
 LONGEST_BRISTLE = 1e-4  # s
 SHORTEST_WAY = 1e-9  # m, over which a force's slope is still sure
 VALUE, EVOLVE, INITIAL = range(3)
@@ -122,7 +121,7 @@ def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> in
 def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
     """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
     states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
-    longest = LONGEST_CALM if np.any(states) else LONGEST
+    longest = LONGEST_STATE if np.any(states) else LONGEST
     short = min(table.longest(bristle) / longest, 1.0)
     return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))
 

