@@ -193,7 +193,7 @@ def picture(told: list[Told], path: Path) -> None:
 
     looks = {
         "none": ("o", OTHER, "nothing has changed"),
-        "promoted": ("^", MODEL, "drift: new model put in force"),
+        "promoted": ("^", MODEL, "new model put in force"),
         "effect": ("*", "#cc79a7", "missing effect named and added"),
         "refused": ("v", "#56b4e9", "challenger refused"),
         "structure": ("s", "#e69f00", "another structure: no model follows"),
