@@ -7,7 +7,8 @@ import numpy as np
 from identification.arrays import Array, BoolArray, IntArray
 from identification.trace_result import Dependence
 
-BINS = (10, 60)  # levels of a signal, by quantiles; straight lines in between
+BINS = (10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
+FEW = 8  # values of a signal (a switch, a gear) that are told apart each by itself
 LEAST = 0.08  # share of the residual, on blocks left out, from which it depends on a signal
 MOST = 3  # signals named
 ADDED = 0.15  # share of what is left that a second signal must explain
@@ -15,6 +16,9 @@ ADDED = 0.15  # share of what is left that a second signal must explain
 
 def hats(x: Array, levels: int) -> Array:
     """Piecewise linear functions of `x` over its quantiles, (n, k)."""
+    values = np.unique(x)
+    if len(values) <= FEW:
+        return np.asarray(x[:, np.newaxis] == values, dtype=np.float64)
     knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, levels)))
     if len(knots) < 3:
         return np.ones((len(x), 1))

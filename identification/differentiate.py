@@ -20,6 +20,8 @@ MIN_SAMPLES = 64
 ORDER = 4
 DEGREE = 5
 MARGIN = 2.0
+MOST_STEPS = 1e8  # in the range of a position that is counted
+WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
 SETTLED = 8.0
 
@@ -72,9 +74,25 @@ def spectrum(y: Array, h: float) -> Spectrum:
     degrees = 2.0 * max(1.0, 1.6 * (n / size))
     low = 1.0 - 2.0 / (9.0 * degrees)
     floor = float(np.median(ratio[f > 0.25])) / low**3
+    # At rest a counted position shows no noise at all, and yet is off by a part of its step.
+    floor = max(floor, 2.0 * resolution(y) ** 2 / 12.0)
     above = np.flatnonzero(_smooth(ratio) > 2.0 * floor)
     cut = float(f[above[-1]]) if len(above) else float(f[0])
     return Spectrum(float(np.sqrt(floor / 2.0)), min(MARGIN * cut, 0.4) / h)
+
+
+def resolution(x: Array) -> float:
+    """Step of a signal that takes whole multiples of one only (an encoder's), else 0."""
+    levels = np.unique(np.asarray(x, dtype=np.float64))
+    if len(levels) < 2:
+        return 0.0
+    span = float(levels[-1] - levels[0])
+    count = span / float(np.min(np.diff(levels)))
+    if count > MOST_STEPS:
+        return 0.0
+    step = span / round(count)
+    off = (levels - levels[0]) / step
+    return step if float(np.max(np.abs(off - np.round(off)))) < WHOLE_STEP else 0.0
 
 
 def differentiate(

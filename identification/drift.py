@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.arrays import BoolArray
+from identification.arrays import Array, BoolArray
 from identification.before_after import seen_by
 from identification.choice import Step
 from identification.evidence import ACTUATOR, FIVE, MECHANICAL, Moving, Rows, stacked
@@ -12,11 +12,14 @@ from identification.left_over import FEWEST_ROWS
 from identification.log import Rig
 from identification.outcome import Outcome
 from identification.plant import units_of
-from identification.structure import OVERLAP, Model
+from identification.stage import Stage
+from identification.structure import OVERLAP, Model, band
 from identification.trace_result import Change
+from identification.weak_form import noise_gain, weights
 
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed has to gain
 DRIFT_SHARE = 0.1  # of the test logs' square error that it has to take away
+SHOWN = 0.3  # share of a column's square that is motion and not noise, at least
 DRIFT_LEAST = 0.01  # of its value, that it changes at least
 
 
@@ -31,22 +34,50 @@ def drift(
         if equation in after.outcomes:
             mine = after.outcomes[equation]
             rows = stacked(stage.parts[equation])
-            keep = rows.speed >= mine.slowest
+            # Other motion may be slow where the training was fast: in the band it does not slide.
+            slowest = max(mine.slowest, band(after)) if equation == MECHANICAL else mine.slowest
+            keep = rows.speed >= slowest
             if np.count_nonzero(keep) >= FEWEST_ROWS:
+                blur = np.sum(
+                    (column_noise(stage, equation) / rows.sd[:, np.newaxis] ** 2)[keep], 0
+                )
                 out += [
                     Change(name, units[name], *change)
-                    for name, *change in changes(mine, rows, keep, names)
+                    for name, *change in changes(mine, rows, keep, names, blur)
                 ]
     return tuple(out)
 
 
+def column_noise(stage: Stage, equation: str) -> Array:
+    """Variance that the position's noise gives each column of an equation, (r, k).
+
+    Noise in a column draws its parameter to 0, the more the calmer the motion: without it a mass
+    in fast motion would seem to be another in slow motion.
+    """
+    out = []
+    for one, rows in zip(stage.logs, stage.parts[equation], strict=True):
+        windows = one.sliding if equation == MECHANICAL else one.whole
+        assert windows is not None
+        _, first, second, *_ = weights(windows.length, one.log.h)
+        variance = np.zeros((len(rows.b), rows.X.shape[1]))
+        if equation == MECHANICAL:
+            variance[:, 0] = one.noise_y**2 * noise_gain(second)
+            variance[:, 3] = one.noise_y**2 * noise_gain(first) * one.up
+            variance[:, 4] = one.noise_y**2 * noise_gain(first) * ~one.up
+        else:
+            variance[:, 1] = one.noise_y**2 * noise_gain(first)
+        out.append(variance)
+    return np.concatenate(out)
+
+
 def changes(
-    mine: Outcome, rows: Rows, keep: BoolArray, names: Sequence[str]
+    mine: Outcome, rows: Rows, keep: BoolArray, names: Sequence[str], blur: Array
 ) -> list[tuple[str, float, float, float]]:
     """Name, value before and after, and deviation of the parameters that have changed.
 
     One is freed at a time, the one that lowers the error most, as long as it lowers it by a
     material share and surely: parameters that a short log cannot tell apart do not all change.
+    blur (k,): square sum that noise makes of each whitened column.
     """
     theta = mine.fit.theta.copy()
     A, b = (rows.X / rows.sd[:, np.newaxis])[keep], (rows.b / rows.sd)[keep]
@@ -55,26 +86,30 @@ def changes(
     every = b - A @ np.linalg.lstsq(A, b, rcond=1e-10)[0]
     own = float(np.mean(mine.fit.residual[mine.rows.speed >= mine.slowest] ** 2))
     noise = max(own, float(np.mean(every**2)), 1.0)
+    gram = A.T @ A - np.diag(blur)
+    slope = A.T @ r + blur * theta
     free: list[int] = []
-    best = theta
+    best, now = theta, float(r @ r)
     while len(free) < len(names):
-        now = float(np.sum((b - A @ best) ** 2))
         options = []
         for i in range(len(names)):
-            if i not in free:
-                at = [*free, i]
-                step = np.linalg.lstsq(A[:, at], r, rcond=1e-8)[0]
-                options.append((float(np.sum((r - A[:, at] @ step) ** 2)), i, step))
+            if i in free or gram[i, i] < SHOWN * (A[:, i] @ A[:, i]):
+                continue
+            at = [*free, i]
+            step = np.linalg.lstsq(gram[np.ix_(at, at)], slope[at], rcond=1e-8)[0]
+            options.append((float(r @ r - step @ slope[at]), i, step))
+        if not options:
+            break
         left, i, step = min(options, key=lambda x: x[0])
         sure = (now - left) / (noise * OVERLAP)
         if sure < DRIFT_GAIN or now - left < DRIFT_SHARE * now:
             break
         free.append(i)
-        best = theta.copy()
+        now, best = left, theta.copy()
         best[free] += step
     if not free:
         return []
-    inverse = np.linalg.pinv(A[:, free].T @ A[:, free])
+    inverse = np.linalg.pinv(gram[np.ix_(free, free)])
     sd = np.sqrt(np.diag(inverse) * noise * OVERLAP)
     return [
         (names[i], float(theta[i]), float(best[i]), float(s))

@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.differentiate import differentiate
+from identification.differentiate import differentiate, resolution
+from identification.karnopp import Karnopp
 from identification.log import Log
 from identification.weak_form import (
     Windows,
@@ -34,12 +35,19 @@ POSITIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either
 FRICTIONAL = ("slip", "friction")
 IN_ACTUATOR = ("actuator", "command", "delay")
 OUT_OF_LOGS = ("sensor", "command", "delay")  # taken out of the signals once found
+CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
+OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
+CALM_SHARE = 0.9  # of the samples, those that tell the controller
 QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
 
 
 @dataclass(frozen=True, eq=False)
 class Moving:
-    """One log with its motion, and its windows in the two equations (actuator: None without u)."""
+    """One log with its motion, and its windows in the two equations (actuator: None without u).
+
+    reference: friction with which a run walks at most under the noise of the measured force; a
+    plant that walks more must not be forgiven for it.
+    """
 
     log: Log
     signals: Mapping[str, Array]
@@ -51,11 +59,16 @@ class Moving:
     noise_F: float
     held: bool
     v_noise: float
+    reference: Karnopp | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A regression b = X theta: b (r,), X (r, k), sd (r,) of b, block (r,) of time, speed (r,)."""
+    """A regression b = X theta: b (r,), X (r, k), sd (r,) of b, block (r,) of time, speed (r,).
+
+    lost: twice the log-likelihood that b has lost, where an effect has taken away a part of what
+    was logged: without it the effect that leaves no force at all would explain every force.
+    """
 
     b: Array
     X: Array
@@ -63,6 +76,7 @@ class Rows:
     block: IntArray
     speed: Array
     names: tuple[str, ...]
+    lost: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +93,12 @@ def local_noise(x: Array, h: float) -> float:
 
     Third differences in short stretches: motion and input raise most of them, noise is in all.
     """
-    d3 = np.diff(np.asarray(x, dtype=np.float64), 3) / np.sqrt(20.0)
+    return quiet_part(np.diff(np.asarray(x, dtype=np.float64), 3))
+
+
+def quiet_part(third: Array) -> float:
+    """White noise (one sigma) of a signal from its third differences, by their quiet stretches."""
+    d3 = third / np.sqrt(20.0)
     size = 25
     count = len(d3) // size
     if count < 4:
@@ -104,12 +123,38 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
         "v": motion.v, "a": motion.a, "smooth": motion.y, "d": d, "u": u,
     }  # fmt: skip
     whole = all_windows(len(log), length, h) if by_command else None
-    noise_F = 0.0 if held else local_noise(log["F"], h)
+    noise_F = _beside_control(log) if held else local_noise(log["F"], h)
     one = Moving(
         log, signals, sliding, d[sliding.middle] > 0, np.min(view[sliding.start], axis=1), whole,
-        min(motion.noise, local_noise(log["y"], h)), noise_F, held, motion.v_noise,
+        min(motion.noise, max(local_noise(log["y"], h), resolution(log["y"]) / np.sqrt(12.0))),
+        noise_F, held, motion.v_noise,
     )  # fmt: skip
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
+
+
+def _beside_control(log: Log) -> float:
+    """Noise of a motor's logged force [N] beside the position's noise that its controller passes.
+
+    That part is in the true force too. A linear controller's force is a filter of position and
+    reference; what of the fast content no such filter gives was not in what the motor was given.
+    """
+    third = {k: np.diff(log[k], 3) for k in ("F", "y", "r") if k in log}
+    n = len(third["F"])
+    if n < 10 * CONTROL_LAGS:
+        return 0.0
+    columns = [
+        third[k][CONTROL_LAGS - i : n - i]
+        for k in ("y", "r")
+        if k in third
+        for i in range(CONTROL_LAGS)
+    ]
+    X, b = np.column_stack(columns), third["F"][CONTROL_LAGS:]
+    X = X / np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    # Kinks of the command (limits, steps of the reference) are few and large.
+    quiet = np.abs(b) <= np.quantile(np.abs(b), CALM_SHARE)
+    theta = np.linalg.lstsq(X[quiet], b[quiet], rcond=1e-10)[0]
+    noise = quiet_part(b - X @ theta)
+    return noise if noise > OF_FILTER * quiet_part(third["F"]) else 0.0
 
 
 def _unexplained(one: Moving) -> float:
@@ -176,7 +221,8 @@ def stacked(parts: Sequence[Rows]) -> Rows:
     """Rows of several logs as one regression; their blocks are kept apart."""
     block = np.concatenate([p.block + BLOCKS * i for i, p in enumerate(parts)])
     join = [np.concatenate([getattr(p, k) for p in parts]) for k in ("b", "X", "sd", "speed")]
-    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names)
+    lost = sum(p.lost for p in parts)
+    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost)
 
 
 def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None) -> Fitted:

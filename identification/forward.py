@@ -20,7 +20,7 @@ from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
 from identification.effects._base import MAX_SIGNALS, Acting, Effect, Param
 from identification.equations import by_load, equations_of
 from identification.errors import UserError
-from identification.evidence import Moving
+from identification.evidence import IN_ACTUATOR, Moving
 from identification.grids import shape_grid
 from identification.karnopp import Karnopp
 from identification.library import Library
@@ -180,7 +180,9 @@ def _beside(
     for key, effect in setting.library.items():
         if key in keys or key in ABSORBED:
             continue
-        if key in shown or effect.acts in IN_RUN or by_load(effect):
+        if setting.drive == "force" and effect.acts in IN_ACTUATOR:
+            continue
+        if key in shown or in_run(effect):
             values = [inside(effect, regressed[key])] if key in regressed else []
             if values and effect.acts == "stiction":  # breakaways show less of it than there is
                 values = [
@@ -192,9 +194,19 @@ def _beside(
                 yield Trial(steps, base, effect, values)
 
 
+def in_run(effect: Effect) -> bool:
+    """Whether a free run may show the effect where the equations do not.
+
+    One with a speed of its own shows in slow motion, most of which the equations leave out: a
+    wider band stands for it there.
+    """
+    slow = any(p.unit in ("m/s", "rad/s") for p in effect.params)
+    return effect.acts in IN_RUN or by_load(effect) or slow
+
+
 def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
     """Values from which an effect that the equations hardly show is tried."""
-    if effect.acts not in IN_RUN and not by_load(effect):
+    if not in_run(effect):
         return []
     if effect.signals and not all(any(k in one.log for k in effect.signals) for one in logs):
         return []
@@ -248,7 +260,7 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
 
 def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
     """The plant refined a little on the short logs."""
-    if effect.acts in ("bristle", "stiction", "sensor"):  # the plain band and limits stood for it
+    if in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         band = max(p.dv_p, -p.dv_n)
         plant = start_band(plant, setting.short, setting.drive, band)

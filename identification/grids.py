@@ -49,10 +49,10 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
 
 
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:
-    """Periods [m] that the travel holds at least once (a force) or half (friction)."""
+    """Periods [m] that the travel holds a good part of at least: a pendulum swings no full turn."""
     slow = float(np.quantile(np.abs(one.signals["v"]), 0.5))
     shortest = max(SHARPEST * slow, 1e-3 * travel)
-    fewest = 1.0 if effect.acts == "force" else 0.5
+    fewest = 0.4 if effect.acts == "force" else 0.5
     most = max(travel / shortest, 2.0 * fewest)
     most = min(most, 200.0 if effect.acts == "force" else 12.0)
     return travel / np.arange(fewest, most + 0.25, 0.4)

@@ -56,7 +56,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
         return Outcome(rows, fit, _robust(fit.residual, scale), 0.0, True)
     if not np.any(np.isfinite(rows.speed)):
         fit = solve(rows)
-        return Outcome(rows, fit, fit.cost / scale, 0.0)
+        return Outcome(rows, fit, fit.cost / scale + rows.lost, 0.0)
     edges = np.quantile(rows.speed, TRIMS)
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
     size = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
@@ -67,7 +67,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     tried = []
     for i in range(len(edges)):
         theta, left = _of_gram(grams[i:].sum(axis=0), own)
-        total = left * size[-1] ** 2 / scale + TRIM * np.count_nonzero(bins < i)
+        total = left * size[-1] ** 2 / scale + TRIM * np.count_nonzero(bins < i) + rows.lost
         tried.append((total, i, theta))
     total, best, theta = min(tried, key=lambda each: each[0])
     theta = theta * size[-1] / size[:-1]

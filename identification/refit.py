@@ -14,14 +14,15 @@ from typing import Literal
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
-from identification.starts import SECONDS, WHOLE, freed, left, starts
+from identification.starts import SECONDS, WHOLE, freed, left, starts, walks
 
 FIRST = 1.0  # s, of the windows in which the search begins
+GROWING = (0.25, 0.5, FIRST)  # s, of windows that grow: the shorter, the wider the minimum
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
@@ -38,7 +39,9 @@ MOST, HALF = 0.9, 0.5  # share of the residuals that then count in full
 NARROW = 0.03  # of its value, that the mass keeps at least in a search
 WIDE = 2.0  # factor within which a search keeps what an effect is not linear in
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
-STEP = 1e-4
+STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
+# Near it: what tells the scale common to masses and forces is a small difference of large columns.
+FINE_STEP = 1e-7
 TRIES = 6  # of the damping in one step
 ENOUGH = 1e-5  # share of the cost below which a step is the last
 LITTLE = 1e-3  # the same, where more than noise is left
@@ -221,17 +224,21 @@ def refit(
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
         return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
 
+    def polished(at: Minimum) -> Minimum:
+        return gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
+
     slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
-    if effort == "whole":
-        x = refined(x, FIRST, True, MOST).x
+    for seconds in GROWING if not quick else ():
+        x = refined(x, seconds, True, MOST).x
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
     rounds = [] if quick else [SECONDS]
-    if drive == "command" and not slow and not quick:
+    steady = drive == "command" and not any(walks(one, drive) for one in logs)
+    if steady and not slow and not quick:
         rounds.append(LONG if plant_is_motor(plant) else WHOLE)
     for seconds in rounds:
         again = refined(at.x, seconds, False)
@@ -243,7 +250,7 @@ def refit(
         # Band and stick limits have narrow minima, and many: another one of either direction.
         other = by_side(plant_with(plant, names, full(at.x)), logs, drive)
         trial = refined(values_of(other, names)[open_] / unit[open_], SECONDS, False)
-        if drive == "command":
+        if steady:
             longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
             trial = longer if longer.followed else trial
         better = misfit(plant_with(plant, names, full(trial.x)), logs, drive)
@@ -252,14 +259,32 @@ def refit(
             at, found = trial, better
         if better > SAME * before:
             break
+    if at.followed and not quick:
+        finer = polished(at)
+        left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
+        if left_by < max(found, COMPLETE):
+            at, found = finer, left_by
     best = plant_with(plant, names, full(at.x))
 
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
         factor = SECONDS / logs[0].log.h if found > FOLLOWED else 1.0
-        return factor * at.covariance() * np.outer(unit[open_], unit[open_])
+        walking = any(walks(one, drive) for one in logs)
+        cluster = _windows(logs, drive) if walking else None
+        return factor * at.covariance(cluster) * np.outer(unit[open_], unit[open_])
 
     return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
+
+
+def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
+    """Number of the window of every sample over all logs, (n,)."""
+    parts, count = [], 0
+    for one in logs:
+        begun = starts(one, drive).at
+        window = np.searchsorted(begun, np.arange(len(one.log)), side="right") - 1
+        parts.append(window + count)
+        count += len(begun)
+    return np.concatenate(parts).astype(np.int64)
 
 
 def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
@@ -270,7 +295,8 @@ def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
     worst = 0.0
     for one in logs:
         least = LOST  # a short window may begin badly, a long one lose a stop
-        for seconds in (SECONDS, WHOLE) if drive == "command" else (SECONDS,):
+        whole = drive == "command" and not walks(one, drive)
+        for seconds in (SECONDS, WHOLE) if whole else (SECONDS,):
             r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive, seconds)))
             if r is not None:
                 least = min(least, max(loss(own) / len(own) / NOISE_LOSS for own in r))
@@ -296,13 +322,31 @@ class Minimum:
         """Whether hardly more than noise is left."""
         return self.mean < FOLLOWED
 
-    def covariance(self) -> Array:
-        """Of x, (k, k), for residuals that are noise of this mean square."""
-        J = jacobian(self.fun, self.x)
-        return np.asarray(np.linalg.pinv(J.T @ J) * self.mean, dtype=np.float64)
+    def covariance(self, cluster: IntArray | None = None) -> Array:
+        """Of x, (k, k), for residuals that are noise of this mean square.
+
+        cluster (n,): stretches of the first n residuals within which they walk together; the
+        stretches are independent, and what they pull x about by tells its deviation (Liang, Zeger,
+        Biometrika 73 (1986) 13).
+        """
+        J = jacobian(self.fun, self.x, None, FINE_STEP)
+        inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
+        if cluster is None:
+            return np.asarray(inverse * self.mean)
+        pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
+        sums = np.array([np.bincount(cluster, column) for column in pull.T])
+        count = sums.shape[1]
+        spare = count / max(count - len(self.x), 1)
+        wider = spare * inverse @ (sums @ sums.T) @ inverse
+        # With few stretches for many unknowns the sums all but vanish at the minimum.
+        if count <= 2 * len(self.x):
+            wider = spare**2 * (wider + inverse * self.mean)
+        return np.asarray(wider, dtype=np.float64)
 
 
-def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> Minimum:
+def gauss_newton(
+    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP
+) -> Minimum:
     """Minimum of the square sum of `fun` near x.
 
     Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
@@ -310,7 +354,7 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> Minimum
     r = fun(x)
     cost, damping = float(r @ r), 1e-3
     for _ in range(steps):
-        J = jacobian(fun, x, r)
+        J = jacobian(fun, x, r, step_by)
         A, g = J.T @ J, J.T @ r
         size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
         for _ in range(TRIES):
@@ -329,14 +373,16 @@ def gauss_newton(fun: Callable[[Array], Array], x: Array, steps: int) -> Minimum
     return Minimum(fun, x, cost / len(r))
 
 
-def jacobian(fun: Callable[[Array], Array], x: Array, r: Array | None = None) -> Array:
+def jacobian(
+    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = STEP
+) -> Array:
     """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
 
     def column(i: int) -> Array:
         up, down = x.copy(), x.copy()
-        up[i] += STEP
-        down[i] -= STEP
-        return (fun(up) - r) / STEP if r is not None else (fun(up) - fun(down)) / (2 * STEP)
+        up[i] += step
+        down[i] -= step
+        return (fun(up) - r) / step if r is not None else (fun(up) - fun(down)) / (2 * step)
 
     with ThreadPoolExecutor(2) as pool:
         return np.column_stack(list(pool.map(column, range(len(x)))))

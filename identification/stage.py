@@ -36,6 +36,8 @@ from identification.transforms import driven, reached, shown_to_true
 
 BLURRED = 1e3  # times the noise, of a row that says nothing
 LOCKED = 0.1  # of the applied force, at least left to drive
+SMALL = 1e-6  # of the largest command, a step by which its passing is told
+FLAT = 0.2  # of the time in sliding, that a command may leave a motor without force
 HOPELESS = 1e3  # times the force to be explained
 
 
@@ -154,9 +156,12 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
             plain(stage, equation, i, y=shown_to_true(effect, shape, one, stage.friction)), rows
         )
     if effect.acts in ("command", "delay"):
-        return _beside(
+        behind = _beside(
             plain(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
         )
+        if one.held and equation == MECHANICAL and effect.acts == "command":
+            return _flattened(effect, shape, one, stage, behind)
+        return behind
     if split(effect):
         shape = {**shape, "asymmetry": 0.0}
     if by_load(effect):
@@ -171,6 +176,24 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
         own, names = [own[0] * up, own[0] * ~up], (f"{names[0]}+", f"{names[0]}-")
     b = rows.b - fixed if not names else rows.b
     return replace(rows, b=b, X=np.column_stack([rows.X, *own]), names=(*rows.names, *names))
+
+
+def _flattened(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+    """A motor's rows with what they lose where the effect flattens their force.
+
+    By the change of variable from the logged force to the one that reaches the body; where none
+    of it passes, the log tells no more than that it lies within the force's range.
+    """
+    s, h, u = one.signals, one.log.h, np.asarray(one.log["u"])
+    step = SMALL * float(np.max(np.abs(u)))
+    more = contribution(effect, shape, {**s, "u": u + np.copysign(step, u)}, h, stage.friction)
+    given = contribution(effect, shape, s, h, stage.friction)
+    slope = np.abs(more - given) / step
+    least = float(np.median(rows.sd)) * np.sqrt(2 * np.pi) / max(float(np.ptp(s["F"])), 1e-300)
+    if np.mean(one.sliding.held @ (slope < least)) > FLAT:  # a body driven by nothing
+        return replace(rows, b=HOPELESS * (one.sliding.held @ one.log["F"]))
+    lost = -2.0 * np.sum(one.sliding.held @ np.log(np.maximum(slope, min(least, 1.0))))
+    return replace(rows, lost=float(lost))
 
 
 def _beside(fresh: Rows, rows: Rows) -> Rows:

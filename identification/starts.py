@@ -15,7 +15,7 @@ from identification.arrays import Array, IntArray
 from identification.errors import BadModel
 from identification.evidence import Moving
 from identification.log import Log
-from identification.plant import Plant
+from identification.plant import Motor, Plant
 from identification.rest import stretches
 from identification.result import Drive
 from identification.simulate import FreeRun, free_run
@@ -215,16 +215,35 @@ def _sureness(
 
     By a few runs with as much noise once more (of fixed seeds: a quadrature, nothing random).
     """
-    square = np.zeros(r.shape)
-    if drive == "command" or one.held or one.noise_F == 0.0:
+    if not walks(one, drive):
         return np.ones(r.shape)
+    square = np.zeros(r.shape)
+    square[0] = _walk(plant, one, drive, begun, base)
+    if one.reference is not None:
+        plain = Plant(one.reference, plant.actuator)
+        run = window_run(plain, one, drive, begun)
+        if run is not None:
+            square[0] = np.minimum(square[0], _walk(plain, one, drive, begun, run))
+    return np.asarray(1.0 / np.sqrt(1.0 + square))
+
+
+def walks(one: Moving, drive: Drive) -> bool:
+    """Whether a run walks away with the noise of the force that drives it."""
+    return (drive == "force" or one.held) and one.noise_F > 0.0
+
+
+def _walk(plant: Plant, one: Moving, drive: Drive, begun: Starts, base: FreeRun) -> Array:
+    """Variance (n,) of a run by the force's noise, in units of the position's."""
+    square = np.zeros(len(one.log))
     for seed in range(WALKS):
         noise = one.noise_F * np.random.default_rng(seed).standard_normal(len(one.log))
-        log = one.log.with_signals(F=one.log["F"] + noise)
-        run = window_run(plant, one, drive, begun, log=log)
+        more = {"F": one.log["F"] + noise}
+        if isinstance(plant.actuator, Motor):
+            more["u"] = one.log["u"] + noise / plant.actuator.k_a
+        run = window_run(plant, one, drive, begun, log=one.log.with_signals(**more))
         if run is not None:
-            square[0] += ((run.shown - base.shown) / one.noise_y) ** 2 / WALKS
-    return np.asarray(1.0 / np.sqrt(1.0 + square))
+            square += ((run.shown - base.shown) / one.noise_y) ** 2 / WALKS
+    return square
 
 
 def left(plant: Plant, one: Moving, drive: Drive, found: Freed | None) -> Array | None:

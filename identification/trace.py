@@ -81,6 +81,7 @@ def trace(
     if not before.led and before.misfit > COMPLETE and not rough(first):
         before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
+        logs = [replace(one, reference=before.plant.friction) for one in logs]
         start = replace(start, band=band(before), sliding=before.plant.friction)
         first = base_outcomes(start)
     if before.misfit <= COMPLETE:  # the plain plant's run leaves nothing but noise
@@ -92,7 +93,10 @@ def trace(
         near = None if before.led else before.plant.friction
         after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig, near=near)
     report("judging", 0.0)
-    short = [moving(cut(log, SHORT), held=held, by_command=by_command) for log in train]
+    short = [
+        replace(moving(cut(log, SHORT), held=held, by_command=by_command), reference=one.reference)
+        for log, one in zip(train, logs, strict=True)
+    ]
     setting = Setting(logs, short, drive, library, start, first, before)
     choice, after = judged_forward(choice, after, setting, report)
     seen = [moving(log, held=held, by_command=by_command) for log in test]
