@@ -200,8 +200,12 @@ def in_run(effect: Effect) -> bool:
     One with a speed of its own shows in slow motion, most of which the equations leave out: a
     wider band stands for it there.
     """
-    slow = any(p.unit in ("m/s", "rad/s") for p in effect.params)
-    return effect.acts in IN_RUN or by_load(effect) or slow
+    return effect.acts in IN_RUN or by_load(effect) or slow_motion(effect)
+
+
+def slow_motion(effect: Effect) -> bool:
+    """Whether the effect has a speed of its own."""
+    return any(p.unit in ("m/s", "rad/s") for p in effect.params)
 
 
 def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
@@ -302,7 +306,7 @@ def _taken(
     winner: Contender, done: Refit, rivals: Sequence[Contender], setting: Setting, before: float
 ) -> tuple[Choice, Model]:
     """The choice with the winner as its last step, and the model."""
-    stage, base = _with_steps(winner.steps, setting)
+    stage, base = with_steps(winner.steps, setting.start, setting.first)
     values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
     count = sum(len(starts(one, setting.drive).at) for one in setting.logs)
     scaled = [_as_candidate(one, stage, base, count * (before - one.misfit)) for one in rivals]
@@ -345,15 +349,17 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
         found = refit(base, setting.logs, setting.drive, prior=even(base), effort="near")
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
-        end, outcomes = _with_steps(stay, setting)
+        end, outcomes = with_steps(stay, setting.start, setting.first)
         choice = Choice(setting.start, setting.first, stay, end, outcomes, choice.tried)
         model = Model(end, outcomes, found.plant, found.sd, False, found.misfit)
     return choice, model
 
 
-def _with_steps(steps: Sequence[Step], setting: Setting) -> tuple[Stage, Mapping[str, Outcome]]:
+def with_steps(
+    steps: Sequence[Step], start: Stage, first: Mapping[str, Outcome]
+) -> tuple[Stage, Mapping[str, Outcome]]:
     """The stage with these effects in it, and what it leaves."""
-    stage, outcomes = setting.start, setting.first
+    stage, outcomes = start, first
     for step in steps:
         stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
     return stage, outcomes

@@ -17,13 +17,28 @@ from identification.drift import drift
 from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
-from identification.forward import SHORT, Setting, judged_forward
+from identification.forward import (
+    NEEDLESS,
+    SHORT,
+    Setting,
+    judged_forward,
+    slow_motion,
+    with_steps,
+)
 from identification.held_out import left_out
 from identification.karnopp import NAMES
-from identification.left_over import FEWEST_ROWS, in_run, left_over, signals_at, too_much
+from identification.left_over import (
+    ASTRAY,
+    FEWEST_ROWS,
+    MUCH,
+    in_run,
+    left_over,
+    signals_at,
+    too_much,
+)
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.outcome import Outcome, base_outcomes, rms
+from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
 from identification.refit import COMPLETE, refit
@@ -43,6 +58,7 @@ from identification.trace_result import (
 Progress = Callable[[str, float], None]
 ALIKE = 10.0  # gain by which two effects that explain equally may differ
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
+HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 RUNS = {
     "v": "strokes at several constant speeds",
     "y": "the same short stroke at several places",
@@ -82,7 +98,9 @@ def trace(
         before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
         logs = [replace(one, reference=before.plant.friction) for one in logs]
-        start = replace(start, band=band(before), sliding=before.plant.friction)
+        # A run that is not followed may have swollen its band in place of what is missing.
+        known = band(before) if before.misfit <= ASTRAY else 0.0
+        start = replace(start, band=known, sliding=before.plant.friction)
         first = base_outcomes(start)
     if before.misfit <= COMPLETE:  # the plain plant's run leaves nothing but noise
         library = {}
@@ -92,6 +110,8 @@ def trace(
     if choice.steps:
         near = None if before.led else before.plant.friction
         after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig, near=near)
+        if start.band == 0.0 and not before.led:
+            choice, after = doubted(choice, before, after, logs, drive, rig)
     report("judging", 0.0)
     short = [
         replace(moving(cut(log, SHORT), held=held, by_command=by_command), reference=one.reference)
@@ -99,6 +119,8 @@ def trace(
     ]
     setting = Setting(logs, short, drive, library, start, first, before)
     choice, after = judged_forward(choice, after, setting, report)
+    if useless(choice, before, after):
+        choice, after = Choice(start, first, (), start, first, choice.tried), before
     seen = [moving(log, held=held, by_command=by_command) for log in test]
     left = Dependence((), 0.0) if after.misfit <= COMPLETE else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
@@ -132,6 +154,42 @@ def trace(
         residuals=_residuals(choice.start, choice.first, choice.end, choice.base),
         remarks=tuple(remarks),
     )
+
+
+def doubted(
+    choice: Choice, before: Model, after: Model, logs: Sequence[Moving], drive: Drive, rig: Rig
+) -> tuple[Choice, Model]:
+    """Without an effect of slow motion that the run does as well without.
+
+    While the band was not known, the passage through it may have been taken for such an effect.
+    """
+    for step in choice.steps:
+        if not slow_motion(step.candidate.effect):
+            continue
+        stay = tuple(one for one in choice.steps if one is not step)
+        end, base = with_steps(stay, choice.start, choice.first)
+        other = before
+        if stay:
+            near = before.plant.friction
+            other = model_of(end, base, stay, logs, drive, rig, near=near)
+        if other.misfit <= NEEDLESS * after.misfit:
+            choice = Choice(choice.start, choice.first, stay, end, base, choice.tried)
+            after = other
+    return choice, after
+
+
+def useless(choice: Choice, before: Model, after: Model) -> bool:
+    """Whether effects explain neither the run nor, to the sensors' noise, the equations.
+
+    Where no effect of the library is the right one, the nearest stands in for it: it lowers what
+    the equations leave, bends the other parameters, and hides on what the rest depends.
+    """
+    if after.led or not choice.steps:
+        return False
+    told = [choice.base[e] for e in (MECHANICAL, ACTUATOR) if e in choice.base]
+    if all(spread(o) <= MUCH**2 for o in told):
+        return False
+    return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
 
 
 def searched(
