@@ -185,14 +185,14 @@ def next_step(
     scaled = replace(stage, scales=scales)
     base = base_outcomes(scaled)
     ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
-    best = ranked[0]
-    if not material(best, scaled, base):
-        ranked = [c for c in ranked if material(c, scaled, base)]
-        if not ranked:
-            return None
-        best = ranked[0]
+    # What explains a trifle of what is missing in its own equations must not hide the next.
+    worth = [c for c in ranked if material(c, scaled, base) and share(c, base) >= SHARE]
+    if not worth:
+        return None
+    best = worth[0]
+    ranked = [best, *(c for c in ranked if c is not best)]
     p_value = chance(best, ranked, scaled, base, rng)
-    if p_value > LEVEL or merit(best) <= 0 or share(best, base) < SHARE:
+    if p_value > LEVEL or merit(best) <= 0:
         return None
     return Step(best, p_value, tuple(ranked[1:]), scaled, base)
 

@@ -37,6 +37,7 @@ IN_ACTUATOR = ("actuator", "command", "delay")
 OUT_OF_LOGS = ("sensor", "command", "delay")  # taken out of the signals once found
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
+OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
 CALM_SHARE = 0.9  # of the samples, those that tell the controller
 QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
 
@@ -154,7 +155,8 @@ def _beside_control(log: Log) -> float:
     quiet = np.abs(b) <= np.quantile(np.abs(b), CALM_SHARE)
     theta = np.linalg.lstsq(X[quiet], b[quiet], rcond=1e-10)[0]
     noise = quiet_part(b - X @ theta)
-    return noise if noise > OF_FILTER * quiet_part(third["F"]) else 0.0
+    least = max(OF_FILTER * quiet_part(third["F"]), OF_FORCE * float(np.std(log["F"])))
+    return noise if noise > least else 0.0
 
 
 def _unexplained(one: Moving) -> float:

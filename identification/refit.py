@@ -22,7 +22,6 @@ from identification.result import Drive
 from identification.starts import SECONDS, WHOLE, freed, left, starts, walks
 
 FIRST = 1.0  # s, of the windows in which the search begins
-GROWING = (0.25, 0.5, FIRST)  # s, of windows that grow: the shorter, the wider the minimum
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
@@ -231,8 +230,8 @@ def refit(
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
-    for seconds in GROWING if not quick else ():
-        x = refined(x, seconds, True, MOST).x
+    if effort == "whole":
+        x = refined(x, FIRST, True, MOST).x
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.

@@ -12,12 +12,23 @@ import numpy as np
 
 from identification.before_after import errors_of, noise_of
 from identification.candidates import Candidate
-from identification.choice import Choice, Step, choose, first_stage, merit, rough, share
+from identification.choice import (
+    SHARE,
+    Choice,
+    Step,
+    choose,
+    first_stage,
+    material,
+    merit,
+    rough,
+    share,
+)
 from identification.drift import drift
 from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
 from identification.forward import (
+    DECISIVE,
     NEEDLESS,
     SHORT,
     Setting,
@@ -58,6 +69,7 @@ from identification.trace_result import (
 Progress = Callable[[str, float], None]
 ALIKE = 10.0  # gain by which two effects that explain equally may differ
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
+BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 RUNS = {
     "v": "strokes at several constant speeds",
@@ -122,7 +134,8 @@ def trace(
     if useless(choice, before, after):
         choice, after = Choice(start, first, (), start, first, choice.tried), before
     seen = [moving(log, held=held, by_command=by_command) for log in test]
-    left = Dependence((), 0.0) if after.misfit <= COMPLETE else left_over(choice, after)
+    enough = DECISIVE if choice.steps else COMPLETE  # a refinement may end short of its minimum
+    left = Dependence((), 0.0) if after.misfit <= enough else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
     verdict = _verdict(choice, left, changed)
     if verdict != "unknown" and too_much(choice, after):
@@ -133,6 +146,16 @@ def trace(
     slowest = choice.base[MECHANICAL].slowest
     if after.led:
         remarks.append("the motion is imposed (inertia is of no account): no free run is judged")
+    elif choice.steps and after.misfit > ASTRAY:
+        remarks.append(
+            f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
+            " band and stick limits are not to be trusted, or more is missing"
+        )
+    if not after.led and driven_only(logs):
+        remarks.append(
+            "the force hardly ever opposes the motion: friction in proportion to it would change"
+            " mass and friction by one factor and not show (a run that brakes hard would show it)"
+        )
     if not seen:
         remarks.append("no test log: the test errors are those of stretches left out in turn")
     return Trace(
@@ -159,7 +182,7 @@ def trace(
 def doubted(
     choice: Choice, before: Model, after: Model, logs: Sequence[Moving], drive: Drive, rig: Rig
 ) -> tuple[Choice, Model]:
-    """Without an effect of slow motion that the run does as well without.
+    """Without an effect of slow motion that the run does as well without, or that its band hides.
 
     While the band was not known, the passage through it may have been taken for such an effect.
     """
@@ -172,7 +195,9 @@ def doubted(
         if stay:
             near = before.plant.friction
             other = model_of(end, base, stay, logs, drive, rig, near=near)
-        if other.misfit <= NEEDLESS * after.misfit:
+        beyond = replace(step.stage, band=band(after))
+        shows = material(step.candidate, beyond, step.base)
+        if not shows or other.misfit <= NEEDLESS * after.misfit:
             choice = Choice(choice.start, choice.first, stay, end, base, choice.tried)
             after = other
     return choice, after
@@ -205,6 +230,14 @@ def searched(
     if found.misfit >= model.misfit:
         return model
     return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
+
+
+def driven_only(logs: Sequence[Moving]) -> bool:
+    """Whether the force points along the motion in all sliding but a trace of it."""
+    against = [
+        (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
+    ]
+    return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
 def cut(log: Log, seconds: float) -> Log:
@@ -252,7 +285,7 @@ def _verdict(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Verdi
 def _alike(step: Step) -> tuple[Candidate, ...]:
     """Rivals that explain as much as the effect taken, but for luck."""
     mine = merit(step.candidate)
-    return tuple(c for c in step.rivals if mine - merit(c) < ALIKE)
+    return tuple(c for c in step.rivals if mine - merit(c) < ALIKE and share(c, step.base) >= SHARE)
 
 
 def _found(step: Step, after: Model, choice: Choice) -> FoundEffect:

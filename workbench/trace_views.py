@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from identification.chance import DRAWS
 from identification.effects._base import GIVES
 from identification.result import Estimate
 from identification.trace_result import Change, Errors, FoundEffect, Rival, Trace
@@ -23,6 +24,8 @@ CHANGE_HEAD = ("parameter", "before", "after", "unit", "95 % interval after", "c
 DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
 SHOWS = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
+FLOOR = 1.0 / (DRAWS + 1)  # least chance that draws can show
+LEAST = 1.1e-9  # value that a plant keeps of a parameter that comes out 0
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -83,8 +86,14 @@ def sentence(traced: Traced) -> str:
 
 def unexplained(traced: Traced) -> str:
     """What is left where it is far more than noise and depends on no signal."""
-    found, unit = traced.trace, shown(traced.model.rotary).force
-    left = found.after["train"].force_rms
+    found, units = traced.trace, shown(traced.model.rotary)
+    unit, left = units.force, found.after["train"].force_rms
+    off = found.after["train"].position_rms
+    if left is not None and left <= NOISE * found.noise_force and off is not None:
+        return (
+            f"the free run is off by {off:.3g} {units.position} in 2 s (sensors' noise"
+            f" {found.noise_y:.3g} {units.position}), and it depends on none of the signals."
+        )
     return (
         f"the model leaves {left:.3g} {unit} of force, the sensors' noise alone"
         f" {found.noise_force:.3g} {unit}, and it depends on none of the signals."
@@ -207,6 +216,8 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
     """Value and interval, with the digits that mean something."""
     if estimate.value is None:
         return "-", estimate.reason or "not identified"
+    if 0.0 < abs(estimate.value) <= LEAST:
+        return "0", "at its bound"
     if estimate.low is None or estimate.high is None or not estimate.sd:
         return f"{estimate.value:.4g}", estimate.reason or "held"
     numbers = (estimate.value, estimate.low, estimate.high)
@@ -224,8 +235,13 @@ def effect_lines(found: Trace) -> list[str]:
 
 
 def _worth(e: FoundEffect) -> str:
-    chance = f"p = {e.p_value:.2g}" if e.p_value >= 1e-4 else "p < 1e-4"
-    return f"It explains {100 * e.explained:.3g} % of what was missing (by luck: {chance})"
+    chance = "p < 1e-4" if e.p_value < 1e-4 else f"p = {e.p_value:.2g}"
+    if math.isclose(e.p_value, FLOOR):
+        chance = f"p < {FLOOR:.1g}, none of {DRAWS} draws"
+    return (
+        f"It explains {100 * e.explained:.3g} % of what was missing where it shows"
+        f" (by luck: {chance})"
+    )
 
 
 def rival_rows(found: Trace, rotary: bool) -> list[Row]:

@@ -39,3 +39,13 @@ def test_noise_depends_on_nothing() -> None:
         r = rng.normal(size=1500)
         named += bool(dependence(r, s, s["v"] > 0, np.arange(1500) * 8 // 1500).depends_on)
     assert named == 0
+
+
+def test_a_switch_is_a_signal() -> None:
+    rng = np.random.default_rng(4)
+    n = 4000
+    named = signals(n, rng)
+    named["vibration"] = np.repeat(rng.integers(0, 2, n // 100), 100).astype(np.float64)
+    r = 2.0 * named["vibration"] + 0.3 * rng.standard_normal(n)
+    found = dependence(r, named, named["v"] >= 0, np.arange(n) * 64 // n % 8)
+    assert found.depends_on[0] == "vibration"

@@ -126,3 +126,41 @@ def test_other_parameters_are_drift() -> None:
     assert set(changes) == {"F_cp", "F_vn"}
     assert changes["F_cp"].after == pytest.approx(12.0, rel=0.01)
     assert changes["F_vn"].after == pytest.approx(180.0, rel=0.01)
+
+
+def test_a_slower_test_log_is_no_drift_of_the_mass() -> None:
+    slow = made(51)
+    u = 0.15 * np.sin(2 * np.pi * 0.1 * slow["t"])
+    blank = slow.with_signals(u=u)
+    run = free_run(Plant(PLAIN, ACTUATOR), blank, (0.0, 0.0, 0.0), "command")
+    rng = np.random.default_rng(3)
+    n = len(slow)
+    calm = blank.with_signals(
+        y=run.shown + 2e-5 * rng.standard_normal(n), F=run.F + 0.4 * rng.standard_normal(n)
+    )
+    found = traced(made(11), calm)
+    assert found.verdict == "none", found.drift
+
+
+def test_scale_of_forces_is_as_exact_as_its_interval() -> None:
+    found = traced(made(11))
+    for name, true in (("k1", ACTUATOR.k1), ("k2", ACTUATOR.k2), ("m", PLAIN.m)):
+        told = found.parameters_after[name]
+        assert told.value is not None and told.sd is not None
+        assert abs(told.value - true) < 4.0 * told.sd, name
+
+
+def test_an_effect_of_the_command_is_no_rival_without_one() -> None:
+    effects = {"stribeck": {"F_s": 5.0, "v_s": 0.04}}
+    train = made(61, effects)
+    bare = Log(train.name, {k: v for k, v in train.signals.items() if k != "u"})
+    found = traced(bare)
+    named = {one.key for one in found.rivals} | {e.effect.key for e in found.effects}
+    assert not named & {"input_delay", "valve_dead_zone", "leakage"}
+
+
+def test_a_stand_in_is_not_named_beside_unknown() -> None:
+    values = {"width": 4e-4}
+    library = {k: e for k, e in built_in().items() if k != "backlash"}
+    found = traced(made(71, {"backlash": values}), library=library)
+    assert found.verdict == "unknown" and not found.effects

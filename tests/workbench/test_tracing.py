@@ -176,9 +176,11 @@ def test_what_is_left_without_structure_is_not_called_noise() -> None:
 
 def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     found = replace(trace_of("unknown", ()), unknown=Dependence((), 0.0))
-    text = sentence(traced(found))
+    text = sentence(traced(replace(found, noise_force=0.01)))
     assert text.startswith("Unknown: the model leaves 0.07 N of force")
     assert "depends on none of the signals" in text
+    text = sentence(traced(found))  # no more force than the sensors' noise: it is in the run
+    assert text.startswith("Unknown: the free run is off by") and "m in 2 s" in text
 
 
 def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:

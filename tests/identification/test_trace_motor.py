@@ -1,0 +1,95 @@
+"""Trace of motors, counted positions, noise in the logged command: what a workshop's logs are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.choice import first_stage
+from identification.differentiate import resolution
+from identification.evidence import MECHANICAL
+from identification.library import Library, built_in
+from identification.log import Log, Rig
+from identification.outcome import base_outcomes
+from identification.refit import misfit
+from identification.stage import HOPELESS, joined
+from identification.starts import starts, walks
+from identification.trace import driven_only, trace
+from identification.trace_result import Trace
+from tests.identification.motor_logs import K_A, NINE, made, plant, seen
+
+RIG = Rig("motor", force_per_command=K_A)
+COUNT = 5e-6
+
+
+def traced(train: Log, *test: Log, library: Library | None = None) -> Trace:
+    return trace([train], list(test), RIG, library or built_in(), np.random.default_rng(0))
+
+
+def counted(log: Log, step: float = COUNT) -> Log:
+    return log.with_signals(y=step * np.round(log["y"] / step))
+
+
+def test_a_counted_position_has_the_noise_of_its_step() -> None:
+    assert resolution(counted(made(2))["y"]) == pytest.approx(COUNT)
+    assert resolution(made(2)["y"]) == 0.0
+    one = seen(counted(made(2), 1e-4))
+    assert one.noise_y >= 0.9 * 1e-4 / np.sqrt(12.0)
+    still = np.zeros(200)
+    assert resolution(still) == 0.0
+
+
+def test_nothing_is_missing_on_a_motor_whose_position_is_counted() -> None:
+    found = traced(counted(made(2, n=15_000), 1e-5), counted(made(5), 1e-5))
+    assert found.verdict == "none"
+    assert found.plant.friction.m == pytest.approx(NINE.m, rel=0.01)
+
+
+def test_a_dead_zone_that_leaves_a_motor_no_force_explains_nothing() -> None:
+    one = seen(made(3, {"cogging": {"a": 4.0, "b": 0.0, "period": 0.02}}))
+    stage, _ = first_stage([one], by_command=False)
+    zone = built_in()["valve_dead_zone"]
+    whole = {"u_d": 2.0 * float(np.max(np.abs(one.log["u"]))), "asymmetry": 0.0}
+    rows = joined(stage, MECHANICAL, zone, whole, 0, stage.parts[MECHANICAL][0])
+    assert np.max(np.abs(rows.b)) > 0.1 * HOPELESS  # not 0 = 0
+    small = {"u_d": 1e-3, "asymmetry": 0.0}
+    kept = joined(stage, MECHANICAL, zone, small, 0, stage.parts[MECHANICAL][0])
+    assert -0.01 < kept.lost < 100.0
+    assert MECHANICAL in base_outcomes(stage)
+
+
+def test_a_spring_on_a_motor_is_no_dead_zone() -> None:
+    effects = {"spring": {"k": 60.0}}
+    found = traced(made(3, effects, n=15_000), made(4, effects))
+    assert [e.effect.key for e in found.effects] == ["spring"]
+    assert found.effects[0].params["k"].value == pytest.approx(60.0, rel=0.02)
+
+
+def test_noise_of_a_logged_command_is_told_from_what_a_controller_passes() -> None:
+    log, rng = made(6), np.random.default_rng(0)
+    noise = 0.3 * rng.standard_normal(len(log))
+    noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
+    assert seen(noisy).noise_F == pytest.approx(0.3, rel=0.15)
+    assert walks(seen(noisy), "command") and not walks(seen(log), "command")
+    filtered = np.convolve(log["y"], [400.0, -300.0, -100.0])[: len(log)]
+    passed = log.with_signals(F=log["F"] + filtered, u=log["u"] + filtered / K_A)
+    assert seen(passed).noise_F < 0.02
+
+
+def test_a_plant_that_walks_more_is_not_forgiven_for_it() -> None:
+    log, rng = made(6), np.random.default_rng(0)
+    noise = 0.3 * rng.standard_normal(len(log))
+    noisy = log.with_signals(F=log["F"] + noise, u=log["u"] + noise / K_A)
+    one = replace(seen(noisy), reference=NINE)
+    light = replace(plant(), friction=replace(NINE, m=0.02 * NINE.m, F_cp=1e-9, F_cn=1e-9))
+    alone = replace(one, reference=None)
+    assert misfit(light, [one], "command") > 1.5 * misfit(light, [alone], "command")
+    assert len(starts(one, "command").at) > 3
+
+
+def test_a_force_that_never_brakes_is_said_so() -> None:
+    one = seen(made(6))
+    assert driven_only([one])
+    braking = np.where(one.log["t"] % 1.0 < 0.1, -1.0, 1.0) * one.log["F"]
+    assert not driven_only([replace(one, log=one.log.with_signals(F=braking))])
+    assert any("hardly ever opposes" in line for line in traced(made(6)).remarks)
