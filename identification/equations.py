@@ -7,6 +7,7 @@ from identification.effects._base import Effect, Param
 from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR, MECHANICAL, REST
 
 Values = Mapping[str, float]
+TRIFLE = 0.05  # of an effect's largest size, by which another may lie out of bounds
 
 
 def equations_of(effect: Effect, by_command: bool, held: bool = False) -> tuple[str, ...]:
@@ -63,5 +64,13 @@ def symbols_of(effect: Effect) -> set[str]:
 
 
 def admissible(effect: Effect, values: Values) -> bool:
-    """Whether every parameter lies within its bounds."""
-    return all(p.low <= values[p.name] <= p.high for p in effect.params)
+    """Whether every parameter lies within its bounds.
+
+    One size of several may lie a trifle beyond: one that is 0 comes out on either side of it.
+    """
+    most = max((abs(values[name]) for name in effect.linear), default=0.0)
+
+    def slack(p: Param) -> float:
+        return TRIFLE * most if p.linear else 0.0
+
+    return all(p.low - slack(p) <= values[p.name] <= p.high + slack(p) for p in effect.params)
