@@ -7,7 +7,15 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.before_after import seen_by
 from identification.choice import Step
-from identification.evidence import ACTUATOR, FIVE, MECHANICAL, Moving, Rows, stacked
+from identification.evidence import (
+    ACTUATOR,
+    FIVE,
+    MECHANICAL,
+    Moving,
+    Rows,
+    column_noise,
+    stacked,
+)
 from identification.left_over import FEWEST_ROWS
 from identification.log import Rig
 from identification.outcome import Outcome
@@ -15,7 +23,6 @@ from identification.plant import units_of
 from identification.stage import Stage
 from identification.structure import OVERLAP, Model, band
 from identification.trace_result import Change
-from identification.weak_form import noise_gain, weights
 
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed has to gain
 DRIFT_SHARE = 0.1  # of the test logs' square error that it has to take away
@@ -38,9 +45,7 @@ def drift(
             slowest = max(mine.slowest, band(after)) if equation == MECHANICAL else mine.slowest
             keep = rows.speed >= slowest
             if np.count_nonzero(keep) >= FEWEST_ROWS:
-                blur = np.sum(
-                    (column_noise(stage, equation) / rows.sd[:, np.newaxis] ** 2)[keep], 0
-                )
+                blur = _blur(stage, equation, rows, keep)
                 out += [
                     Change(name, units[name], *change)
                     for name, *change in changes(mine, rows, keep, names, blur)
@@ -48,26 +53,14 @@ def drift(
     return tuple(out)
 
 
-def column_noise(stage: Stage, equation: str) -> Array:
-    """Variance that the position's noise gives each column of an equation, (r, k).
+def _blur(stage: Stage, equation: str, rows: Rows, keep: BoolArray) -> Array:
+    """Square sum (k,) that the position's noise makes of each whitened column.
 
-    Noise in a column draws its parameter to 0, the more the calmer the motion: without it a mass
-    in fast motion would seem to be another in slow motion.
+    The plain columns come first; those of effects are taken as they are.
     """
-    out = []
-    for one, rows in zip(stage.logs, stage.parts[equation], strict=True):
-        windows = one.sliding if equation == MECHANICAL else one.whole
-        assert windows is not None
-        _, first, second, *_ = weights(windows.length, one.log.h)
-        variance = np.zeros((len(rows.b), rows.X.shape[1]))
-        if equation == MECHANICAL:
-            variance[:, 0] = one.noise_y**2 * noise_gain(second)
-            variance[:, 3] = one.noise_y**2 * noise_gain(first) * one.up
-            variance[:, 4] = one.noise_y**2 * noise_gain(first) * ~one.up
-        else:
-            variance[:, 1] = one.noise_y**2 * noise_gain(first)
-        out.append(variance)
-    return np.concatenate(out)
+    noise = np.concatenate([column_noise(one, equation) for one in stage.logs])
+    plain = np.sum((noise / rows.sd[:, np.newaxis] ** 2)[keep], axis=0)
+    return np.pad(plain, (0, rows.X.shape[1] - len(plain)))
 
 
 def changes(

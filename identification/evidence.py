@@ -89,7 +89,7 @@ class Fitted:
     cost: float
 
 
-def local_noise(x: Array, h: float) -> float:
+def local_noise(x: Array) -> float:
     """White noise of a signal (one sigma) from the quiet part of it; a fast input does not count.
 
     Third differences in short stretches: motion and input raise most of them, noise is in all.
@@ -123,13 +123,12 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
         **{k: np.asarray(v) for k, v in log.signals.items()},
         "v": motion.v, "a": motion.a, "smooth": motion.y, "d": d, "u": u,
     }  # fmt: skip
+    up, slowest = d[sliding.middle] > 0, np.min(view[sliding.start], axis=1)
     whole = all_windows(len(log), length, h) if by_command else None
-    noise_F = _beside_control(log) if held else local_noise(log["F"], h)
-    one = Moving(
-        log, signals, sliding, d[sliding.middle] > 0, np.min(view[sliding.start], axis=1), whole,
-        min(motion.noise, max(local_noise(log["y"], h), resolution(log["y"]) / np.sqrt(12.0))),
-        noise_F, held, motion.v_noise,
-    )  # fmt: skip
+    of_counts = resolution(log["y"]) / np.sqrt(12.0)
+    noise_y = min(motion.noise, max(local_noise(log["y"]), of_counts))
+    noise_F = _beside_control(log) if held else local_noise(log["F"])
+    one = Moving(log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise)
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 
@@ -164,7 +163,7 @@ def _unexplained(one: Moving) -> float:
     k1, k2, _ = solve(actuator(one, np.array([1.0, 0.0, 0.0]))).theta
     h = one.log.h
     force = one.log["F"] - k1 * integral(one.log["u"], h) + k2 * one.signals["smooth"]
-    return local_noise(force, h)
+    return local_noise(force)
 
 
 def mechanical(one: Moving, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
@@ -208,6 +207,23 @@ def actuator(one: Moving, theta: Array, y: Array | None = None, u: Array | None 
         w.first @ one.log["F"], X, np.full(r, sd), _blocks(w, len(one.log)), np.full(r, np.inf),
         ("k1", "k2", "offset"),
     )  # fmt: skip
+
+
+def column_noise(one: Moving, equation: str) -> Array:
+    """Variance (r, k) that the position's noise gives each column of an equation's rows.
+
+    Noise in a column draws its parameter to 0, the more the calmer the motion: without it a mass
+    in fast motion would seem to be another in slow motion.
+    """
+    w = one.sliding if equation == MECHANICAL else one.whole
+    assert w is not None
+    _, first, second, *_ = weights(w.length, one.log.h)
+    none = np.zeros(len(w.start))
+    slow = none + one.noise_y**2 * noise_gain(first)
+    if equation == ACTUATOR:
+        return np.column_stack([none, slow, none])
+    fast = none + one.noise_y**2 * noise_gain(second)
+    return np.column_stack([fast, none, none, slow * one.up, slow * ~one.up])
 
 
 def integral(u: Array, h: float) -> Array:

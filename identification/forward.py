@@ -182,7 +182,7 @@ def _beside(
             continue
         if setting.drive == "force" and effect.acts in IN_ACTUATOR:
             continue
-        if key in shown or in_run(effect):
+        if key in shown or seen_in_run(effect):
             values = [inside(effect, regressed[key])] if key in regressed else []
             if values and effect.acts == "stiction":  # breakaways show less of it than there is
                 values = [
@@ -194,7 +194,7 @@ def _beside(
                 yield Trial(steps, base, effect, values)
 
 
-def in_run(effect: Effect) -> bool:
+def seen_in_run(effect: Effect) -> bool:
     """Whether a free run may show the effect where the equations do not.
 
     One with a speed of its own shows in slow motion, most of which the equations leave out: a
@@ -210,7 +210,7 @@ def slow_motion(effect: Effect) -> bool:
 
 def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
     """Values from which an effect that the equations hardly show is tried."""
-    if not in_run(effect):
+    if not seen_in_run(effect):
         return []
     if effect.signals and not all(any(k in one.log for k in effect.signals) for one in logs):
         return []
@@ -264,7 +264,7 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
 
 def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
     """The plant refined a little on the short logs."""
-    if in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
+    if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         band = max(p.dv_p, -p.dv_n)
         plant = start_band(plant, setting.short, setting.drive, band)

@@ -19,7 +19,7 @@ from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
-from identification.starts import SECONDS, WHOLE, freed, left, starts, walks
+from identification.starts import SECONDS, WHOLE, freed, left, starts, walks, window_of
 
 FIRST = 1.0  # s, of the windows in which the search begins
 RESCUES = 3  # searches beside, of a run that leaves more than noise
@@ -223,9 +223,6 @@ def refit(
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
         return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
 
-    def polished(at: Minimum) -> Minimum:
-        return gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
-
     slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
@@ -259,7 +256,7 @@ def refit(
         if better > SAME * before:
             break
     if at.followed and not quick:
-        finer = polished(at)
+        finer = gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
         left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
         if left_by < max(found, COMPLETE):
             at, found = finer, left_by
@@ -279,11 +276,10 @@ def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
     """Number of the window of every sample over all logs, (n,)."""
     parts, count = [], 0
     for one in logs:
-        begun = starts(one, drive).at
-        window = np.searchsorted(begun, np.arange(len(one.log)), side="right") - 1
-        parts.append(window + count)
-        count += len(begun)
-    return np.concatenate(parts).astype(np.int64)
+        begun = starts(one, drive)
+        parts.append(window_of(begun, len(one.log)) + count)
+        count += len(begun.at)
+    return np.concatenate(parts)
 
 
 def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:

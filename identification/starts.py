@@ -78,6 +78,11 @@ def starts(one: Moving, drive: Drive, seconds: float = SECONDS) -> Starts:
     )
 
 
+def window_of(begun: Starts, n: int) -> IntArray:
+    """Number of the window that each of n samples is in, (n,)."""
+    return np.searchsorted(begun.at, np.arange(n), side="right").astype(np.int64) - 1
+
+
 def window_run(
     plant: Plant, one: Moving, drive: Drive, begun: Starts, shift: Array | None = None,
     log: Log | None = None,
@@ -189,7 +194,7 @@ def freed(
     base = window_run(plant, one, drive, begun)
     if base is None:
         return None
-    window = np.searchsorted(begun.at, np.arange(len(one.log)), side="right") - 1
+    window = window_of(begun, len(one.log))
     r = errors(base, one, drive)
     weight = np.ones(r.shape) if even else _sureness(plant, one, drive, begun, base, r)
     B = np.zeros((3, *r.shape))
@@ -205,7 +210,7 @@ def freed(
     count = len(begun.at)
     sums = [[np.bincount(window, gram[i, j], count) for j in range(3)] for i in range(3)]
     inverse = np.linalg.inv(np.eye(3) + np.moveaxis(np.array(sums), 2, 0))
-    return Freed(begun, window.astype(np.int64), weight, B, inverse)
+    return Freed(begun, window, weight, B, inverse)
 
 
 def _sureness(

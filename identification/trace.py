@@ -5,7 +5,7 @@ The choice is made on the two equations in weak form and on rest and breakaway (
 plant with the effects found is then refined on its free run (`refit`).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -144,20 +144,7 @@ def trace(
         if not left.depends_on and not after.led:
             left = in_run(after, logs, drive)
     slowest = choice.base[MECHANICAL].slowest
-    if after.led:
-        remarks.append("the motion is imposed (inertia is of no account): no free run is judged")
-    elif choice.steps and after.misfit > ASTRAY:
-        remarks.append(
-            f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
-            " band and stick limits are not to be trusted, or more is missing"
-        )
-    if not after.led and driven_only(logs):
-        remarks.append(
-            "the force hardly ever opposes the motion: friction in proportion to it would change"
-            " mass and friction by one factor and not show (a run that brakes hard would show it)"
-        )
-    if not seen:
-        remarks.append("no test log: the test errors are those of stretches left out in turn")
+    remarks += _remarks(choice, after, logs, seen)
     return Trace(
         verdict=verdict,
         before=errors_of(before, slowest, (), logs, seen, drive),
@@ -177,6 +164,26 @@ def trace(
         residuals=_residuals(choice.start, choice.first, choice.end, choice.base),
         remarks=tuple(remarks),
     )
+
+
+def _remarks(
+    choice: Choice, after: Model, logs: Sequence[Moving], seen: Sequence[Moving]
+) -> Iterator[str]:
+    """What whoever reads the trace has to know of it."""
+    if after.led:
+        yield "the motion is imposed (inertia is of no account): no free run is judged"
+    elif choice.steps and after.misfit > ASTRAY:
+        yield (
+            f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
+            " band and stick limits are not to be trusted, or more is missing"
+        )
+    if not after.led and driven_only(logs):
+        yield (
+            "the force hardly ever opposes the motion: friction in proportion to it would change"
+            " mass and friction by one factor and not show (a run that brakes hard would show it)"
+        )
+    if not seen:
+        yield "no test log: the test errors are those of stretches left out in turn"
 
 
 def doubted(

@@ -20,7 +20,7 @@ from workbench.fleet.work import work
 from workbench.recording import as_columns, record
 from workbench.registry.values import Version
 
-URL = "memory://work"
+URL = "memory://bench"
 VERSION = Version("a", 3, "m", None, None, datetime(2026, 3, 1, tzinfo=UTC))
 
 
@@ -42,10 +42,10 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     for name, table in tables.items():
         buffer = BytesIO()
         table.to_parquet(buffer)
-        memory.pipe(f"/work/{name}.parquet", buffer.getvalue())
-    memory.pipe("/work/cut.parquet", memory.cat_file("/work/good.parquet")[:5000])
+        memory.pipe(f"/bench/{name}.parquet", buffer.getvalue())
+    memory.pipe("/bench/cut.parquet", memory.cat_file("/bench/good.parquet")[:5000])
     yield folder
-    memory.rm("/work", recursive=True)
+    memory.rm("/bench", recursive=True)
 
 
 def done(name: str, card: str | None = None, in_force: Result | None = None) -> Result:
@@ -97,6 +97,6 @@ def test_a_bad_card_leaves_the_log_waiting(place: Path) -> None:
 
 def test_a_log_that_has_gone_is_set_aside(place: Path) -> None:
     (log,) = (one for one in find_logs(URL) if one.machine == "good")
-    found = work(Item(URL, replace(log, path="/work/none.parquet"), card_text(), 0))
+    found = work(Item(URL, replace(log, path="/bench/none.parquet"), card_text(), 0))
     assert (found.verdict, found.sha256) == ("set_aside", "")
     assert "cannot be fetched" in found.reason
