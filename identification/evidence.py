@@ -132,6 +132,14 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 
+def shortened(one: Moving, seconds: float) -> Moving:
+    """The first seconds of a log with its motion."""
+    n = min(len(one.log), max(2, round(seconds / one.log.h)))
+    cut = Log(one.log.name, {key: x[:n] for key, x in one.log.signals.items()})
+    short = moving(cut, held=one.held, by_command=one.whole is not None)
+    return replace(short, reference=one.reference)
+
+
 def _beside_control(log: Log) -> float:
     """Noise of a motor's logged force [N] beside the position's noise that its controller passes.
 

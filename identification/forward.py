@@ -9,38 +9,39 @@ nothing but noise, so a term that merely helps is never taken here.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import product, takewhile
 
 import numpy as np
 from scipy.stats import chi2
 
+from identification.approach import approach, closer, judge_led, less_load
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
-from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
-from identification.effects._base import MAX_SIGNALS, Acting, Effect, Param
+from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, material, settled
+from identification.effects._base import Effect, Param
 from identification.equations import by_load, equations_of
 from identification.errors import UserError
-from identification.evidence import IN_ACTUATOR, Moving
+from identification.evidence import IN_ACTUATOR, REST, Moving
 from identification.grids import shape_grid
-from identification.karnopp import Karnopp
 from identification.library import Library
-from identification.outcome import Outcome
+from identification.log import Rig
+from identification.outcome import Outcome, spread
 from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, judge, loss, refit, start_band
+from identification.refit import COMPLETE, Refit, even, judge, loose, loss, refit, start_band
 from identification.rest import stretches
 from identification.result import Drive
-from identification.stage import LOCKED, Stage
+from identification.stage import Stage
 from identification.starts import SECONDS, starts
-from identification.structure import Model, inside
+from identification.structure import Model, band, inside, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found here is taken
 HALF = 0.5  # of the excess misfit before, at most
 NEAR, ALONE = 8.0, 0.15  # misfit, and share of any rival's excess, up to which it is taken too
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 WALKED = 3.0  # misfit that the noise of a measured force may leave
+STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
-SHORT = 15.0  # s of each log in which all are tried first
 SHOWN = 3  # rivals of an effect taken that are tried in its place
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
@@ -82,17 +83,69 @@ class Setting:
     logs: Sequence[Moving]
     short: Sequence[Moving]
     drive: Drive
+    rig: Rig
     library: Library
     start: Stage
     first: Mapping[str, Outcome]
     plain: Model
+    rng: np.random.Generator
+
+
+def fitted(choice: Choice, setting: Setting) -> Model:
+    """The model of a choice made on the equations."""
+    near = None if setting.plain.led else setting.plain.plant.friction
+    return model_of(
+        choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
+        setting.rng, near=near,
+    )  # fmt: skip
+
+
+def without_slow(choice: Choice) -> Choice:
+    """The choice up to the first effect of slow motion, which is left to the run to find.
+
+    While the band is not known, the passage through it may have been taken for one, and what was
+    chosen after it was chosen beside it.
+    """
+    stay = tuple(takewhile(lambda one: not slow_motion(one.candidate.effect), choice.steps))
+    if len(stay) == len(choice.steps):
+        return choice
+    end, base = with_steps(stay, choice.start, choice.first)
+    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
+
+
+def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:
+    """Without an effect of slow motion that the run does as well without, or that its band hides.
+
+    While the band was not known, the passage through it may have been taken for such an effect.
+    """
+    for step in choice.steps:
+        if not slow_motion(step.candidate.effect):
+            continue
+        stay = tuple(one for one in choice.steps if one is not step)
+        end, base = with_steps(stay, choice.start, choice.first)
+        less = Choice(choice.start, choice.first, stay, end, base, choice.tried)
+        keys = {one.candidate.effect.key for one in stay}
+        plant = after.plant
+        plant = replace(plant, effects=tuple(a for a in plant.effects if a.key in keys))
+        found = _refined(plant, setting)
+        other = Model(end, base, found.plant, found.sd, False, found.misfit)
+        if other.misfit > COMPLETE:
+            again = fitted(less, setting) if stay else setting.plain
+            other = again if again.misfit < other.misfit else other
+        beyond = replace(step.stage, band=band(after))
+        shows = material(step.candidate, beyond, step.base)
+        if not shows or other.misfit <= NEEDLESS * after.misfit:
+            choice, after = less, other
+    return choice, after
 
 
 def judged_forward(
     choice: Choice, model: Model, setting: Setting, report: Report
 ) -> tuple[Choice, Model]:
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
-    if model.led:
+    # On bristles a run takes ten times as long, and where all of it is searched, too long.
+    slow = any(acting.effect.acts == "bristle" for acting in model.plant.effects)
+    if model.led or (slow and loose(model.plant, setting.drive)):
         return choice, model
     least = DECISIVE if setting.drive == "command" else WALKED
     if model.misfit > max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0)):
@@ -177,12 +230,16 @@ def _beside(
     regressed = {one.effect.key: one.values for one in tried}
     ranked = sorted(tried, key=lambda one: -one.gain)
     shown = {one.effect.key for one in ranked[: SHOWN if instead else 0]}
+    free = loose(base, setting.drive)
     for key, effect in setting.library.items():
         if key in keys or key in ABSORBED:
             continue
         if setting.drive == "force" and effect.acts in IN_ACTUATOR:
             continue
-        if key in shown or seen_in_run(effect):
+        if effect.acts == "bristle" and rigid(setting.first):
+            continue
+        # Where every trial is a search, what the equations chose is not contested by all.
+        if key in shown or (seen_in_run(effect) and not (instead and free)):
             values = [inside(effect, regressed[key])] if key in regressed else []
             if values and effect.acts == "stiction":  # breakaways show less of it than there is
                 values = [
@@ -192,6 +249,11 @@ def _beside(
             values += grid(effect, base, setting.short)
             if values:
                 yield Trial(steps, base, effect, values)
+
+
+def rigid(first: Mapping[str, Outcome]) -> bool:
+    """Whether the body is seen at rest and does not move there: on bristles it would."""
+    return REST in first and spread(first[REST]) < STILL
 
 
 def seen_in_run(effect: Effect) -> bool:
@@ -245,13 +307,18 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
             continue
     if not plants:
         return None
-    errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
+    free = loose(plants[0], setting.drive)
+    if free:
+        errors_of = judge_led(plants[0], setting.short, setting.drive, 1.0)
+    else:
+        errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
     try:
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
         at = int(np.argmin(costs))
         # The plain parameters are bent to do without it: a larger size may be the better start.
-        more = LARGER if trial.effect.acts == "sensor" and len(trial.effect.params) == 1 else 1
+        of_one = trial.effect.acts == "sensor" and len(trial.effect.params) == 1
+        more = LARGER if of_one and not free else 1
         found = _near(plants[at], trial.effect, setting)
         for one in plants[at + 1 : at + more]:
             if found.misfit > WORTH * enough:
@@ -264,6 +331,9 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
 
 def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
     """The plant refined a little on the short logs."""
+    if loose(plant, setting.drive):
+        plant = approach(plant, setting.short, setting.drive, setting.rng)
+        return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         band = max(p.dv_p, -p.dv_n)
@@ -271,35 +341,21 @@ def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
     return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 
-def less_load(base: Plant, acting: Acting) -> Plant:
-    """The plant with what friction by load takes of the force taken off its own parameters."""
-    p = base.friction
-    none = np.zeros(MAX_SIGNALS)
-    share = 1.0 - acting.effect.value(
-        0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, p.F_cp, p.F_cp, none, acting.array
-    )
-    array = p.array * max(share, LOCKED)
-    array[5:7] = p.array[5:7]
-    return replace(base, friction=Karnopp.from_array(array))
-
-
-def even(plant: Plant) -> dict[str, float]:
-    """A prior that holds every asymmetry that is 0, and nothing else."""
-    return {
-        f"{a.key}.{name}": 0.0
-        for a in plant.effects
-        for name, value in a.values.items()
-        if name == "asymmetry" and value == 0.0
-    }
-
-
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    found = refit(one.plant, setting.logs, setting.drive, prior=even(one.plant), effort="near")
+    found = _refined(one.plant, setting)
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
     return found
+
+
+def _refined(plant: Plant, setting: Setting) -> Refit:
+    """The plant refined on the whole logs from close by."""
+    logs, drive = setting.logs, setting.drive
+    if loose(plant, drive):
+        return closer(plant, logs, drive, setting.rng)
+    return refit(plant, logs, drive, prior=even(plant), effort="near")
 
 
 def _taken(
@@ -342,11 +398,12 @@ def _as_candidate(
 def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
     """Without the effects that a run which is followed does as well without."""
     for step in choice.steps:
-        if len(choice.steps) < 2 or model.misfit > NEAR:
+        free = loose(model.plant, setting.drive)
+        if (len(choice.steps) < 2 and not free) or model.misfit > NEAR:
             break
         stay = tuple(one for one in choice.steps if one is not step)
         base = without(model, stay, setting)
-        found = refit(base, setting.logs, setting.drive, prior=even(base), effort="near")
+        found = _refined(base, setting)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
         end, outcomes = with_steps(stay, setting.start, setting.first)

@@ -19,7 +19,7 @@ from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
-from identification.starts import SECONDS, WHOLE, freed, left, starts, walks, window_of
+from identification.starts import COARSE, SECONDS, WHOLE, freed, left, starts, walks, window_of
 
 FIRST = 1.0  # s, of the windows in which the search begins
 RESCUES = 3  # searches beside, of a run that leaves more than noise
@@ -28,6 +28,7 @@ WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
+NEARLY, FINE = 20.0, 1e-4  # misfit up to which, and s: sub-step with which a bristle is refined
 LONG = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 LOST = 1e6  # error of a run that cannot be followed
@@ -121,14 +122,29 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
     return Plant(Karnopp(*nine), actuator, tuple(effects))
 
 
+def even(plant: Plant) -> dict[str, float]:
+    """A prior that holds every asymmetry that is 0, and nothing else."""
+    return {
+        f"{a.key}.{name}": 0.0
+        for a in plant.effects
+        for name, value in a.values.items()
+        if name == "asymmetry" and value == 0.0
+    }
+
+
 Effort = Literal["quick", "near", "whole"]
 Judge = Callable[[Plant], Array]
 
 
-def judge(plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float) -> Judge:
+def judge(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float, bristle: float = COARSE
+) -> Judge:
     """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
-    force) over all logs, less what the windows' unsure states account for."""
-    free = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
+    force) over all logs, less what the windows' unsure states account for.
+
+    bristle [s]: longest sub-step of one.
+    """
+    free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
     sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
 
     def errors_of(tried: Plant) -> Array:
@@ -216,9 +232,11 @@ def refit(
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 
-    def refined(x: Array, seconds: float, tie: bool, part: float = 0.0) -> Minimum:
+    def refined(
+        x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE
+    ) -> Minimum:
         now = plant_with(plant, names, full(x))
-        errors_of = judge(now, logs, drive, seconds)
+        errors_of = judge(now, logs, drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
         return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
@@ -260,6 +278,12 @@ def refit(
         left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
         if left_by < max(found, COMPLETE):
             at, found = finer, left_by
+    if slow and not quick and COMPLETE < found < NEARLY and loose(plant, drive):
+        # Without a spring the errors of the sub-steps add up.
+        trial = refined(at.x, SECONDS, False, bristle=FINE)
+        left_by = misfit(plant_with(plant, names, full(trial.x)), logs, drive, FINE)
+        if left_by < found:
+            at, found = trial, left_by
     best = plant_with(plant, names, full(at.x))
 
     def spread() -> Array:
@@ -282,17 +306,19 @@ def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
     return np.concatenate(parts)
 
 
-def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
+def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive, bristle: float = COARSE) -> float:
     """What the free run leaves of that signal of that log which it follows worst.
 
-    Robust mean square in units of the sensors' noise: 1 where noise alone is left.
+    Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
+    longest sub-step of one.
     """
     worst = 0.0
     for one in logs:
         least = LOST  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not walks(one, drive)
         for seconds in (SECONDS, WHOLE) if whole else (SECONDS,):
-            r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive, seconds)))
+            begun = starts(one, drive, seconds, bristle)
+            r = left(plant, one, drive, freed(plant, one, drive, begun))
             if r is not None:
                 least = min(least, max(loss(own) / len(own) / NOISE_LOSS for own in r))
         worst = max(worst, least)
@@ -302,6 +328,11 @@ def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float:
 def plant_is_motor(plant: Plant) -> bool:
     """Whether a motor drives it, whose position nothing brings back."""
     return isinstance(plant.actuator, Motor)
+
+
+def loose(plant: Plant, drive: Drive) -> bool:
+    """Whether a force drives it and nothing brings its position back to the log's."""
+    return drive == "force" or plant_is_motor(plant)
 
 
 @dataclass(frozen=True, eq=False)

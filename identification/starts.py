@@ -22,8 +22,9 @@ from identification.simulate import FreeRun, free_run
 
 SECONDS = 2.0  # of a window
 REACH = 0.45  # of a window, within which a rest is looked for
+FAST = 0.5  # of the usual speed, at which a window begins where there is no rest near
 LATER = 2.0  # windows by which a start is put off until there is a rest
-COARSE = 5e-4  # s, sub-step of a bristle: errs by a tenth of the noise, enough for a search
+COARSE = 5e-4  # s, sub-step of a bristle: errs by a tenth of the noise where a spring holds it
 LEAST_REST = 24  # samples
 SURE = 3.0  # deviations of the velocity from which a body creeps
 WIDEST = 50  # samples on either side by which a creep is seen
@@ -39,7 +40,8 @@ STEP = 0.3  # of a state's deviation, by which the change with it is taken
 class Starts:
     """Samples (k,) at which the windows of a log begin, states there, and their deviations.
 
-    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known.
+    y [m], v [m/s] (0 at rest), F [N]; sd (3, k) of y, v, F: 0 where a state is known. step [s]:
+    longest sub-step of a bristle in the runs.
     """
 
     at: IntArray
@@ -47,10 +49,14 @@ class Starts:
     v: Array
     F: Array
     sd: Array
+    step: float = COARSE
 
 
-def starts(one: Moving, drive: Drive, seconds: float = SECONDS) -> Starts:
-    """Windows of about so many seconds, begun at rest where the body rests near by."""
+def starts(one: Moving, drive: Drive, seconds: float = SECONDS, bristle: float = COARSE) -> Starts:
+    """Windows of about so many seconds, begun at rest where the body rests near by.
+
+    bristle [s]: longest sub-step of one.
+    """
     n, h = len(one.log), one.log.h
     step = max(2, round(min(seconds / h, 2.0 * n)))
     y = np.asarray(one.log["y"])
@@ -75,6 +81,7 @@ def starts(one: Moving, drive: Drive, seconds: float = SECONDS) -> Starts:
         np.where(rest, 0.0, one.signals["v"][index]),
         np.asarray(one.log["F"])[index],
         sd,
+        bristle,
     )
 
 
@@ -98,7 +105,13 @@ def window_run(
     def run_from(y: Array) -> FreeRun:
         start = (float(y[0]), float(v[0]), float(F[0]))
         return free_run(
-            plant, driven, start, drive, restarts=(begun.at, y, v), forces=F, bristle_step=COARSE
+            plant,
+            driven,
+            start,
+            drive,
+            restarts=(begun.at, y, v),
+            forces=F,
+            bristle_step=begun.step,
         )
 
     sensors = [acting.effect for acting in plant.effects if acting.effect.acts == "sensor"]
@@ -125,7 +138,7 @@ def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
 
 
 def _next(one: Moving, wanted: int, step: int, rests: IntArray) -> int:
-    """Sample near `wanted` from which a run may start anew: at rest, else in the calmest motion."""
+    """Sample near `wanted` from which a run may start anew: at rest, else in calm motion."""
     reach = int(REACH * step)
     near = rests[np.abs(rests - wanted) <= reach]
     if len(near):
@@ -133,9 +146,15 @@ def _next(one: Moving, wanted: int, step: int, rests: IntArray) -> int:
     later = rests[(rests > wanted) & (rests <= wanted + LATER * step)]
     if len(later):
         return int(later[0])
-    span = np.arange(wanted - reach, min(wanted + reach, len(one.log) - 1))
-    pace = np.where(one.signals["d"][span] != 0, np.abs(one.signals["a"][span]), np.inf)
-    return int(span[np.argmin(pace)])
+    # Near the band a state within its noise may stop or not: what is sure of itself is fast.
+    speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
+    enough = FAST * float(np.median(speed[speed > 0.0])) if np.any(speed) else 0.0
+    last = len(one.log) - 1
+    span = np.arange(wanted - reach, min(wanted + reach, last))
+    if np.max(speed[span]) < enough:
+        span = np.arange(wanted - reach, min(wanted + round(LATER * step), last))
+    fast = speed[span] >= min(enough, FAST * float(np.max(speed[span])))
+    return int(span[np.argmin(np.where(fast, np.abs(one.signals["a"][span]), np.inf))])
 
 
 def _rests(one: Moving) -> IntArray:

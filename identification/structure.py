@@ -5,16 +5,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.approach import SEARCHES, closest, less_load
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step
 from identification.effects._base import Effect
+from identification.equations import by_load
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
 from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Actuator, Motor, Plant
-from identification.refit import COMPLETE, RESCUES, refit
+from identification.refit import COMPLETE, RESCUES, loose, refit
 from identification.result import Drive
 from identification.stage import Stage
 
@@ -45,11 +47,12 @@ class Model:
 
 def model_of(
     stage: Stage, outcomes: Mapping[str, Outcome], steps: Sequence[Step], logs: Sequence[Moving],
-    drive: Drive, rig: Rig, *, near: Karnopp | None = None,
+    drive: Drive, rig: Rig, rng: np.random.Generator, *, near: Karnopp | None = None,
 ) -> Model:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
-    near: band and stick limits to begin from too, where those of the regression lead nowhere.
+    rng: of the search where nothing holds the run to the log's position; near: band and stick
+    limits to begin from too, where those of the regression lead nowhere.
     """
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     prior: dict[str, float] = {}
@@ -85,13 +88,23 @@ def model_of(
         return Model(stage, outcomes, plant, prior, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do.
     missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
-    rescues = 0 if steps and missing else RESCUES
+    free = loose(plant, drive)
+    rescues = 0 if free or (steps and missing) else RESCUES
     done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior, rescues=rescues)
-    if near is not None and done.misfit > COMPLETE:
+    if near is not None and not free and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
         beside = replace(plant, friction=replace(nine, **same))
         wide = max(near.dv_p, -near.dv_n)
         other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
+        done = other if other.misfit < done.misfit else done
+    if free and done.misfit > COMPLETE and not (steps and missing):
+        begin = done.plant
+        if near is not None and any(by_load(a.effect) for a in acting):
+            # What the plain run tells is what the load leaves of it.
+            begin = replace(plant, friction=near)
+            for one in acting:
+                begin = less_load(begin, one) if by_load(one.effect) else begin
+        other = closest(begin, logs, drive, rng, 1 if missing else SEARCHES)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.approach import SHORT
 from identification.before_after import errors_of, noise_of
 from identification.candidates import Candidate
 from identification.choice import (
@@ -18,7 +19,6 @@ from identification.choice import (
     Step,
     choose,
     first_stage,
-    material,
     merit,
     rough,
     share,
@@ -26,15 +26,23 @@ from identification.choice import (
 from identification.drift import drift
 from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
-from identification.evidence import ACTUATOR, MECHANICAL, Moving, actuator, moving, solve, stacked
+from identification.evidence import (
+    ACTUATOR,
+    MECHANICAL,
+    Moving,
+    actuator,
+    moving,
+    shortened,
+    solve,
+    stacked,
+)
 from identification.forward import (
     DECISIVE,
-    NEEDLESS,
-    SHORT,
     Setting,
+    doubted,
+    fitted,
     judged_forward,
-    slow_motion,
-    with_steps,
+    without_slow,
 )
 from identification.held_out import left_out
 from identification.karnopp import NAMES
@@ -52,7 +60,7 @@ from identification.log import Log, Rig
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
-from identification.refit import COMPLETE, refit
+from identification.refit import COMPLETE, loose, refit
 from identification.result import Drive, Estimate
 from identification.stage import Stage
 from identification.structure import Model, band, model_of, untold
@@ -105,8 +113,9 @@ def trace(
     report("tracing", 0.0)
     drive: Drive = "command" if by_command or held else "force"
     start, first = first_stage(logs, by_command)
-    before = model_of(start, first, (), logs, drive, rig)
-    if not before.led and before.misfit > COMPLETE and not rough(first):
+    before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
+    found = before.led or before.misfit <= COMPLETE or loose(before.plant, drive)
+    if not found and not rough(first):
         before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
         logs = [replace(one, reference=before.plant.friction) for one in logs]
@@ -118,18 +127,17 @@ def trace(
         library = {}
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
+    short = [shortened(one, SHORT) for one in logs]
+    setting = Setting(logs, short, drive, rig, library, start, first, before, rng.spawn(1)[0])
     after = before
+    unsure = start.band == 0.0 and not before.led
+    if unsure and loose(before.plant, drive):
+        choice = without_slow(choice)
     if choice.steps:
-        near = None if before.led else before.plant.friction
-        after = model_of(choice.end, choice.base, choice.steps, logs, drive, rig, near=near)
-        if start.band == 0.0 and not before.led:
-            choice, after = doubted(choice, before, after, logs, drive, rig)
+        after = fitted(choice, setting)
+        if unsure:
+            choice, after = doubted(choice, after, setting)
     report("judging", 0.0)
-    short = [
-        replace(moving(cut(log, SHORT), held=held, by_command=by_command), reference=one.reference)
-        for log, one in zip(train, logs, strict=True)
-    ]
-    setting = Setting(logs, short, drive, library, start, first, before)
     choice, after = judged_forward(choice, after, setting, report)
     if useless(choice, before, after):
         choice, after = Choice(start, first, (), start, first, choice.tried), before
@@ -186,30 +194,6 @@ def _remarks(
         yield "no test log: the test errors are those of stretches left out in turn"
 
 
-def doubted(
-    choice: Choice, before: Model, after: Model, logs: Sequence[Moving], drive: Drive, rig: Rig
-) -> tuple[Choice, Model]:
-    """Without an effect of slow motion that the run does as well without, or that its band hides.
-
-    While the band was not known, the passage through it may have been taken for such an effect.
-    """
-    for step in choice.steps:
-        if not slow_motion(step.candidate.effect):
-            continue
-        stay = tuple(one for one in choice.steps if one is not step)
-        end, base = with_steps(stay, choice.start, choice.first)
-        other = before
-        if stay:
-            near = before.plant.friction
-            other = model_of(end, base, stay, logs, drive, rig, near=near)
-        beyond = replace(step.stage, band=band(after))
-        shows = material(step.candidate, beyond, step.base)
-        if not shows or other.misfit <= NEEDLESS * after.misfit:
-            choice = Choice(choice.start, choice.first, stay, end, base, choice.tried)
-            after = other
-    return choice, after
-
-
 def useless(choice: Choice, before: Model, after: Model) -> bool:
     """Whether effects explain neither the run nor, to the sensors' noise, the equations.
 
@@ -218,8 +202,9 @@ def useless(choice: Choice, before: Model, after: Model) -> bool:
     """
     if after.led or not choice.steps:
         return False
-    told = [choice.base[e] for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    if all(spread(o) <= MUCH**2 for o in told):
+    told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
+    lacked = any(spread(choice.first[e]) > MUCH**2 for e in told)
+    if lacked and all(spread(choice.base[e]) <= MUCH**2 for e in told):
         return False
     return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
 
@@ -245,12 +230,6 @@ def driven_only(logs: Sequence[Moving]) -> bool:
         (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
     ]
     return bool(np.mean(np.concatenate(against)) < BRAKES)
-
-
-def cut(log: Log, seconds: float) -> Log:
-    """The first seconds of a log."""
-    n = min(len(log), max(2, round(seconds / log.h)))
-    return Log(log.name, {key: x[:n] for key, x in log.signals.items()})
 
 
 def _by_command(train: Sequence[Log], rig: Rig, remarks: list[str]) -> bool:

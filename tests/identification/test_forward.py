@@ -5,21 +5,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.approach import less_load
 from identification.candidates import Candidate
 from identification.choice import choose, first_stage
 from identification.forward import (
     Contender,
     Setting,
     decisive,
-    even,
     grid,
     judged_forward,
-    less_load,
     luck,
 )
 from identification.library import built_in
 from identification.log import Rig
-from identification.refit import COMPLETE
+from identification.refit import COMPLETE, even
 from identification.structure import Model, model_of
 from identification.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
@@ -31,8 +30,9 @@ def setting_of(seed: int, width: float) -> tuple[Setting, Model]:
     """What the contest needs of a log with that play in its transducer."""
     one = seen(made(seed, {"backlash": {"width": width}}))
     start, first = first_stage([one], False)
-    plain = model_of(start, first, (), [one], "command", MOTOR)
-    return Setting([one], [one], "command", built_in(), start, first, plain), plain
+    rng = np.random.default_rng(0)
+    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    return Setting([one], [one], "command", MOTOR, built_in(), start, first, plain, rng), plain
 
 
 def test_play_shows_in_the_run_alone_and_is_named() -> None:

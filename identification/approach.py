@@ -1,0 +1,288 @@
+"""Search for a plant by a run that is led by the measured velocity.
+
+A free run that is driven by a force alone turns on every stop: a little too much friction, and the
+body stays where it should have passed. The distance to the log then has many narrow minima, all
+around the right one. A damping between the body and the measured velocity, D (v_log - v), keeps
+the run near the log whatever the friction (as an observer does; Abarbanel, Creveling, Farsian,
+Kostuk, SIAM Journal on Applied Dynamical Systems 8 (2009) 1341), so what is left changes smoothly
+with the parameters. It is searched in a wide range first, then without leading in a narrow one.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.effects._base import MAX_SIGNALS, Acting, Param
+from identification.equations import by_load
+from identification.evidence import FIVE, SURE, Moving, shortened
+from identification.karnopp import Karnopp
+from identification.plant import Motor, Plant
+from identification.refit import (
+    COMPLETE,
+    FIRST,
+    WIDE,
+    Judge,
+    Refit,
+    even,
+    judge,
+    loss,
+    names_of,
+    plant_with,
+    refit,
+    values_of,
+)
+from identification.rest import stretches
+from identification.result import Drive
+from identification.search import evolve
+from identification.stage import LOCKED
+
+TAU = 0.1  # s, in which a led body takes on the log's velocity
+STRONG = 1.5  # times the body's own viscous friction, with which it is led at least
+SAMPLES = 10  # the same at least, in samples
+SHAKEN = 0.1  # of the Coulomb level, that the velocity's noise may push a led body with
+STILL = 5  # samples of a rest, in which it is led by no velocity
+# Members and generations, of a plant with effects and (its runs are quick) without.
+CROWD, PLAIN_CROWD = (32, 30), (48, 40)
+SPREAD = 0.25  # of the first members
+NARROWER = 0.3  # of that spread, for mass and sliding friction
+
+
+@dataclass(frozen=True)
+class Range:
+    """How far around a plant is searched: shares of mass and sliding friction and of the stick
+    limits, factors on the band and on effects; open: from no more than the regression tells."""
+
+    five: float
+    stick: float
+    band: float
+    effect: float
+    open: bool
+
+
+FAR = Range(0.02, 0.0, 2.5, 4.0, True)
+CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
+SHORT = 15.0  # s of each log on which a search from afar is made
+SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
+MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
+NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
+SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
+KNOWN = 0.002  # share within which sliding is searched where an effect acts in stops alone
+BAND = 0.15  # of the slowest sure speed, that a band is at least
+STICK = (0.95, 1.6, 3.0)  # times the Coulomb level: least, usual and most of a stick limit
+BEYOND = 1.15  # times a stick limit, up to which it is searched
+
+
+def approach(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+    stages: Sequence[tuple[float, Range]] = ((1.0, FAR), (0.0, CLOSE)),
+) -> Plant:  # fmt: skip
+    """The plant with the parameters that the logs' run by force calls for, nearly.
+
+    stages: leading (1: in full, 0: none) and range of one search after the other.
+    """
+    loaded = any(by_load(acting.effect) for acting in plant.effects)
+    first = plant
+    for share, around in stages:
+        if share > 0.0 and loaded:  # the force that leads would be a load too
+            continue
+        if share == 0.0 and plant is not first:
+            errors_of = judge(first, logs, drive, FIRST)
+            plant = min((plant, first), key=lambda one: loss(errors_of(one)))
+        plant = _searched(plant, logs, drive, rng, share, around)
+    return plant
+
+
+def closest(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+    searches: int = SEARCHES,
+) -> Refit:  # fmt: skip
+    """The plant searched on short logs from afar, and closer (`closer`) on the whole.
+
+    One with effects, which such a search does not always find, twice where it has to be.
+    """
+    short = [shortened(one, SHORT) for one in logs]
+    best: Refit | None = None
+    for _ in range(2 if plant.effects else 1):
+        near = approach(plant, short, drive, rng)
+        near = refit(near, short, drive, prior=even(near), effort="quick").plant
+        found = closer(near, logs, drive, rng, searches)
+        best = found if best is None or found.misfit < best.misfit else best
+        if best.misfit <= NEARLY:
+            break
+    assert best is not None
+    return best
+
+
+def closer(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+    searches: int = SEARCHES,
+) -> Refit:  # fmt: skip
+    """The plant searched close by and refined, so many times at most, as long as that helps."""
+    slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
+    part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
+    best: Refit | None = None
+    for _ in range(searches):
+        near = approach(plant, part, drive, rng, ((0.0, CLOSE),))
+        found = refit(near, logs, drive, prior=even(near), effort="near")
+        gained = best is None or found.misfit < GAIN * best.misfit
+        best = found if best is None or found.misfit < best.misfit else best
+        if best.misfit <= (NEARLY if slow else COMPLETE) or not gained:
+            break
+        plant = best.plant
+    assert best is not None
+    return best
+
+
+def load_share(friction: Karnopp, acting: Acting) -> float:
+    """Share of the applied force that friction by load leaves to the motion."""
+    none = np.zeros(MAX_SIGNALS)
+    level = friction.F_cp
+    taken = acting.effect.value(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, level, level, none, acting.array)
+    return max(1.0 - taken, LOCKED)
+
+
+def less_load(base: Plant, acting: Acting) -> Plant:
+    """The plant with what friction by load takes of the force taken off its own parameters."""
+    nine = base.friction.array.copy()
+    nine[SCALED] *= load_share(base.friction, acting)
+    return replace(base, friction=Karnopp.from_array(nine))
+
+
+def more_load(plant: Plant) -> Plant:
+    """The plant without what friction by load takes of the force: as a plain one appears."""
+    loads = [acting for acting in plant.effects if by_load(acting.effect)]
+    nine = plant.friction.array.copy()
+    for acting in loads:
+        nine[SCALED] /= load_share(plant.friction, acting)
+    return replace(plant, friction=Karnopp.from_array(nine))
+
+
+def judge_led(plant: Plant, logs: Sequence[Moving], drive: Drive, share: float) -> Judge:
+    """Errors of a plant like this one led by this share of the full damping (`refit.judge`)."""
+    damping = share * leading(plant, logs)
+    if damping == 0.0:
+        return judge(plant, logs, drive, FIRST)
+    pulled = [led(one, plant, damping) for one in logs]
+    errors_of = judge(damped(plant, damping), pulled, drive, FIRST)
+    return lambda tried: errors_of(damped(tried, damping))
+
+
+def led(one: Moving, plant: Plant, damping: float) -> Moving:
+    """The log with the force [N] in it by which a damping [N s/m] leads a body."""
+    v = one.signals["v"].copy()
+    for low, high in stretches(one, STILL):
+        v[low:high] = 0.0
+    force = damping * np.append(0.5 * (v[1:] + v[:-1]), v[-1])
+    more = {"F": one.log["F"] + force}
+    if isinstance(plant.actuator, Motor):
+        more["u"] = one.log["u"] + force / plant.actuator.k_a
+    return replace(one, log=one.log.with_signals(**more))
+
+
+def leading(plant: Plant, logs: Sequence[Moving]) -> float:
+    """Damping [N s/m] by which a body is led to the measured velocity but not shaken by noise."""
+    p = plant.friction
+    noise = max(one.v_noise for one in logs)
+    tau = max(TAU, *(SAMPLES * one.log.h for one in logs))
+    strong = max(p.m / tau, STRONG * max(p.F_vp, p.F_vn))
+    return float(min(strong, SHAKEN * min(p.F_cp, p.F_cn) / max(noise, 1e-300)))
+
+
+def damped(plant: Plant, damping: float) -> Plant:
+    """The plant with so much more viscous friction [N s/m]."""
+    p = plant.friction
+    return replace(plant, friction=replace(p, F_vp=p.F_vp + damping, F_vn=p.F_vn + damping))
+
+
+def _searched(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, share: float,
+    around: Range,
+) -> Plant:  # fmt: skip
+    """The best plant in this range, led by this share of the full damping."""
+    size, generations = CROWD if plant.effects else PLAIN_CROWD
+    errors_of = judge_led(plant, logs, drive, share)
+    # Friction by load and everything else scale each other: they are searched apart.
+    plant = more_load(plant)
+    names = names_of(plant, drive)
+    low, high = limits(plant, names, SURE * max(one.v_noise for one in logs), around)
+    by_log = _by_log(names, low, high)
+
+    def at(z: Array) -> Plant:
+        x = low + z * (high - low)
+        x[by_log] = low[by_log] * (high[by_log] / low[by_log]) ** z[by_log]
+        tried = plant_with(plant, names, x)
+        for acting in tried.effects:
+            tried = less_load(tried, acting) if by_load(acting.effect) else tried
+        return tried
+
+    here = _place(values_of(plant, names), low, high, by_log)
+    spread = SPREAD * np.where(np.isin(names, FIVE), NARROWER, 1.0)
+    first = np.clip(here + spread * rng.standard_normal((size, len(names))), 0.0, 1.0)
+    first[0] = here
+    with ThreadPoolExecutor(2) as pool:
+        found = evolve(
+            lambda every: np.array(list(pool.map(lambda z: loss(errors_of(at(z))), every))),
+            first, generations, rng,
+        )  # fmt: skip
+    best: Array = found.members[0]
+    return at(best)
+
+
+def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tuple[Array, Array]:
+    """Bounds (k,) of each parameter; slow [m/s]: speed from which the log is sure of a motion."""
+    p = plant.friction
+    # Growing stiction does not bend what sliding tells: that is known closely already.
+    stops = bool(plant.effects) and all(a.effect.acts == "stiction" for a in plant.effects)
+    five = min(around.five, KNOWN) if stops else around.five
+    params = {f"{a.key}.{one.name}": one for a in plant.effects for one in a.effect.params}
+    low, high = [], []
+    for name, value in zip(names, values_of(plant, names).tolist(), strict=True):
+        size = abs(value)
+        if name in ("dv_p", "dv_n"):
+            size = max(size, slow) if around.open else size
+            least = BAND if around.open else 1.0 / around.band
+            ends = [np.sign(value) * size * least, np.sign(value) * size * around.band]
+        elif name in ("F_sp", "F_sn") and around.open:
+            coulomb = p.F_cp if name == "F_sp" else p.F_cn
+            most = min(max(STICK[1], BEYOND * size / coulomb), STICK[2])
+            ends = [np.sign(value) * STICK[0] * coulomb, np.sign(value) * most * coulomb]
+        elif name in params:
+            ends = _of_effect(params[name], value, around.effect)
+        else:
+            off = around.stick if name in ("F_sp", "F_sn") else five
+            ends = [value - off * size, value + off * size]
+        low.append(ends[0])
+        high.append(ends[1])
+    return np.array(low), np.array(high)
+
+
+def _of_effect(p: Param, value: float, factor: float) -> list[float]:
+    """Bounds of one parameter of an effect; an asymmetry stays as it is."""
+    if p.name == "asymmetry":
+        return [value, value]
+    factor = factor if p.linear else min(factor, WIDE)
+    if p.low < 0.0:
+        off = (factor - 1.0) * (abs(value) if value else p.typical)
+        ends = [value - off, value + off]
+    else:
+        ends = [value / factor, value * factor]
+    return [float(np.clip(x, p.low, p.high)) for x in ends]
+
+
+def _by_log(names: Sequence[str], low: Array, high: Array) -> BoolArray:
+    """Whether a parameter is searched by its logarithm: bands and effects of one sign."""
+    own = np.array([name in ("dv_p", "dv_n") or "." in name for name in names])
+    return np.asarray(own & (low * high > 0.0) & (low != high), dtype=np.bool_)
+
+
+def _place(x: Array, low: Array, high: Array, by_log: BoolArray) -> Array:
+    """Values (k,) in the unit cube of the bounds."""
+    out = np.full(len(x), 0.5)
+    wide = high != low
+    out[wide] = (x[wide] - low[wide]) / (high[wide] - low[wide])
+    own = by_log & (x * low > 0.0)
+    out[own] = np.log(x[own] / low[own]) / np.log(high[own] / low[own])
+    return np.asarray(np.clip(out, 0.0, 1.0), dtype=np.float64)

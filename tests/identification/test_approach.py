@@ -1,0 +1,93 @@
+"""A run led by the measured velocity: it stays near the log, and the search on it gets there."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.approach import (
+    CLOSE,
+    FAR,
+    approach,
+    closest,
+    judge_led,
+    leading,
+    less_load,
+    limits,
+    more_load,
+)
+from identification.karnopp import Karnopp
+from identification.refit import COMPLETE, even, judge, loss, names_of, refit, values_of
+from identification.starts import FAST, starts
+from tests.identification.motor_logs import NINE, made, plant, seen
+
+OFF = Karnopp(3.05, 12.2, 9.9, 81.0, 99.0, 0.004, -0.02, 13.0, -15.5)
+
+
+def test_a_led_run_stays_near_the_log_where_a_free_one_is_lost() -> None:
+    one = seen(made(2))
+    wrong = replace(plant(), friction=OFF)
+    free = judge(wrong, [one], "command", 1.0)(wrong)
+    led = judge_led(wrong, [one], "command", 1.0)(wrong)
+    assert np.median(np.abs(led)) < 0.4 * np.median(np.abs(free))
+    right = judge_led(plant(), [one], "command", 1.0)(plant())
+    assert loss(right) < 0.3 * loss(led)
+
+
+def test_noise_does_not_shake_a_led_body() -> None:
+    one = seen(made(2))
+    tight = leading(plant(), [one])
+    assert tight == pytest.approx(1.5 * NINE.F_vn)
+    rough = replace(one, v_noise=1.0)
+    assert leading(plant(), [rough]) == pytest.approx(0.1 * NINE.F_cn)
+
+
+def test_the_search_finds_what_a_gradient_does_not() -> None:
+    true = plant({"stribeck": {"F_s": 3.0, "v_s": 0.03}})
+    one = seen(made(4, {"stribeck": {"F_s": 3.0, "v_s": 0.03}}))
+    wrong = replace(plant({"stribeck": {"F_s": 1.5, "v_s": 0.05}}), friction=OFF)
+    by_gradient = refit(wrong, [one], "command", prior=even(wrong), effort="near")
+    found = closest(wrong, [one], "command", np.random.default_rng(0))
+    assert by_gradient.misfit > 2.0 * COMPLETE
+    assert found.misfit <= COMPLETE
+    names = names_of(found.plant, "command")
+    assert values_of(found.plant, names) == pytest.approx(values_of(true, names), rel=0.06)
+
+
+def test_a_search_close_by_keeps_what_is_right() -> None:
+    one = seen(made(2))
+    found = approach(plant(), [one], "command", np.random.default_rng(0), ((0.0, CLOSE),))
+    errors_of = judge(plant(), [one], "command", 1.0)
+    assert loss(errors_of(found)) <= loss(errors_of(plant()))
+
+
+def test_friction_by_load_is_searched_apart_from_what_it_scales() -> None:
+    loaded = plant({"load_dependent_friction": {"mu": 0.2}})
+    acting = loaded.effects[0]
+    again = less_load(more_load(loaded), acting)
+    assert again.friction.array == pytest.approx(loaded.friction.array)
+    assert more_load(loaded).friction.m == pytest.approx(loaded.friction.m / 0.8)
+    assert more_load(plant()).friction == plant().friction
+
+
+def test_bounds_hold_every_value_and_an_asymmetry_stays() -> None:
+    own = plant({"stribeck": {"F_s": 2.0, "v_s": 0.05, "asymmetry": 0.3}})
+    names = names_of(own, "command")
+    for around in (FAR, CLOSE):
+        low, high = limits(own, names, 0.005, around)
+        x = values_of(own, names)
+        assert np.all((np.minimum(low, high) <= x) & (x <= np.maximum(low, high)))
+        at = names.index("stribeck.asymmetry")
+        assert low[at] == high[at] == 0.3
+    wide, close = (np.ptp(np.array(limits(own, names, 0.005, a)), axis=0) for a in (FAR, CLOSE))
+    assert np.all(wide >= close)
+
+
+def test_a_window_in_motion_begins_fast() -> None:
+    one = seen(made(3))
+    begun = starts(one, "command", 0.3)
+    moving = begun.sd[1] > 0.0
+    speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
+    usual = np.median(speed[speed > 0])
+    assert np.count_nonzero(moving) > 3
+    assert np.mean(np.abs(begun.v[moving][1:]) >= FAST * usual) > 0.9
