@@ -62,7 +62,8 @@ class Range:
     open: bool
 
 
-FAR = Range(0.02, 0.0, 2.5, 4.0, True)
+FAR = Range(0.03, 0.0, 2.5, 4.0, True)
+MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
@@ -70,6 +71,7 @@ MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searc
 NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 KNOWN = 0.002  # share within which sliding is searched where an effect acts in stops alone
+UNEVEN = 0.15  # by which an asymmetry that is not 0 is searched
 BAND = 0.15  # of the slowest sure speed, that a band is at least
 STICK = (0.95, 1.6, 3.0)  # times the Coulomb level: least, usual and most of a stick limit
 BEYOND = 1.15  # times a stick limit, up to which it is searched
@@ -96,21 +98,21 @@ def approach(
 
 
 def closest(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+    begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES,
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
-    One with effects, which such a search does not always find, twice where it has to be.
+    begins: plants to begin from in turn, as long as more is left than should be.
     """
     short = [shortened(one, SHORT) for one in logs]
     best: Refit | None = None
-    for _ in range(2 if plant.effects else 1):
+    for plant in begins:
         near = approach(plant, short, drive, rng)
         near = refit(near, short, drive, prior=even(near), effort="quick").plant
         found = closer(near, logs, drive, rng, searches)
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= NEARLY:
+        if best.misfit <= (NEARLY if plant.effects else COMPLETE):
             break
     assert best is not None
     return best
@@ -260,9 +262,10 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
 
 
 def _of_effect(p: Param, value: float, factor: float) -> list[float]:
-    """Bounds of one parameter of an effect; an asymmetry stays as it is."""
+    """Bounds of one parameter of an effect; an asymmetry of 0 stays."""
     if p.name == "asymmetry":
-        return [value, value]
+        off = UNEVEN if value != 0.0 else 0.0
+        return [max(value - off, p.low), min(value + off, p.high)]
     factor = factor if p.linear else min(factor, WIDE)
     if p.low < 0.0:
         off = (factor - 1.0) * (abs(value) if value else p.typical)
@@ -274,7 +277,9 @@ def _of_effect(p: Param, value: float, factor: float) -> list[float]:
 
 def _by_log(names: Sequence[str], low: Array, high: Array) -> BoolArray:
     """Whether a parameter is searched by its logarithm: bands and effects of one sign."""
-    own = np.array([name in ("dv_p", "dv_n") or "." in name for name in names])
+    own = np.array(
+        [name in ("dv_p", "dv_n") or ("." in name and "asymmetry" not in name) for name in names]
+    )
     return np.asarray(own & (low * high > 0.0) & (low != high), dtype=np.bool_)
 
 

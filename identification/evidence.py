@@ -132,10 +132,10 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 
-def shortened(one: Moving, seconds: float) -> Moving:
-    """The first seconds of a log with its motion."""
-    n = min(len(one.log), max(2, round(seconds / one.log.h)))
-    cut = Log(one.log.name, {key: x[:n] for key, x in one.log.signals.items()})
+def shortened(one: Moving, seconds: float, begin: int = 0) -> Moving:
+    """So many seconds of a log from a sample on, with its motion."""
+    n = min(len(one.log) - begin, max(2, round(seconds / one.log.h)))
+    cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
     short = moving(cut, held=one.held, by_command=one.whole is not None)
     return replace(short, reference=one.reference)
 

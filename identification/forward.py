@@ -14,14 +14,14 @@ from itertools import product, takewhile
 import numpy as np
 from scipy.stats import chi2
 
-from identification.approach import approach, closer, judge_led, less_load
+from identification.approach import CLOSE, FAR, MIDWAY, approach, closer, judge_led, less_load
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
 from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, material, settled
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, equations_of
 from identification.errors import UserError
-from identification.evidence import IN_ACTUATOR, REST, Moving
+from identification.evidence import IN_ACTUATOR, REST, Moving, shortened
 from identification.grids import shape_grid
 from identification.library import Library
 from identification.log import Rig
@@ -31,7 +31,7 @@ from identification.refit import COMPLETE, Refit, even, judge, loose, loss, refi
 from identification.rest import stretches
 from identification.result import Drive
 from identification.stage import Stage
-from identification.starts import SECONDS, starts
+from identification.starts import SECONDS, freed, left, starts
 from identification.structure import Model, band, inside, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found here is taken
@@ -39,6 +39,7 @@ HALF = 0.5  # of the excess misfit before, at most
 NEAR, ALONE = 8.0, 0.15  # misfit, and share of any rival's excess, up to which it is taken too
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 WALKED = 3.0  # misfit that the noise of a measured force may leave
+OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
 STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
@@ -101,12 +102,17 @@ def fitted(choice: Choice, setting: Setting) -> Model:
 
 
 def without_slow(choice: Choice) -> Choice:
-    """The choice up to the first effect of slow motion, which is left to the run to find.
+    """The choice up to the first effect of slow or micro-motion, which is left to the run to find.
 
     While the band is not known, the passage through it may have been taken for one, and what was
     chosen after it was chosen beside it.
     """
-    stay = tuple(takewhile(lambda one: not slow_motion(one.candidate.effect), choice.steps))
+
+    def sure(step: Step) -> bool:
+        effect = step.candidate.effect
+        return not slow_motion(effect) and effect.acts != "bristle"
+
+    stay = tuple(takewhile(sure, choice.steps))
     if len(stay) == len(choice.steps):
         return choice
     end, base = with_steps(stay, choice.start, choice.first)
@@ -182,11 +188,12 @@ def contest(
     if best is None:
         return None
     done, winner = best
-    if done.misfit > decisive(
-        model.misfit, [one for one in screened if one.effect.key != winner.effect.key]
-    ):
-        return None
     rivals = [one for one in screened if one.effect.key != winner.effect.key]
+    bound = decisive(model.misfit, rivals)
+    if winner.effect.acts == "bristle" and loose(done.plant, setting.drive):
+        bound = 1.0 + OF_STEPS * (bound - 1.0)
+    if done.misfit > bound:
+        return None
     found = _taken(winner, done, rivals, setting, model.misfit)
     return found if found[0].steps[-1].p_value <= LEVEL else None
 
@@ -251,6 +258,18 @@ def _beside(
                 yield Trial(steps, base, effect, values)
 
 
+def most_left(plant: Plant, one: Moving, drive: Drive, seconds: float) -> Moving:
+    """The stretch of a log, of so many seconds, of which the plant's run leaves most."""
+    n, size = len(one.log), round(seconds / one.log.h)
+    r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive)))
+    if r is None or size >= n:
+        return shortened(one, seconds)
+    sums = np.concatenate([[0.0], np.cumsum(np.log1p(np.sum(r**2, axis=0)))])
+    step = max(1, size // 8)
+    begins = np.arange(0, n - size + 1, step)
+    return shortened(one, seconds, int(begins[np.argmax(sums[begins + size] - sums[begins])]))
+
+
 def rigid(first: Mapping[str, Outcome]) -> bool:
     """Whether the body is seen at rest and does not move there: on bristles it would."""
     return REST in first and spread(first[REST]) < STILL
@@ -308,7 +327,7 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
     if not plants:
         return None
     free = loose(plants[0], setting.drive)
-    if free:
+    if free and setting.plain.misfit > NEAR:
         errors_of = judge_led(plants[0], setting.short, setting.drive, 1.0)
     else:
         errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
@@ -320,6 +339,10 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
         of_one = trial.effect.acts == "sensor" and len(trial.effect.params) == 1
         more = LARGER if of_one and not free else 1
         found = _near(plants[at], trial.effect, setting)
+        # What hardly shows by itself is small at its best start: another one from the middle.
+        if free and (by_load(trial.effect) or trial.effect.acts == "stiction"):
+            beside = _near(plants[len(plants) // 2], trial.effect, setting)
+            found = min(found, beside, key=lambda x: x.misfit)
         for one in plants[at + 1 : at + more]:
             if found.misfit > WORTH * enough:
                 break
@@ -332,7 +355,10 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
 def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
     """The plant refined a little on the short logs."""
     if loose(plant, setting.drive):
-        plant = approach(plant, setting.short, setting.drive, setting.rng)
+        # Where the plain run is nearly followed, its band and limits are nearly right.
+        nearly = setting.plain.misfit <= NEAR
+        stages = ((0.0, MIDWAY) if nearly else (1.0, FAR), (0.0, CLOSE))
+        plant = approach(plant, setting.short, setting.drive, setting.rng, stages)
         return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
@@ -347,6 +373,9 @@ def _whole(one: Contender, setting: Setting) -> Refit:
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
+        if found.misfit > COMPLETE and loose(found.plant, setting.drive):
+            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 1)
+            found = again if again.misfit < found.misfit else found
     return found
 
 
@@ -403,6 +432,8 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
             break
         stay = tuple(one for one in choice.steps if one is not step)
         base = without(model, stay, setting)
+        if free:  # the search without the effect may have ended elsewhere
+            base = replace(base, friction=model.plant.friction)
         found = _refined(base, setting)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue

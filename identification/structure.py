@@ -98,13 +98,14 @@ def model_of(
         other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
         done = other if other.misfit < done.misfit else done
     if free and done.misfit > COMPLETE and not (steps and missing):
-        begin = done.plant
+        begins = [plant, done.plant]
         if near is not None and any(by_load(a.effect) for a in acting):
             # What the plain run tells is what the load leaves of it.
             begin = replace(plant, friction=near)
             for one in acting:
                 begin = less_load(begin, one) if by_load(one.effect) else begin
-        other = closest(begin, logs, drive, rng, 1 if missing else SEARCHES)
+            begins = [begin, plant]
+        other = closest(begins, logs, drive, rng, 1 if missing else SEARCHES)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 

@@ -38,10 +38,12 @@ from identification.evidence import (
 )
 from identification.forward import (
     DECISIVE,
+    NEAR,
     Setting,
     doubted,
     fitted,
     judged_forward,
+    most_left,
     without_slow,
 )
 from identification.held_out import left_out
@@ -127,12 +129,15 @@ def trace(
         library = {}
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
+    unsure = start.band == 0.0 and not before.led
+    free = not before.led and loose(before.plant, drive)
+    if unsure and free:
+        choice = without_slow(choice)
     short = [shortened(one, SHORT) for one in logs]
+    if free and not choice.steps and before.misfit <= NEAR:
+        short = [most_left(before.plant, one, drive, SHORT) for one in logs]
     setting = Setting(logs, short, drive, rig, library, start, first, before, rng.spawn(1)[0])
     after = before
-    unsure = start.band == 0.0 and not before.led
-    if unsure and loose(before.plant, drive):
-        choice = without_slow(choice)
     if choice.steps:
         after = fitted(choice, setting)
         if unsure:

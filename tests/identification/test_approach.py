@@ -47,7 +47,7 @@ def test_the_search_finds_what_a_gradient_does_not() -> None:
     one = seen(made(4, {"stribeck": {"F_s": 3.0, "v_s": 0.03}}))
     wrong = replace(plant({"stribeck": {"F_s": 1.5, "v_s": 0.05}}), friction=OFF)
     by_gradient = refit(wrong, [one], "command", prior=even(wrong), effort="near")
-    found = closest(wrong, [one], "command", np.random.default_rng(0))
+    found = closest([wrong], [one], "command", np.random.default_rng(0))
     assert by_gradient.misfit > 2.0 * COMPLETE
     assert found.misfit <= COMPLETE
     names = names_of(found.plant, "command")
@@ -70,7 +70,15 @@ def test_friction_by_load_is_searched_apart_from_what_it_scales() -> None:
     assert more_load(plant()).friction == plant().friction
 
 
-def test_bounds_hold_every_value_and_an_asymmetry_stays() -> None:
+def test_an_asymmetry_of_zero_stays() -> None:
+    own = plant({"stribeck": {"F_s": 2.0, "v_s": 0.05}})
+    names = names_of(own, "command")
+    low, high = limits(own, names, 0.005, FAR)
+    at = names.index("stribeck.asymmetry")
+    assert low[at] == high[at] == 0.0
+
+
+def test_bounds_hold_every_value() -> None:
     own = plant({"stribeck": {"F_s": 2.0, "v_s": 0.05, "asymmetry": 0.3}})
     names = names_of(own, "command")
     for around in (FAR, CLOSE):
@@ -78,7 +86,8 @@ def test_bounds_hold_every_value_and_an_asymmetry_stays() -> None:
         x = values_of(own, names)
         assert np.all((np.minimum(low, high) <= x) & (x <= np.maximum(low, high)))
         at = names.index("stribeck.asymmetry")
-        assert low[at] == high[at] == 0.3
+        assert low[at] < 0.3 < high[at]
+        assert not np.any((low == high) & (np.arange(len(low)) != at))
     wide, close = (np.ptp(np.array(limits(own, names, 0.005, a)), axis=0) for a in (FAR, CLOSE))
     assert np.all(wide >= close)
 
