@@ -14,7 +14,16 @@ from itertools import product, takewhile
 import numpy as np
 from scipy.stats import chi2
 
-from identification.approach import CLOSE, FAR, MIDWAY, approach, closer, judge_led, less_load
+from identification.approach import (
+    CLOSE,
+    FAR,
+    MIDWAY,
+    approach,
+    closer,
+    judge_led,
+    less_load,
+    more_load,
+)
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
 from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, material, settled
@@ -433,7 +442,7 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
         stay = tuple(one for one in choice.steps if one is not step)
         base = without(model, stay, setting)
         if free:  # the search without the effect may have ended elsewhere
-            base = replace(base, friction=model.plant.friction)
+            base = replace(base, friction=more_load(model.plant).friction)
         found = _refined(base, setting)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
