@@ -85,10 +85,10 @@ def approach(
 
     stages: leading (1: in full, 0: none) and range of one search after the other.
     """
-    loaded = any(by_load(acting.effect) for acting in plant.effects)
+    by_force = any(by_load(acting.effect) for acting in plant.effects)
     first = plant
     for share, around in stages:
-        if share > 0.0 and loaded:  # the force that leads would be a load too
+        if share > 0.0 and by_force:  # the force that leads would be a load too
             continue
         if share == 0.0 and plant is not first:
             errors_of = judge(first, logs, drive, FIRST)
@@ -153,6 +153,13 @@ def less_load(base: Plant, acting: Acting) -> Plant:
     return replace(base, friction=Karnopp.from_array(nine))
 
 
+def loaded(plant: Plant) -> Plant:
+    """The plant with what its own friction by load takes of the force taken off."""
+    for acting in plant.effects:
+        plant = less_load(plant, acting) if by_load(acting.effect) else plant
+    return plant
+
+
 def more_load(plant: Plant) -> Plant:
     """The plant without what friction by load takes of the force: as a plain one appears."""
     loads = [acting for acting in plant.effects if by_load(acting.effect)]
@@ -215,10 +222,7 @@ def _searched(
     def at(z: Array) -> Plant:
         x = low + z * (high - low)
         x[by_log] = low[by_log] * (high[by_log] / low[by_log]) ** z[by_log]
-        tried = plant_with(plant, names, x)
-        for acting in tried.effects:
-            tried = less_load(tried, acting) if by_load(acting.effect) else tried
-        return tried
+        return loaded(plant_with(plant, names, x))
 
     here = _place(values_of(plant, names), low, high, by_log)
     spread = SPREAD * np.where(np.isin(names, FIVE), NARROWER, 1.0)

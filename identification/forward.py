@@ -9,7 +9,7 @@ nothing but noise, so a term that merely helps is never taken here.
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from itertools import product, takewhile
+from itertools import product
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,18 +22,24 @@ from identification.approach import (
     closer,
     judge_led,
     less_load,
-    more_load,
 )
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
-from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, material, settled
+from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, equations_of
 from identification.errors import UserError
 from identification.evidence import IN_ACTUATOR, REST, Moving, shortened
 from identification.grids import shape_grid
-from identification.library import Library
-from identification.log import Rig
+from identification.needed import (
+    NEAR,
+    Setting,
+    pruned,
+    refined,
+    slow_motion,
+    with_steps,
+    without,
+)
 from identification.outcome import Outcome, spread
 from identification.plant import Plant
 from identification.refit import COMPLETE, Refit, even, judge, loose, loss, refit, start_band
@@ -41,17 +47,16 @@ from identification.rest import stretches
 from identification.result import Drive
 from identification.stage import Stage
 from identification.starts import SECONDS, freed, left, starts
-from identification.structure import Model, band, inside, model_of
+from identification.structure import Model, inside
 
 DECISIVE = 1.5  # misfit up to which a structure found here is taken
 HALF = 0.5  # of the excess misfit before, at most
-NEAR, ALONE = 8.0, 0.15  # misfit, and share of any rival's excess, up to which it is taken too
+ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 WALKED = 3.0  # misfit that the noise of a measured force may leave
 OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
 STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
-NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 SHOWN = 3  # rivals of an effect taken that are tried in its place
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
@@ -84,74 +89,6 @@ class Contender:
     effect: Effect
     plant: Plant
     misfit: float
-
-
-@dataclass(frozen=True, eq=False)
-class Setting:
-    """What every trial needs: logs whole and cut short, how they are driven, and the library."""
-
-    logs: Sequence[Moving]
-    short: Sequence[Moving]
-    drive: Drive
-    rig: Rig
-    library: Library
-    start: Stage
-    first: Mapping[str, Outcome]
-    plain: Model
-    rng: np.random.Generator
-
-
-def fitted(choice: Choice, setting: Setting) -> Model:
-    """The model of a choice made on the equations."""
-    near = None if setting.plain.led else setting.plain.plant.friction
-    return model_of(
-        choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
-        setting.rng, near=near,
-    )  # fmt: skip
-
-
-def without_slow(choice: Choice) -> Choice:
-    """The choice up to the first effect of slow or micro-motion, which is left to the run to find.
-
-    While the band is not known, the passage through it may have been taken for one, and what was
-    chosen after it was chosen beside it.
-    """
-
-    def sure(step: Step) -> bool:
-        effect = step.candidate.effect
-        return not slow_motion(effect) and effect.acts != "bristle"
-
-    stay = tuple(takewhile(sure, choice.steps))
-    if len(stay) == len(choice.steps):
-        return choice
-    end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
-
-
-def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:
-    """Without an effect of slow motion that the run does as well without, or that its band hides.
-
-    While the band was not known, the passage through it may have been taken for such an effect.
-    """
-    for step in choice.steps:
-        if not slow_motion(step.candidate.effect):
-            continue
-        stay = tuple(one for one in choice.steps if one is not step)
-        end, base = with_steps(stay, choice.start, choice.first)
-        less = Choice(choice.start, choice.first, stay, end, base, choice.tried)
-        keys = {one.candidate.effect.key for one in stay}
-        plant = after.plant
-        plant = replace(plant, effects=tuple(a for a in plant.effects if a.key in keys))
-        found = _refined(plant, setting)
-        other = Model(end, base, found.plant, found.sd, False, found.misfit)
-        if other.misfit > COMPLETE:
-            again = fitted(less, setting) if stay else setting.plain
-            other = again if again.misfit < other.misfit else other
-        beyond = replace(step.stage, band=band(after))
-        shows = material(step.candidate, beyond, step.base)
-        if not shows or other.misfit <= NEEDLESS * after.misfit:
-            choice, after = less, other
-    return choice, after
 
 
 def judged_forward(
@@ -225,14 +162,6 @@ def _structures(choice: Choice, model: Model, setting: Setting) -> Iterator[Tria
         yield from _beside(stay, without(model, stay, setting), step.rivals, setting, True)
 
 
-def without(model: Model, stay: Sequence[Step], setting: Setting) -> Plant:
-    """The model's plant with the effects of these steps only."""
-    keys = {step.candidate.effect.key for step in stay}
-    effects = tuple(a for a in model.plant.effects if a.key in keys)
-    friction = model.plant.friction if stay else setting.plain.plant.friction
-    return Plant(friction, model.plant.actuator, effects)
-
-
 def _beside(
     steps: tuple[Step, ...],
     base: Plant,
@@ -291,11 +220,6 @@ def seen_in_run(effect: Effect) -> bool:
     wider band stands for it there.
     """
     return effect.acts in IN_RUN or by_load(effect) or slow_motion(effect)
-
-
-def slow_motion(effect: Effect) -> bool:
-    """Whether the effect has a speed of its own."""
-    return any(p.unit in ("m/s", "rad/s") for p in effect.params)
 
 
 def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
@@ -378,7 +302,7 @@ def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
 
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    found = _refined(one.plant, setting)
+    found = refined(one.plant, setting)
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
@@ -386,14 +310,6 @@ def _whole(one: Contender, setting: Setting) -> Refit:
             again = closer(found.plant, setting.logs, setting.drive, setting.rng, 1)
             found = again if again.misfit < found.misfit else found
     return found
-
-
-def _refined(plant: Plant, setting: Setting) -> Refit:
-    """The plant refined on the whole logs from close by."""
-    logs, drive = setting.logs, setting.drive
-    if loose(plant, drive):
-        return closer(plant, logs, drive, setting.rng)
-    return refit(plant, logs, drive, prior=even(plant), effort="near")
 
 
 def _taken(
@@ -431,32 +347,3 @@ def _as_candidate(
     values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
     told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
     return Candidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
-
-
-def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
-    """Without the effects that a run which is followed does as well without."""
-    for step in choice.steps:
-        free = loose(model.plant, setting.drive)
-        if (len(choice.steps) < 2 and not free) or model.misfit > NEAR:
-            break
-        stay = tuple(one for one in choice.steps if one is not step)
-        base = without(model, stay, setting)
-        if free:  # the search without the effect may have ended elsewhere
-            base = replace(base, friction=more_load(model.plant).friction)
-        found = _refined(base, setting)
-        if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
-            continue
-        end, outcomes = with_steps(stay, setting.start, setting.first)
-        choice = Choice(setting.start, setting.first, stay, end, outcomes, choice.tried)
-        model = Model(end, outcomes, found.plant, found.sd, False, found.misfit)
-    return choice, model
-
-
-def with_steps(
-    steps: Sequence[Step], start: Stage, first: Mapping[str, Outcome]
-) -> tuple[Stage, Mapping[str, Outcome]]:
-    """The stage with these effects in it, and what it leaves."""
-    stage, outcomes = start, first
-    for step in steps:
-        stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
-    return stage, outcomes

@@ -15,8 +15,10 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.effect_step import LONGEST_BRISTLE
 from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
+from identification.minimum import FINE_STEP, FOLLOWED, Minimum, gauss_newton
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive
 from identification.starts import COARSE, SECONDS, WHOLE, freed, left, starts, walks, window_of
@@ -28,23 +30,16 @@ WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
-NEARLY, FINE = 20.0, 1e-4  # misfit up to which, and s: sub-step with which a bristle is refined
+IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 LONG = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 LOST = 1e6  # error of a run that cannot be followed
 ROBUST = 3.0  # residual in noise units from which it counts less
-FOLLOWED = 2.0  # robust square up to which a whole run is followed
 FAR = 300.0  # the same, at most, while much is far off
 MOST, HALF = 0.9, 0.5  # share of the residuals that then count in full
 NARROW = 0.03  # of its value, that the mass keeps at least in a search
 WIDE = 2.0  # factor within which a search keeps what an effect is not linear in
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
-STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
-# Near it: what tells the scale common to masses and forces is a small difference of large columns.
-FINE_STEP = 1e-7
-TRIES = 6  # of the damping in one step
-ENOUGH = 1e-5  # share of the cost below which a step is the last
-LITTLE = 1e-3  # the same, where more than noise is left
 BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
@@ -278,10 +273,10 @@ def refit(
         left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
         if left_by < max(found, COMPLETE):
             at, found = finer, left_by
-    if slow and not quick and COMPLETE < found < NEARLY and loose(plant, drive):
+    if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
         # Without a spring the errors of the sub-steps add up.
-        trial = refined(at.x, SECONDS, False, bristle=FINE)
-        left_by = misfit(plant_with(plant, names, full(trial.x)), logs, drive, FINE)
+        trial = refined(at.x, SECONDS, False, bristle=LONGEST_BRISTLE)
+        left_by = misfit(plant_with(plant, names, full(trial.x)), logs, drive, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
     best = plant_with(plant, names, full(at.x))
@@ -333,82 +328,3 @@ def plant_is_motor(plant: Plant) -> bool:
 def loose(plant: Plant, drive: Drive) -> bool:
     """Whether a force drives it and nothing brings its position back to the log's."""
     return drive == "force" or plant_is_motor(plant)
-
-
-@dataclass(frozen=True, eq=False)
-class Minimum:
-    """Minimum of the square sum of `fun` at x (k,), and its mean square over the rows of `fun`."""
-
-    fun: Callable[[Array], Array]
-    x: Array
-    mean: float
-
-    @property
-    def followed(self) -> bool:
-        """Whether hardly more than noise is left."""
-        return self.mean < FOLLOWED
-
-    def covariance(self, cluster: IntArray | None = None) -> Array:
-        """Of x, (k, k), for residuals that are noise of this mean square.
-
-        cluster (n,): stretches of the first n residuals within which they walk together; the
-        stretches are independent, and what they pull x about by tells its deviation (Liang, Zeger,
-        Biometrika 73 (1986) 13).
-        """
-        J = jacobian(self.fun, self.x, None, FINE_STEP)
-        inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
-        if cluster is None:
-            return np.asarray(inverse * self.mean)
-        pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
-        sums = np.array([np.bincount(cluster, column) for column in pull.T])
-        count = sums.shape[1]
-        spare = count / max(count - len(self.x), 1)
-        wider = spare * inverse @ (sums @ sums.T) @ inverse
-        # With few stretches for many unknowns the sums all but vanish at the minimum.
-        if count <= 2 * len(self.x):
-            wider = spare**2 * (wider + inverse * self.mean)
-        return np.asarray(wider, dtype=np.float64)
-
-
-def gauss_newton(
-    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP
-) -> Minimum:
-    """Minimum of the square sum of `fun` near x.
-
-    Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
-    """
-    r = fun(x)
-    cost, damping = float(r @ r), 1e-3
-    for _ in range(steps):
-        J = jacobian(fun, x, r, step_by)
-        A, g = J.T @ J, J.T @ r
-        size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
-        for _ in range(TRIES):
-            step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
-            after = fun(x + step)
-            gained = cost - float(after @ after)
-            if gained > 0:
-                break
-            damping *= 10.0
-        else:
-            break
-        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
-        # What is left of much more than noise need not be known to its last digits.
-        if gained < (ENOUGH if cost < FOLLOWED * len(r) else LITTLE) * cost:
-            break
-    return Minimum(fun, x, cost / len(r))
-
-
-def jacobian(
-    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = STEP
-) -> Array:
-    """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
-
-    def column(i: int) -> Array:
-        up, down = x.copy(), x.copy()
-        up[i] += step
-        down[i] -= step
-        return (fun(up) - r) / step if r is not None else (fun(up) - fun(down)) / (2 * step)
-
-    with ThreadPoolExecutor(2) as pool:
-        return np.column_stack(list(pool.map(column, range(len(x)))))

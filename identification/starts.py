@@ -61,9 +61,13 @@ def starts(one: Moving, drive: Drive, seconds: float = SECONDS, bristle: float =
     step = max(2, round(min(seconds / h, 2.0 * n)))
     y = np.asarray(one.log["y"])
     rests = _rests(one)
+    speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
+    fast = FAST * float(np.median(speed[speed > 0.0])) if np.any(speed) else 0.0
     at = [0]
     while at[-1] + step < n - step // 2:
-        at.append(_next(one, at[-1] + step, step, rests))
+        wanted = at[-1] + step
+        found = _rest_near(wanted, step, rests)
+        at.append(_calm(one, wanted, step, speed, fast) if found is None else found)
     index = np.array(at, dtype=np.int64)
     rest = np.isin(index, rests)
     level = np.array([float(np.mean(y[max(k - AROUND // 2, 0) : k + AROUND // 2 + 1])) for k in at])
@@ -137,19 +141,21 @@ def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
     return np.array(out)
 
 
-def _next(one: Moving, wanted: int, step: int, rests: IntArray) -> int:
-    """Sample near `wanted` from which a run may start anew: at rest, else in calm motion."""
-    reach = int(REACH * step)
-    near = rests[np.abs(rests - wanted) <= reach]
+def _rest_near(wanted: int, step: int, rests: IntArray) -> int | None:
+    """The rest nearest to `wanted`, or else the next one after it, if it is not far."""
+    near = rests[np.abs(rests - wanted) <= int(REACH * step)]
     if len(near):
         return int(near[np.argmin(np.abs(near - wanted))])
     later = rests[(rests > wanted) & (rests <= wanted + LATER * step)]
-    if len(later):
-        return int(later[0])
-    # Near the band a state within its noise may stop or not: what is sure of itself is fast.
-    speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
-    enough = FAST * float(np.median(speed[speed > 0.0])) if np.any(speed) else 0.0
-    last = len(one.log) - 1
+    return int(later[0]) if len(later) else None
+
+
+def _calm(one: Moving, wanted: int, step: int, speed: Array, enough: float) -> int:
+    """Sample near `wanted` in calm motion that is fast enough [m/s], if there is any.
+
+    Near the band a state within its noise may stop or not: what is sure of itself is fast.
+    """
+    reach, last = int(REACH * step), len(one.log) - 1
     span = np.arange(wanted - reach, min(wanted + reach, last))
     if np.max(speed[span]) < enough:
         span = np.arange(wanted - reach, min(wanted + round(LATER * step), last))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.approach import SEARCHES, closest, less_load
+from identification.approach import SEARCHES, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step
@@ -101,10 +101,7 @@ def model_of(
         begins = [plant, done.plant]
         if near is not None and any(by_load(a.effect) for a in acting):
             # What the plain run tells is what the load leaves of it.
-            begin = replace(plant, friction=near)
-            for one in acting:
-                begin = less_load(begin, one) if by_load(one.effect) else begin
-            begins = [begin, plant]
+            begins = [loaded(replace(plant, friction=near)), plant]
         other = closest(begins, logs, drive, rng, 1 if missing else SEARCHES)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)

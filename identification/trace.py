@@ -36,16 +36,7 @@ from identification.evidence import (
     solve,
     stacked,
 )
-from identification.forward import (
-    DECISIVE,
-    NEAR,
-    Setting,
-    doubted,
-    fitted,
-    judged_forward,
-    most_left,
-    without_slow,
-)
+from identification.forward import DECISIVE, judged_forward, most_left
 from identification.held_out import left_out
 from identification.karnopp import NAMES
 from identification.left_over import (
@@ -59,6 +50,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
+from identification.needed import NEAR, Setting, doubted, fitted, without_slow
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
@@ -116,8 +108,8 @@ def trace(
     drive: Drive = "command" if by_command or held else "force"
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
-    found = before.led or before.misfit <= COMPLETE or loose(before.plant, drive)
-    if not found and not rough(first):
+    free = not before.led and loose(before.plant, drive)
+    if not (before.led or free or rough(first)) and before.misfit > COMPLETE:
         before = searched(before, train, logs, drive, rig, rng)
     if not before.led:
         logs = [replace(one, reference=before.plant.friction) for one in logs]
@@ -130,7 +122,6 @@ def trace(
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
     unsure = start.band == 0.0 and not before.led
-    free = not before.led and loose(before.plant, drive)
     if unsure and free:
         choice = without_slow(choice)
     short = [shortened(one, SHORT) for one in logs]

@@ -10,14 +10,16 @@ from identification.candidates import Candidate
 from identification.choice import choose, first_stage
 from identification.forward import (
     Contender,
-    Setting,
     decisive,
     grid,
     judged_forward,
     luck,
+    most_left,
+    rigid,
 )
 from identification.library import built_in
 from identification.log import Rig
+from identification.needed import Setting
 from identification.refit import COMPLETE, even
 from identification.structure import Model, model_of
 from identification.trace import trace
@@ -102,6 +104,26 @@ def test_values_to_begin_from_lie_within_bounds() -> None:
         for v in values:
             effect.acting(v)
     assert grid(built_in()["spring"], plant(), [one]) == []
+
+
+def test_the_stretch_of_which_most_is_left_is_where_the_run_errs() -> None:
+    one = seen(made(2))
+    y = one.log["y"].copy()
+    y[6000:7000] += 1e-3 * np.sin(np.linspace(0.0, 20.0, 1000))
+    disturbed = seen(one.log.with_signals(y=y))
+    worst = most_left(plant(), disturbed, "command", 4.0)
+    t = one.log["t"]
+    assert len(worst.log) == 2000
+    assert worst.log["t"][0] <= t[6000] and worst.log["t"][-1] >= t[6999]
+    assert len(most_left(plant(), disturbed, "command", 60.0).log) == len(one.log)
+
+
+def test_a_contact_is_rigid_where_nothing_moves_at_rest() -> None:
+    _, first = first_stage([seen(made(2))], False)
+    assert rigid(first)
+    _, first = first_stage([seen(made(2, {"presliding": {"sigma_0": 5e4}}))], False)
+    assert not rigid(first)
+    assert not rigid({})
 
 
 def test_friction_by_load_takes_its_share_of_the_plain() -> None:

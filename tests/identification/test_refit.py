@@ -7,8 +7,9 @@ import pytest
 
 from identification.arrays import Array
 from identification.karnopp import Karnopp
+from identification.minimum import gauss_newton
 from identification.plant import Plant
-from identification.refit import gauss_newton, plant_with, refit
+from identification.refit import plant_with, refit
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))

@@ -1,0 +1,96 @@
+"""The nearest minimum of a square sum by differences, and how sure it is."""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+
+FOLLOWED = 2.0  # mean square up to which hardly more than noise is left
+STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
+# Near it: what tells the scale common to masses and forces is a small difference of large columns.
+FINE_STEP = 1e-7
+TRIES = 6  # of the damping in one step
+ENOUGH = 1e-5  # share of the cost below which a step is the last
+LITTLE = 1e-3  # the same, where more than noise is left
+
+
+@dataclass(frozen=True, eq=False)
+class Minimum:
+    """Minimum of the square sum of `fun` at x (k,), and its mean square over the rows of `fun`."""
+
+    fun: Callable[[Array], Array]
+    x: Array
+    mean: float
+
+    @property
+    def followed(self) -> bool:
+        """Whether hardly more than noise is left."""
+        return self.mean < FOLLOWED
+
+    def covariance(self, cluster: IntArray | None = None) -> Array:
+        """Of x, (k, k), for residuals that are noise of this mean square.
+
+        cluster (n,): stretches of the first n residuals within which they walk together; the
+        stretches are independent, and what they pull x about by tells its deviation (Liang, Zeger,
+        Biometrika 73 (1986) 13).
+        """
+        J = jacobian(self.fun, self.x, None, FINE_STEP)
+        inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
+        if cluster is None:
+            return np.asarray(inverse * self.mean)
+        pull = J[: len(cluster)] * self.fun(self.x)[: len(cluster), np.newaxis]
+        sums = np.array([np.bincount(cluster, column) for column in pull.T])
+        count = sums.shape[1]
+        spare = count / max(count - len(self.x), 1)
+        wider = spare * inverse @ (sums @ sums.T) @ inverse
+        # With few stretches for many unknowns the sums all but vanish at the minimum.
+        if count <= 2 * len(self.x):
+            wider = spare**2 * (wider + inverse * self.mean)
+        return np.asarray(wider, dtype=np.float64)
+
+
+def gauss_newton(
+    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP
+) -> Minimum:
+    """Minimum of the square sum of `fun` near x.
+
+    Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
+    """
+    r = fun(x)
+    cost, damping = float(r @ r), 1e-3
+    for _ in range(steps):
+        J = jacobian(fun, x, r, step_by)
+        A, g = J.T @ J, J.T @ r
+        size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
+        for _ in range(TRIES):
+            step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
+            after = fun(x + step)
+            gained = cost - float(after @ after)
+            if gained > 0:
+                break
+            damping *= 10.0
+        else:
+            break
+        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
+        # What is left of much more than noise need not be known to its last digits.
+        if gained < (ENOUGH if cost < FOLLOWED * len(r) else LITTLE) * cost:
+            break
+    return Minimum(fun, x, cost / len(r))
+
+
+def jacobian(
+    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = STEP
+) -> Array:
+    """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
+
+    def column(i: int) -> Array:
+        up, down = x.copy(), x.copy()
+        up[i] += step
+        down[i] -= step
+        return (fun(up) - r) / step if r is not None else (fun(up) - fun(down)) / (2 * step)
+
+    with ThreadPoolExecutor(2) as pool:
+        return np.column_stack(list(pool.map(column, range(len(x)))))

@@ -1,0 +1,61 @@
+"""Effects that are not needed: left out where the band is unknown, or the run does without."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.choice import Choice, choose, first_stage
+from identification.library import built_in
+from identification.log import Rig
+from identification.needed import Setting, keeping, pruned, without, without_slow
+from identification.refit import COMPLETE
+from identification.structure import model_of
+from tests.identification.motor_logs import K_A, NINE, made, plant, seen
+
+MOTOR = Rig("motor", force_per_command=K_A)
+SPRING = {"spring": {"k": 40.0}}
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Setting, Choice]:
+    """A motor with a spring, and what its equations call for."""
+    one = seen(made(4, SPRING))
+    rng = np.random.default_rng(0)
+    start, first = first_stage([one], False)
+    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    library = {key: built_in()[key] for key in ("spring", "stribeck")}
+    setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
+    return setting, choose(start, first, library, rng, lambda _stage, _share: None)
+
+
+def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(
+    found: tuple[Setting, Choice],
+) -> None:
+    _, choice = found
+    first = choice.steps[0]
+    assert first.candidate.effect.key == "spring"
+    kept = without_slow(choice)
+    assert [step.candidate.effect.key for step in kept.steps] == ["spring"]
+    other = replace(first, candidate=replace(first.candidate, effect=built_in()["stribeck"]))
+    assert not without_slow(replace(choice, steps=(other, first))).steps
+
+
+def test_an_effect_that_is_needed_stays(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    kept = without_slow(choice)
+    model = model_of(
+        kept.end, kept.base, kept.steps, setting.logs, "command", MOTOR, np.random.default_rng(1)
+    )
+    assert model.misfit <= COMPLETE
+    after, same = pruned(kept, model, setting)
+    assert after.steps == kept.steps and same is model
+
+
+def test_a_plant_keeps_the_effects_of_its_steps(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    both = plant({**SPRING, "backlash": {"width": 1e-4}})
+    assert [a.key for a in keeping(both, choice.steps[:1]).effects] == ["spring"]
+    assert keeping(both, choice.steps[:1]).friction == NINE
+    assert not keeping(both, ()).effects
+    assert without(setting.plain, (), setting).friction == setting.plain.plant.friction
