@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.candidates import Candidate, best_of
 from identification.chance import chance
+from identification.equations import slow_motion
 from identification.evidence import (
     ACTUATOR,
     BREAKAWAY,
@@ -31,6 +32,8 @@ MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
 CARRIES = 0.95  # of the error on logs left out, that an effect may leave
 MOSTLY = 0.55  # of what is missing, where much is left in the end
 FAR = 25.0  # square in noise units from which much is left
+WORSE = 1.5  # times the square left before, at which an effect does harm
+ANY_SPEED = ("friction", "force", "command", "delay")
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 PENALTY = 5.0  # criterion that each parameter more has to gain
@@ -98,8 +101,11 @@ def choose(
         step = next_step(tried, stage, base, rng)
         if step is None:
             break
+        beside, left = settled(replace(absorb(step.stage, step.candidate), scales={}))
+        if any(spread(left[e]) > WORSE * max(spread(o), 1.0) for e, o in base.items() if e in left):
+            break
         steps.append(step)
-        stage, base = settled(replace(absorb(step.stage, step.candidate), scales={}))
+        stage, base = beside, left
         if len(stage.chosen) > 1:
             stage, base, steps = polished(stage, base, steps)
     if steps and rough(base):
@@ -186,7 +192,11 @@ def next_step(
     base = base_outcomes(scaled)
     ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
     # What explains a trifle of what is missing in its own equations must not hide the next.
-    worth = [c for c in ranked if material(c, scaled, base) and share(c, base) >= SHARE]
+    worth = [
+        c
+        for c in ranked
+        if material(c, scaled, base) and share(c, base) >= SHARE and shows_fast(c, scaled, base)
+    ]
     if not worth:
         return None
     best = worth[0]
@@ -200,6 +210,26 @@ def next_step(
 def merit(candidate: Candidate) -> float:
     """Gain less what its parameters would gain by luck."""
     return candidate.gain - PENALTY * len(candidate.effect.params)
+
+
+def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) -> bool:
+    """Whether an effect that acts at any speed gains where the base explains the motion at all.
+
+    In the band the body takes any force, so some effect always fits a few of its rows.
+    """
+    effect = candidate.effect
+    if effect.acts not in ANY_SPEED or slow_motion(effect):
+        return True
+    gain = 0.0
+    for equation, after in candidate.outcomes.items():
+        before = base[equation]
+        keep = before.rows.speed >= before.slowest
+        if before.robust or not np.any(np.isfinite(before.rows.speed)):
+            gain += before.criterion - after.criterion
+            continue
+        less = np.sum(before.fit.residual[keep] ** 2) - np.sum(after.fit.residual[keep] ** 2)
+        gain += float(less) / stage.scale(equation) + before.rows.lost - after.rows.lost
+    return gain > PENALTY * len(effect.params)
 
 
 def share(candidate: Candidate, base: Mapping[str, Outcome]) -> float:

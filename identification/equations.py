@@ -7,6 +7,7 @@ from identification.effects._base import Effect, Param
 from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR, MECHANICAL, REST
 
 Values = Mapping[str, float]
+SLIDING = "f > c"  # as an equation says it
 TRIFLE = 0.05  # of an effect's largest size, by which another may lie out of bounds
 
 
@@ -38,6 +39,11 @@ def by_load(effect: Effect) -> bool:
     return effect.acts in FRICTIONAL and "F" in effect.depends_on
 
 
+def slow_motion(effect: Effect) -> bool:
+    """Whether the effect has a speed of its own."""
+    return any(p.unit in ("m/s", "rad/s") for p in effect.params)
+
+
 def split(effect: Effect) -> bool:
     """Whether its one linear parameter gets a column for each direction."""
     return in_columns(effect) and "asymmetry" in effect.names and len(effect.linear) == 1
@@ -50,17 +56,19 @@ def shape_params(effect: Effect) -> list[Param]:
         for p in effect.params
         if not (p.linear and in_columns(effect))
         and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
+        and p.name != "at_rest"  # no equation of sliding tells it
     ]
 
 
 def needs_rounds(effect: Effect) -> bool:
     """Whether the contribution depends on the friction parameters that are fitted with it."""
-    return effect.acts in FRICTIONAL and bool({"c", "f"} & symbols_of(effect))
+    sizes = symbols_of(effect.equation.replace(SLIDING, ""))
+    return effect.acts in FRICTIONAL and bool({"c", "f"} & sizes)
 
 
-def symbols_of(effect: Effect) -> set[str]:
-    """Names in the effect's equation."""
-    return set(re.findall(r"[A-Za-z_]\w*", effect.equation))
+def symbols_of(equation: str) -> set[str]:
+    """Names in an equation."""
+    return set(re.findall(r"[A-Za-z_]\w*", equation))
 
 
 def admissible(effect: Effect, values: Values) -> bool:

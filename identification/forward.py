@@ -27,16 +27,16 @@ from identification.arrays import Array
 from identification.candidates import Candidate, trial
 from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
 from identification.effects._base import Effect, Param
-from identification.equations import by_load, equations_of
+from identification.equations import by_load, equations_of, slow_motion
 from identification.errors import UserError
 from identification.evidence import IN_ACTUATOR, REST, Moving, shortened
 from identification.grids import shape_grid
 from identification.needed import (
+    DECISIVE,
     NEAR,
     Setting,
     pruned,
     refined,
-    slow_motion,
     with_steps,
     without,
 )
@@ -49,7 +49,6 @@ from identification.stage import Stage
 from identification.starts import SECONDS, freed, left, starts
 from identification.structure import Model, inside
 
-DECISIVE = 1.5  # misfit up to which a structure found here is taken
 HALF = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest

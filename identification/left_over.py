@@ -38,11 +38,13 @@ def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Depend
     any_size: however little of what was missing it is.
     """
     best = Dependence((), 0.0)
+    # A body that creeps in short stops is no rest, and a run that is followed does it too.
+    calm = not after.led and after.misfit <= ASTRAY
     for equation, o in choice.base.items():
         keep = judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:
             keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
-        if np.count_nonzero(keep) < FEWEST_ROWS or (o.robust and spread(o) < RESTLESS):
+        if np.count_nonzero(keep) < FEWEST_ROWS or (o.robust and (calm or spread(o) < RESTLESS)):
             continue
         signals = {k: v[keep] for k, v in signals_at(choice.end, equation).items()}
         if equation == BREAKAWAY:  # force and command at breakaway are what is judged

@@ -11,9 +11,11 @@ from itertools import takewhile
 import numpy as np
 
 from identification.approach import closer, more_load
+from identification.arrays import Array
 from identification.choice import Choice, Step, absorb, material, settled
-from identification.effects._base import Effect
-from identification.evidence import Moving
+from identification.equations import slow_motion
+from identification.evidence import FIVE, Moving
+from identification.karnopp import Karnopp
 from identification.library import Library
 from identification.log import Rig
 from identification.outcome import Outcome
@@ -23,6 +25,7 @@ from identification.result import Drive
 from identification.stage import Stage
 from identification.structure import Model, band, model_of
 
+DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 NEAR = 8.0  # misfit up to which a run is nearly followed
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
@@ -51,6 +54,19 @@ def fitted(choice: Choice, setting: Setting) -> Model:
     )  # fmt: skip
 
 
+def sure(choice: Choice, setting: Setting) -> tuple[Choice, Model]:
+    """The choice and its model where its run is followed; else without slow and micro-motion."""
+    less = without_slow(choice)
+    if not choice.steps:
+        return choice, setting.plain
+    bristles = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
+    if less is choice or not bristles:  # on bristles a search takes too long to be tried
+        model = fitted(choice, setting)
+        if less is choice or model.misfit <= DECISIVE:
+            return choice, model
+    return less, fitted(less, setting) if less.steps else setting.plain
+
+
 def without_slow(choice: Choice) -> Choice:
     """The choice up to the first effect of slow or micro-motion, which is left to the run to find.
 
@@ -58,11 +74,11 @@ def without_slow(choice: Choice) -> Choice:
     chosen after it was chosen beside it.
     """
 
-    def sure(step: Step) -> bool:
+    def fast(step: Step) -> bool:
         effect = step.candidate.effect
         return not slow_motion(effect) and effect.acts != "bristle"
 
-    stay = tuple(takewhile(sure, choice.steps))
+    stay = tuple(takewhile(fast, choice.steps))
     if len(stay) == len(choice.steps):
         return choice
     end, base = with_steps(stay, choice.start, choice.first)
@@ -70,12 +86,14 @@ def without_slow(choice: Choice) -> Choice:
 
 
 def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:
-    """Without an effect of slow motion that the run does as well without, or that its band hides.
+    """Without an effect of slow or micro-motion that the run does as well without, or that its band
+    hides.
 
-    While the band was not known, the passage through it may have been taken for such an effect.
+    While the band was not known, the passage through it may have been taken for such an effect, or
+    short stops of a creeping body for a bristle.
     """
     for step in choice.steps:
-        if not slow_motion(step.candidate.effect):
+        if not (slow_motion(step.candidate.effect) or step.candidate.effect.acts == "bristle"):
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         end, base = with_steps(stay, choice.start, choice.first)
@@ -99,13 +117,15 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
         if (len(choice.steps) < 2 and not free) or model.misfit > NEAR:
             break
         stay = tuple(one for one in choice.steps if one is not step)
+        end, outcomes = with_steps(stay, setting.start, setting.first)
         base = without(model, stay, setting)
         if free:  # the search without the effect may have ended elsewhere
             base = replace(base, friction=more_load(model.plant).friction)
+        elif stay:
+            base = replace(base, friction=levelled(base.friction, end.theta))
         found = refined(base, setting)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
-        end, outcomes = with_steps(stay, setting.start, setting.first)
         choice = Choice(setting.start, setting.first, stay, end, outcomes, choice.tried)
         model = Model(end, outcomes, found.plant, found.sd, False, found.misfit)
     return choice, model
@@ -123,6 +143,19 @@ def without(model: Model, stay: Sequence[Step], setting: Setting) -> Plant:
     return kept if stay else replace(kept, friction=setting.plain.plant.friction)
 
 
+def levelled(friction: Karnopp, theta: Array) -> Karnopp:
+    """The friction with the sliding of a regression, (5,), and its stick limits as far above it.
+
+    What an effect of friction took of the levels is theirs again where it is taken out.
+    """
+    five = dict(zip(FIVE, np.maximum(theta, 1e-9).tolist(), strict=True))
+    up, down = five["F_cp"] - friction.F_cp, five["F_cn"] - friction.F_cn
+    return replace(
+        friction, **five,
+        F_sp=max(friction.F_sp + up, 1e-9), F_sn=min(friction.F_sn - down, -1e-9),
+    )  # fmt: skip
+
+
 def with_steps(
     steps: Sequence[Step], start: Stage, first: Mapping[str, Outcome]
 ) -> tuple[Stage, Mapping[str, Outcome]]:
@@ -131,11 +164,6 @@ def with_steps(
     for step in steps:
         stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
     return stage, outcomes
-
-
-def slow_motion(effect: Effect) -> bool:
-    """Whether the effect has a speed of its own."""
-    return any(p.unit in ("m/s", "rad/s") for p in effect.params)
 
 
 def refined(plant: Plant, setting: Setting) -> Refit:

@@ -8,7 +8,7 @@ import numpy as np
 from identification.approach import SEARCHES, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
-from identification.choice import Step
+from identification.choice import Step, rough
 from identification.effects._base import Effect
 from identification.equations import by_load
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
@@ -97,7 +97,8 @@ def model_of(
         wide = max(near.dv_p, -near.dv_n)
         other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
         done = other if other.misfit < done.misfit else done
-    if free and done.misfit > COMPLETE and not (steps and missing):
+    hopeless = missing and (bool(steps) or rough(outcomes))
+    if free and done.misfit > COMPLETE and not hopeless:
         begins = [plant, done.plant]
         if near is not None and any(by_load(a.effect) for a in acting):
             # What the plain run tells is what the load leaves of it.

@@ -12,7 +12,7 @@ import numpy as np
 
 from identification.approach import SHORT
 from identification.before_after import errors_of, noise_of
-from identification.candidates import Candidate
+from identification.candidates import Candidate, best_of
 from identification.choice import (
     SHARE,
     Choice,
@@ -28,7 +28,9 @@ from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import (
     ACTUATOR,
+    IN_ACTUATOR,
     MECHANICAL,
+    Fitted,
     Moving,
     actuator,
     moving,
@@ -36,7 +38,7 @@ from identification.evidence import (
     solve,
     stacked,
 )
-from identification.forward import DECISIVE, judged_forward, most_left
+from identification.forward import judged_forward, most_left
 from identification.held_out import left_out
 from identification.karnopp import NAMES
 from identification.left_over import (
@@ -50,7 +52,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import NEAR, Setting, doubted, fitted, without_slow
+from identification.needed import DECISIVE, NEAR, Setting, doubted, fitted, sure
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
@@ -100,7 +102,7 @@ def trace(
     """
     report = on_progress or (lambda _stage, _share: None)
     remarks: list[str] = []
-    by_command = _by_command(train, rig, remarks)
+    by_command = _by_command(train, rig, library, remarks)
     held = rig.kind == "motor"
     logs = [moving(log, held=held, by_command=by_command) for log in train]
     _enough(logs)
@@ -122,17 +124,16 @@ def trace(
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
     unsure = start.band == 0.0 and not before.led
+    setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
+    after = fitted(choice, setting) if choice.steps and not (unsure and free) else before
     if unsure and free:
-        choice = without_slow(choice)
+        choice, after = sure(choice, setting)
     short = [shortened(one, SHORT) for one in logs]
     if free and not choice.steps and before.misfit <= NEAR:
         short = [most_left(before.plant, one, drive, SHORT) for one in logs]
-    setting = Setting(logs, short, drive, rig, library, start, first, before, rng.spawn(1)[0])
-    after = before
-    if choice.steps:
-        after = fitted(choice, setting)
-        if unsure:
-            choice, after = doubted(choice, after, setting)
+    setting = replace(setting, short=short)
+    if unsure:
+        choice, after = doubted(choice, after, setting)
     report("judging", 0.0)
     choice, after = judged_forward(choice, after, setting, report)
     if useless(choice, before, after):
@@ -228,15 +229,27 @@ def driven_only(logs: Sequence[Moving]) -> bool:
     return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
-def _by_command(train: Sequence[Log], rig: Rig, remarks: list[str]) -> bool:
-    """Whether a linear actuator with a logged command is to be judged too."""
+def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
+    """Whether an actuator with a logged command is to be judged too: a linear one, or one that
+    some effect of the library makes linear."""
     if rig.kind == "motor" or not all("u" in log and np.ptp(log["u"]) > 0 for log in train):
         return False
     logs = [moving(log, held=False, by_command=True) for log in train]
     rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in logs])
     found = solve(rows)
-    left = float(np.std(found.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
-    if left > LINEAR_ACTUATOR or found.theta[0] <= 0:
+
+    def left_by(one: Fitted) -> float:
+        left = float(np.std(one.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
+        return left if one.theta[0] > 0 else np.inf
+
+    left = left_by(found)
+    if left > LINEAR_ACTUATOR:
+        stage, first = first_stage(logs, True)
+        own = [e for e in library.values() if e.acts in IN_ACTUATOR]
+        tried = [best_of(stage, effect, first) for effect in own if ACTUATOR in first]
+        fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
+        left = min([left, *(left_by(fit) for fit in fits)])
+    if left > LINEAR_ACTUATOR:
         remarks.append(
             f"a linear actuator leaves {100 * left:.0f} % of the force's rate: effects between"
             " command and force are not judged"

@@ -177,3 +177,8 @@ def asymmetry() -> Param:
     return Param(
         "asymmetry", "1", -1.0, 1.0, 0.0, "how much more in positive direction", default=0.0
     )
+
+
+def at_rest() -> Param:
+    """Share of friction added while sliding that is added to the stick limit too."""
+    return Param("at_rest", "1", 0.0, 5.0, 1.0, "share that adds to the stick limit", default=1.0)

@@ -161,7 +161,8 @@ def _moved_in(effect: Effect, which: str, i: int, part: str) -> bool:
 def check_depends_on(effect: Effect) -> None:
     """Declared signals are those that move the contribution; no parameter is idle."""
     found = {name for name in ("t", "y", "v", "F", "u") if moved_by_state(effect, name)}
-    found |= {"v"} if moved_by_state(effect, "f") else set()
+    by_friction = moved_by_state(effect, "f")  # or it but tells sliding from rest
+    found |= {"v"} if by_friction and "at_rest" not in effect.names else set()
     found |= {"u"} if effect.acts == "delay" else set()
     found |= {k for i, k in enumerate(effect.signals) if _moved_in(effect, "s", i, "value")}
     history = {"rest", "reversal"} & set(effect.depends_on)

@@ -97,6 +97,6 @@ def test_wrong_declarations_are_found() -> None:
     with pytest.raises(AssertionError):
         check_depends_on(replace(spring, depends_on=()))
     with pytest.raises(AssertionError, match="multiply out"):
-        check_units(replace(spring, params=(replace(spring.params[0], unit="N"),)))
+        check_units(replace(spring, params=(replace(spring.params[0], unit="N"), spring.params[1])))
     with pytest.raises(AssertionError, match="does nothing"):
         check_depends_on(replace(stribeck, value=symmetric))

@@ -89,8 +89,8 @@ def test_what_is_decisive() -> None:
 
 
 def test_luck_grows_with_what_was_tried() -> None:
-    spring = Candidate(built_in()["spring"], {"k": 1.0}, {}, 12.0)
-    assert luck(spring, 1) == pytest.approx(5.3e-4, rel=0.02)  # chi-square of one, at 12
+    spring = Candidate(built_in()["spring"], {"k": 1.0, "k_3": 0.0}, {}, 12.0)
+    assert luck(spring, 1) == pytest.approx(np.exp(-6.0))  # chi-square of two, at 12
     assert luck(spring, 18) == pytest.approx(18 * luck(spring, 1))
     assert luck(replace(spring, gain=-3.0), 18) == 1.0
 

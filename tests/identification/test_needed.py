@@ -8,7 +8,7 @@ import pytest
 from identification.choice import Choice, choose, first_stage
 from identification.library import built_in
 from identification.log import Rig
-from identification.needed import Setting, keeping, pruned, without, without_slow
+from identification.needed import Setting, keeping, levelled, pruned, without, without_slow
 from identification.refit import COMPLETE
 from identification.structure import model_of
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -59,3 +59,10 @@ def test_a_plant_keeps_the_effects_of_its_steps(found: tuple[Setting, Choice]) -
     assert keeping(both, choice.steps[:1]).friction == NINE
     assert not keeping(both, ()).effects
     assert without(setting.plain, (), setting).friction == setting.plain.plant.friction
+
+
+def test_levels_taken_by_an_effect_are_given_back() -> None:
+    friction = NINE
+    less = replace(friction, F_cp=friction.F_cp - 3.0, F_sp=friction.F_sp - 3.0)
+    theta = np.array([NINE.m, NINE.F_cp, NINE.F_cn, NINE.F_vp, NINE.F_vn])
+    assert levelled(less, theta).array == pytest.approx(NINE.array)

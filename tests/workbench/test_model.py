@@ -89,7 +89,7 @@ def test_effects_are_converted_when_read(tmp_path: Path, document: dict[str, Any
 def test_a_rotary_machine_s_effects_have_rotary_units() -> None:
     library = built_in()
     units = {key: effect_units(library[key], "rotary") for key in library}
-    assert units["spring"] == {"k": "N m/rad"}
+    assert units["spring"] == {"k": "N m/rad", "k_3": "N m/rad**3"}
     assert units["compliance"] == {"flexibility": "rad/(N m)"}
     assert units["warmup"]["b"] == "N m s/rad"
     assert units["nonlinear_viscous"]["k"] == "N m (s/rad)**n"

@@ -38,7 +38,9 @@ def test_a_recipe_is_read_whole(tmp_path: Path) -> None:
     found = recipe(tmp_path, RECIPE)
     assert found.plant.friction.F_sn == -23.0
     assert found.plant.actuator == Actuator(19530.0, 10405.0)
-    assert [(one.key, one.values) for one in found.plant.effects] == [("spring", {"k": 3.0})]
+    assert [(one.key, one.values) for one in found.plant.effects] == [
+        ("spring", {"k": 3.0, "k_3": 0.0})
+    ]
     assert found.reference == Steps((0.0, 0.1), 0.5)
     assert found.loop is not None
     assert found.loop.position == PD(200.0, 0.1, 0.2)
@@ -134,7 +136,7 @@ def test_a_rotary_recipe_writes_its_effects_in_rad_and_newton_metres(tmp_path: P
         if needed is None:
             found = load_card(path).recipe
             assert found is not None
-            assert found.plant.effects[0].values == {"k": 3.0}
+            assert found.plant.effects[0].values == {"k": 3.0, "k_3": 0.0}
         else:
             with pytest.raises(BadCard, match=needed):
                 load_card(path)

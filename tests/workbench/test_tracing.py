@@ -103,6 +103,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "rad/s",
         "",
         "N m/rad",
+        "N m/rad**3",
     ]
     assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in sentence(found)
     html = checked(trace_report(found), 4)
