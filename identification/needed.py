@@ -27,6 +27,7 @@ from identification.structure import Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 NEAR = 8.0  # misfit up to which a run is nearly followed
+LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
 
@@ -148,7 +149,8 @@ def levelled(friction: Karnopp, theta: Array) -> Karnopp:
 
     What an effect of friction took of the levels is theirs again where it is taken out.
     """
-    five = dict(zip(FIVE, np.maximum(theta, 1e-9).tolist(), strict=True))
+    least = [LEAST_MASS * friction.m, *np.full(4, 1e-9)]
+    five = dict(zip(FIVE, np.maximum(theta, least).tolist(), strict=True))
     up, down = five["F_cp"] - friction.F_cp, five["F_cn"] - friction.F_cn
     return replace(
         friction, **five,

@@ -35,6 +35,7 @@ BRIEF = 0.1  # the same, of a shorter series
 QUARTER = 1.5
 SMALLEST_BAND = 1e-9  # m/s; a band of zero width would leave rest undefined
 MAX_EVENTS = 200  # switches within one sample
+MAX_PIECES = 5_000  # series of one sample
 # Tuples, not arrays, go to what runs in an event: arrays would be counted in and out of each call.
 Parameters = tuple[float, float, float, float, float, float, float, float, float, float, float]
 Series = tuple[float, float, float, float, float, float, float, float, float, float, float, float]
@@ -303,7 +304,9 @@ def resolve(
     p: from `parameters`; g: k1 u, or the slope of the force [N/s].
     """
     left, k2, switches = h, p[K2], 0
-    while left > 0.0 and switches < MAX_EVENTS:
+    pieces = 0 if np.isfinite(y) else MAX_PIECES  # a run that was lost stays so
+    while left > 0.0 and switches < MAX_EVENTS and pieces < MAX_PIECES:
+        pieces += 1
         if mode in (STUCK, EDGE_P, EDGE_N):
             slope = g - k2 * v
             tau, following = _held_exit(mode, p, force, slope, left)
@@ -342,7 +345,8 @@ def resolve(
         if found > 0:
             switches += 1
             v, mode = _after_exit(mode, p, force, found)
-    # More switches than any machine makes: no answer is better than one with time missing.
+    # More switches, or a body lighter, than any machine's: no answer is better than one with time
+    # missing.
     return (y if left <= 0.0 else np.nan), v, force, mode
 
 
@@ -378,6 +382,11 @@ def glided(
 def _free_response(m: float, f: float, k2: float, h: float, row: Array) -> None:
     """Exact affine step over `h` of v and dy, from three basis responses, into `row`."""
     rate = max(f / m, np.sqrt(k2 / m))
+    if (
+        rate * h > MAX_PIECES * RATE_STEP
+    ):  # lighter than any machine's: a run that cannot be followed
+        row[:] = np.nan
+        return
     pieces = max(1, int(np.ceil(rate * h / RATE_STEP)))
     piece = h / pieces
     for basis in range(3):

@@ -26,6 +26,7 @@ SHAPE = 0.03  # relative trust in a searched parameter
 MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
+QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -83,7 +84,8 @@ def model_of(
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
-    plant = Plant(nine, drives, tuple(acting))
+    plant = Plant(replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h))),
+                  drives, tuple(acting))  # fmt: skip
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do.
@@ -106,6 +108,15 @@ def model_of(
         other = closest(begins, logs, drive, rng, 1 if missing else SEARCHES)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
+
+
+def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:
+    """Mass [kg] below which a body's motion is over within a small part of a sample of h [s].
+
+    A regression bent by what the model lacks may leave none, and a run with none takes for ever.
+    """
+    k2 = drives.k2 if isinstance(drives, Actuator) else 0.0
+    return max(max(nine.F_vp, nine.F_vn) * h / QUICK, k2 * (h / QUICK) ** 2)
 
 
 def untold(sd: float | None, value: float, typical: float) -> bool:

@@ -59,7 +59,7 @@ from identification.plant import Actuator, units_of
 from identification.refit import COMPLETE, loose, refit
 from identification.result import Drive, Estimate
 from identification.stage import Stage
-from identification.structure import Model, band, model_of, untold
+from identification.structure import Model, band, led, model_of, untold
 from identification.trace_result import (
     Change,
     Dependence,
@@ -123,7 +123,11 @@ def trace(
         library = {}
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
-    unsure = start.band == 0.0 and not before.led
+    sliding = choice.base[MECHANICAL]
+    # What was missing may have hidden the inertia.
+    imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
+    free = free or (before.led and not imposed)
+    unsure = start.band == 0.0 and not imposed
     setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
     after = fitted(choice, setting) if choice.steps and not (unsure and free) else before
     if unsure and free:

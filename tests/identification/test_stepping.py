@@ -274,3 +274,13 @@ def test_a_short_glide_is_the_exact_step_or_none(mode: int) -> None:
             assert min(abs(after), v) < 0.08
         taken += on
     assert (taken == 0) == (mode == BAND_P)
+
+
+@pytest.mark.parametrize("m", [1e-9, 1e-5])
+def test_a_body_next_to_weightless_is_refused_not_followed_for_ever(m: float) -> None:
+    nine = np.array([m, 15.0, 12.0, 160.0, 185.0, 0.03, -0.03, 18.0, -15.0])
+    p = parameters(kernel_parameters(nine, 9000.0, 8000.0)[np.newaxis], 0)
+    y, v, force, mode = 0.0, 0.0, 17.9, STUCK
+    for _ in range(20):
+        y, v, force, mode = resolve(p, y, v, force, mode, 9000.0 * 0.07, 2e-3)
+    assert np.isnan(y)
