@@ -32,7 +32,6 @@ MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
 CARRIES = 0.95  # of the error on logs left out, that an effect may leave
 MOSTLY = 0.55  # of what is missing, where much is left in the end
 FAR = 25.0  # square in noise units from which much is left
-WORSE = 1.5  # times the square left before, at which an effect does harm
 ANY_SPEED = ("friction", "force", "command", "delay")
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
@@ -102,8 +101,9 @@ def choose(
         if step is None:
             break
         beside, left = settled(replace(absorb(step.stage, step.candidate), scales={}))
-        if any(spread(left[e]) > WORSE * max(spread(o), 1.0) for e, o in base.items() if e in left):
-            break
+        told = base.keys() & left.keys()
+        if sum(left[e].criterion for e in told) > sum(base[e].criterion for e in told):
+            break  # it gained at the price of what it bends
         steps.append(step)
         stage, base = beside, left
         if len(stage.chosen) > 1:

@@ -35,6 +35,7 @@ from identification.needed import (
     DECISIVE,
     NEAR,
     Setting,
+    enough,
     pruned,
     refined,
     with_steps,
@@ -51,8 +52,6 @@ from identification.structure import Model, inside
 
 HALF = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
-ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
-WALKED = 3.0  # misfit that the noise of a measured force may leave
 OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
 STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
 UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
@@ -98,8 +97,7 @@ def judged_forward(
     slow = any(acting.effect.acts == "bristle" for acting in model.plant.effects)
     if model.led or (slow and loose(model.plant, setting.drive)):
         return choice, model
-    least = DECISIVE if setting.drive == "command" else WALKED
-    if model.misfit > max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0)):
+    if model.misfit > enough(setting):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found
@@ -112,14 +110,14 @@ def contest(
     """The best structure of one effect more, or of another in an effect's place, if decisive."""
     tried = list(_structures(choice, model, setting))
     screened = []
-    enough = max(NEAR, PROMISING * model.misfit)
+    promising = max(NEAR, PROMISING * model.misfit)
     for i, one in enumerate(tried):
-        contender = _screened(one, setting, enough)
+        contender = _screened(one, setting, promising)
         if contender is not None:
             screened.append(contender)
         report("judging", (i + 1) / len(tried))
     screened.sort(key=lambda one: one.misfit)
-    if not screened or screened[0].misfit > enough:
+    if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
     for finalist in screened[:FINALISTS]:

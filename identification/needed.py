@@ -26,6 +26,8 @@ from identification.stage import Stage
 from identification.structure import Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
+WALKED = 3.0  # the same, where the noise of a measured force may leave as much
+ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 NEAR = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
@@ -46,6 +48,12 @@ class Setting:
     rng: np.random.Generator
 
 
+def enough(setting: Setting) -> float:
+    """Misfit up to which effects that the equations call for are beyond doubt in the run too."""
+    least = DECISIVE if setting.drive == "command" else WALKED
+    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
+
+
 def fitted(choice: Choice, setting: Setting) -> Model:
     """The model of a choice made on the equations."""
     near = None if setting.plain.led else setting.plain.plant.friction
@@ -63,7 +71,7 @@ def sure(choice: Choice, setting: Setting) -> tuple[Choice, Model]:
     bristles = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
     if less is choice or not bristles:  # on bristles a search takes too long to be tried
         model = fitted(choice, setting)
-        if less is choice or model.misfit <= DECISIVE:
+        if less is choice or model.misfit <= min(enough(setting), NEAR):
             return choice, model
     return less, fitted(less, setting) if less.steps else setting.plain
 
@@ -84,6 +92,19 @@ def without_slow(choice: Choice) -> Choice:
         return choice
     end, base = with_steps(stay, choice.start, choice.first)
     return Choice(choice.start, choice.first, stay, end, base, choice.tried)
+
+
+def fewest(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
+    """Without the last effects, as long as a run that is not followed leaves less without them."""
+    while len(choice.steps) > 1 and model.misfit > enough(setting) and not model.led:
+        stay = choice.steps[:-1]
+        end, base = with_steps(stay, choice.start, choice.first)
+        less = Choice(choice.start, choice.first, stay, end, base, choice.tried)
+        found = fitted(less, setting)
+        if found.misfit > model.misfit:
+            break
+        choice, model = less, found
+    return choice, model
 
 
 def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:

@@ -52,7 +52,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, NEAR, Setting, doubted, fitted, sure
+from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest, fitted, sure
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
@@ -136,6 +136,7 @@ def trace(
     if free and not choice.steps and before.misfit <= NEAR:
         short = [most_left(before.plant, one, drive, SHORT) for one in logs]
     setting = replace(setting, short=short)
+    choice, after = fewest(choice, after, setting)
     if unsure:
         choice, after = doubted(choice, after, setting)
     report("judging", 0.0)
