@@ -23,6 +23,8 @@ from identification.choice import (
     rough,
     share,
 )
+from identification.constant import beyond_friction
+from identification.constant import remark as constant_remark
 from identification.drift import drift
 from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
@@ -187,6 +189,9 @@ def _remarks(
             f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
             " band and stick limits are not to be trusted, or more is missing"
         )
+    always = beyond_friction(choice.end.theta)
+    if always is not None:
+        yield constant_remark(always)
     if not after.led and driven_only(logs):
         yield (
             "the force hardly ever opposes the motion: friction in proportion to it would change"

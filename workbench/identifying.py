@@ -15,6 +15,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.arx import ArxModel, fit_arx, one_step_errors, simulation_errors
 from identification.arx_select import select_arx
+from identification.constant import constant_force
+from identification.constant import remark as constant_remark
 from identification.differentiate import differentiate
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.inverse_model import ForceError, Smoothing, force_error
@@ -74,9 +76,11 @@ def identify(
     for log in logs:  # wrong options are refused before the long part
         decimation(log.h, options.design_period)
     fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
+    always = None if fit.adequate else constant_force(logs, held=rig.kind == "motor")
     if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
-        raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
+        why = f"m: {first}" if always is None else constant_remark(always)
+        raise NotIdentifiable(f"none of the nine parameters is identifiable: {why}")
     plant, reason = _arx_or_reason(logs, options)
     errors = _force_error(logs[0], fit, rig)
     return (
@@ -97,7 +101,11 @@ def identify(
                 evaluations=fit.evaluations,
                 force_relative=errors.relative if errors else None,
                 force_rms=errors.rms if errors else None,
-                remarks=(*fit.remarks, *closed_loop_remarks(logs)),
+                remarks=(
+                    *fit.remarks,
+                    *([] if always is None else [constant_remark(always)]),
+                    *closed_loop_remarks(logs),
+                ),
             ),
             log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
             versions=versions(),
