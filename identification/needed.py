@@ -14,16 +14,16 @@ from identification.approach import closer, more_load
 from identification.arrays import Array
 from identification.choice import Choice, Step, absorb, material, settled
 from identification.equations import slow_motion
-from identification.evidence import FIVE, Moving
+from identification.evidence import ACTUATOR, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
 from identification.library import Library
 from identification.log import Rig
-from identification.outcome import Outcome
+from identification.outcome import Outcome, spread
 from identification.plant import Plant
 from identification.refit import COMPLETE, Refit, even, loose, refit
 from identification.result import Drive
 from identification.stage import Stage
-from identification.structure import Model, band, model_of
+from identification.structure import MUCH, Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 WALKED = 3.0  # the same, where the noise of a measured force may leave as much
@@ -63,17 +63,51 @@ def fitted(choice: Choice, setting: Setting) -> Model:
     )  # fmt: skip
 
 
-def sure(choice: Choice, setting: Setting) -> tuple[Choice, Model]:
-    """The choice and its model where its run is followed; else without slow and micro-motion."""
-    less = without_slow(choice)
-    if not choice.steps:
-        return choice, setting.plain
-    bristles = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
-    if less is choice or not bristles:  # on bristles a search takes too long to be tried
-        model = fitted(choice, setting)
-        if less is choice or model.misfit <= min(enough(setting), NEAR):
-            return choice, model
+def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Model]:
+    """The fewest of the leading effects with which the run is followed, and the model.
+
+    Where it is not with any, the model that leaves least; but where nothing brings the run back to
+    the log and its band is unknown (unsure), the one without effects of slow and micro-motion.
+    """
+    unsure = unsure and loose(setting.plain.plant, setting.drive)
+    best: tuple[Choice, Model] | None = None
+    for n in range(1, len(choice.steps) + 1):
+        part, whole = leading(choice, n), n == len(choice.steps)
+        if not whole and not explained(choice.steps[n].base):
+            continue
+        if unsure and any(step.candidate.effect.acts == "bristle" for step in part.steps):
+            break  # on bristles a search takes too long to be tried
+        model = fitted(part, setting)
+        if model.led or model.misfit <= followed(setting, whole):
+            return part, model
+        best = (part, model) if best is None or model.misfit < best[1].misfit else best
+    if not unsure and best is not None:
+        return best
+    less = without_slow(choice) if unsure else choice
+    if best is not None and len(less.steps) == len(best[0].steps):
+        return best
     return less, fitted(less, setting) if less.steps else setting.plain
+
+
+def followed(setting: Setting, whole: bool) -> float:
+    """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
+    if whole:
+        return min(enough(setting), NEAR)
+    return COMPLETE if setting.drive == "command" else DECISIVE
+
+
+def explained(base: Mapping[str, Outcome]) -> bool:
+    """Whether the equations leave hardly more than the sensors' noise."""
+    return all(spread(base[e]) <= MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in base)
+
+
+def leading(choice: Choice, count: int) -> Choice:
+    """The choice up to so many effects."""
+    if count == len(choice.steps):
+        return choice
+    stay = choice.steps[:count]
+    end, base = with_steps(stay, choice.start, choice.first)
+    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
 
 
 def without_slow(choice: Choice) -> Choice:
@@ -87,24 +121,7 @@ def without_slow(choice: Choice) -> Choice:
         effect = step.candidate.effect
         return not slow_motion(effect) and effect.acts != "bristle"
 
-    stay = tuple(takewhile(fast, choice.steps))
-    if len(stay) == len(choice.steps):
-        return choice
-    end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
-
-
-def fewest(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
-    """Without the last effects, as long as a run that is not followed leaves less without them."""
-    while len(choice.steps) > 1 and model.misfit > enough(setting) and not model.led:
-        stay = choice.steps[:-1]
-        end, base = with_steps(stay, choice.start, choice.first)
-        less = Choice(choice.start, choice.first, stay, end, base, choice.tried)
-        found = fitted(less, setting)
-        if found.misfit > model.misfit:
-            break
-        choice, model = less, found
-    return choice, model
+    return leading(choice, len(tuple(takewhile(fast, choice.steps))))
 
 
 def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:

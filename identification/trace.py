@@ -54,7 +54,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest, fitted, sure
+from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
@@ -131,14 +131,13 @@ def trace(
     free = free or (before.led and not imposed)
     unsure = start.band == 0.0 and not imposed
     setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
-    after = fitted(choice, setting) if choice.steps and not (unsure and free) else before
-    if unsure and free:
-        choice, after = sure(choice, setting)
+    after = before
+    if choice.steps:
+        choice, after = fewest(choice, setting, unsure)
     short = [shortened(one, SHORT) for one in logs]
     if free and not choice.steps and before.misfit <= NEAR:
         short = [most_left(before.plant, one, drive, SHORT) for one in logs]
     setting = replace(setting, short=short)
-    choice, after = fewest(choice, after, setting)
     if unsure:
         choice, after = doubted(choice, after, setting)
     report("judging", 0.0)
