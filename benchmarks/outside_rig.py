@@ -1,0 +1,176 @@
+"""Machines of `outside`: plain Euler steps and effects written apart from the package's."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.compiled import compiled
+
+H, SUB, SECONDS = 2e-3, 100, 60.0
+NOISE_Y, NOISE_F, NOISE_P = 1e-5, 1e-2, 10.0
+REACH, SPEED = 0.06, 0.1  # m, m/s, at which sizes are given
+AREA_P, AREA_N, SUPPLY, MEAN, K_A = 12.6e-4, 10e-4, 6e5, 3e5, 20.0
+REFERENCES = ("steps", "multisine", "triangle")
+# Sizes of the effects, in the order in which `run` takes them; all of them 0 in a plain machine.
+SIZES = (
+    "play", "late", "dead", "leak", "k", "k_cube", "ripple", "pitch", "warm", "warm_time", "along",
+    "by_load", "slow", "slow_speed", "square", "grown", "grown_time",
+)  # fmt: skip
+LENGTHS = {"pitch": 0.012, "warm_time": 15.0, "slow_speed": 0.02, "grown_time": 1.0}
+NAMES = {"backlash": "play", "input_delay": "late", "valve_dead_zone": "dead", "leakage": "leak",
+         "spring": "k", "stiff_spring": "k_cube", "cogging": "ripple", "warmup": "warm",
+         "position_dependent_friction": "along", "load_dependent_friction": "by_load",
+         "stribeck": "slow", "nonlinear_viscous": "square", "rising_stiction": "grown"}  # fmt: skip
+IN_COMMAND = ("input_delay", "valve_dead_zone", "leakage")
+EFFECTS = ("none", *NAMES)
+
+
+@dataclass(frozen=True)
+class Rig:
+    """Nine parameters, gains of the loop (k_p, k_d, k_i), and the actuator (k1, k2)."""
+
+    nine: tuple[float, ...]
+    gains: tuple[float, float, float]
+    k1: float
+    k2: float
+    limit: float
+
+
+RIGS: Mapping[str, Rig] = {
+    "pneumatic": Rig((2.2, 14, 11, 180, 210, 0.008, -0.008, 18, -15), (6, 0.12, 1), 9e3, 8e3, 5.0),
+    "force": Rig((1.4, 9, 8, 90, 100, 0.008, -0.008, 12, -11), (6, 0.12, 1), 6e3, 5e3, 5.0),
+    "motor": Rig((5, 14, 12, 80, 70, 0.006, -0.006, 17, -16), (60, 3, 60), K_A, 0.0, 10.0),
+}
+
+
+@compiled
+def run(
+    p: Array, gains: Array, k1: float, k2: float, limit: float, motor: bool, e: Array, r: Array,
+    n_y: Array,
+) -> Array:  # fmt: skip
+    """Position shown, command and force (3, n) at every sample, from rest."""
+    m, f_cp, f_cn, f_vp, f_vn, dv_p, dv_n, f_sp, f_sn = p
+    out = np.zeros((3, len(r)))
+    sent = np.zeros(64)
+    y, v, force, shown, rested = r[0], 0.0, 0.0, r[0], 0.0
+    speed, before, total, dt = 0.0, r[0], 0.0, H / SUB
+    for i in range(len(r)):
+        shown = min(max(shown, y - 0.5 * e[0]), y + 0.5 * e[0])
+        seen = shown + n_y[i]
+        speed += 0.3 * ((seen - before) / H - speed)
+        before = seen
+        total = min(max(total + gains[2] * H * (r[i] - seen), -limit), limit)
+        u = min(max(gains[0] * (r[i] - seen) - gains[1] * speed + total, -limit), limit)
+        out[0, i], out[1, i], out[2, i] = seen, u, force
+        sent[1:] = sent[:-1].copy()
+        sent[0] = u
+        given = sent[int(e[1])]
+        given = np.sign(given) * max(abs(given) - e[2], 0.0)
+        for j in range(SUB):
+            force = k1 * given if motor else force + dt * (k1 * given - k2 * v - e[3] * force)
+            drive = force - e[4] * y - e[5] * y**3 + e[6] * np.sin(2.0 * np.pi * y / e[7])
+            scale = 1.0 + e[8] * np.exp(-(i + j / SUB) * H / e[9]) + e[10] * y
+            more = e[11] * abs(force)
+            stuck = v == 0.0
+            rested = rested + dt if stuck else 0.0
+            grown = e[15] * (1.0 - np.exp(-rested / e[16])) if stuck else 0.0
+            if dv_n < v < dv_p:
+                high, low = f_sp * scale + e[12] + more, f_sn * scale - e[12] - more
+                if low - grown <= drive <= high + grown:
+                    v = 0.0
+                    continue
+                friction = high + grown if drive > 0.0 else low - grown
+            else:
+                way = 1.0 if v > 0.0 else -1.0
+                level = (f_cp if v > 0.0 else f_cn) * scale + more
+                level += e[12] * np.exp(-((v / e[13]) ** 2)) + e[14] * v * v
+                friction = way * level + (f_vp if v > 0.0 else f_vn) * v
+            after = v + dt * (drive - friction) / m
+            v = 0.0 if after * v < 0.0 else after
+            y += dt * v
+    return out
+
+
+def reference(kind: str, rng: np.random.Generator) -> Array:
+    """Ramps to random places with dwells, five sines, or a triangle with a faster sine at times."""
+    t = np.arange(round(SECONDS / H)) * H
+    if kind == "multisine":
+        sizes, rates = (0.6, 0.35, 0.2, 0.08, 0.03), (0.08, 0.21, 0.47, 0.9, 1.7)
+        phases = rng.uniform(0.0, 2.0 * np.pi, 5)
+        parts = [a * np.sin(2 * np.pi * f * t + q) for a, f, q in zip(sizes, rates, phases)]  # noqa: B905
+        return np.asarray(REACH * np.sum(parts, axis=0))
+    if kind == "triangle":
+        turn = (0.12 * t + rng.uniform()) % 1.0
+        swing = np.sin(2 * np.pi * 1.1 * t) * (np.sin(2 * np.pi * 0.05 * t) > 0.0)
+        return np.asarray(REACH * (4.0 * np.abs(turn - 0.5) - 1.0 + 0.25 * swing))
+    out, here = list[Array](), 0.0
+    while sum(len(part) for part in out) < len(t):
+        there = rng.uniform(-REACH, REACH)
+        out.append(np.linspace(here, there, round(rng.uniform(0.1, 0.8) / H)))
+        out.append(np.full(round(rng.uniform(0.7, 2.5) / H), there))
+        here = there
+    return np.asarray(np.concatenate(out)[: len(t)])
+
+
+def sizes_of(effect: str, machine: str, coulomb: float) -> Array:
+    """Sizes of the effects: this one at about a fifth of the Coulomb level, the others 0."""
+    share = 0.2 * coulomb
+    dead = share / K_A if machine == "motor" else 0.1
+    full = {
+        "play": 2e-4, "late": 4.0, "dead": dead, "leak": 1.5, "k": share / REACH,
+        "k_cube": share / REACH**3, "ripple": share, "warm": 0.3, "along": 0.25 / REACH,
+        "by_load": 0.15, "slow": share, "square": share / SPEED**2, "grown": share,
+    }  # fmt: skip
+    own = NAMES.get(effect)
+    one = {name: LENGTHS.get(name, 0.0) for name in SIZES} | ({own: full[own]} if own else {})
+    return np.array([one[name] for name in SIZES])
+
+
+def write(folder: Path, machine: str, effect: str, seed: int, place: int) -> None:
+    """Both logs and the card of one machine."""
+    rig, rng = RIGS[machine], np.random.default_rng([seed, place])
+    nine = np.array(rig.nine) * rng.uniform(0.75, 1.3, 9)
+    nine[7:] = np.sign(nine[7:]) * np.maximum(np.abs(nine[7:]), 1.15 * nine[1:3])
+    e = sizes_of(effect, machine, float(np.mean(nine[1:3])))
+    for name in ("train", "test"):
+        r = reference(REFERENCES[(seed + place) % 3], rng)
+        noise = NOISE_Y * rng.standard_normal(len(r))
+        y, u, F = run(
+            nine, np.array(rig.gains), rig.k1, rig.k2, rig.limit, machine == "motor", e, r, noise
+        )
+        columns = {"time": np.arange(len(r)) * H, "pos": y}
+        F = F + NOISE_F * rng.standard_normal(len(r))
+        if machine != "force":
+            columns["volt"] = u
+        if machine == "force":
+            columns["newton"] = F
+        if machine == "pneumatic":  # eq. (7): F = S_p P_p - S_n P_n - (S_p - S_n) P_s
+            both = F + (AREA_P - AREA_N) * SUPPLY
+            p_n = (2.0 * AREA_P * MEAN - both) / (AREA_P + AREA_N)
+            columns["pp"] = (both + AREA_N * p_n) / AREA_P + NOISE_P * rng.standard_normal(len(r))
+            columns["pn"] = p_n + NOISE_P * rng.standard_normal(len(r))
+        table = np.column_stack(list(columns.values()))
+        np.savetxt(
+            folder / f"{name}.csv", table, "%.10g", ",", header=",".join(columns), comments=""
+        )
+    (folder / "card.toml").write_text(CARD[machine], encoding="utf-8")
+
+
+HEAD = """[card]
+name = "outside"
+[signals]
+t = { column = "time", unit = "s" }
+y = { column = "pos", unit = "m" }
+"""
+CARD = {
+    "pneumatic": HEAD + 'u = { column = "volt", unit = "V" }\n'
+    'p_p = { column = "pp", unit = "Pa" }\np_n = { column = "pn", unit = "Pa" }\n'
+    f'[rig]\nkind = "electro-pneumatic"\narea_p_m2 = {AREA_P}\narea_n_m2 = {AREA_N}\n'
+    f"supply_pressure_pa = {SUPPLY}\n",
+    "force": HEAD + 'F = { column = "newton", unit = "N" }\n[rig]\nkind = "force"\n',
+    "motor": HEAD + 'u = { column = "volt", unit = "V" }\n[rig]\nkind = "motor"\n'
+    f"force_per_command = {K_A}\n",
+}
