@@ -5,10 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.choice import Choice, choose, first_stage
+from identification.choice import Choice, Step, choose, first_stage
 from identification.library import built_in
 from identification.log import Rig
-from identification.needed import Setting, keeping, levelled, pruned, without, without_slow
+from identification.needed import (
+    Setting,
+    explained,
+    fewest,
+    followed,
+    keeping,
+    leading,
+    levelled,
+    pruned,
+    without,
+    without_slow,
+)
 from identification.refit import COMPLETE
 from identification.structure import model_of
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -66,3 +77,23 @@ def test_levels_taken_by_an_effect_are_given_back() -> None:
     less = replace(friction, F_cp=friction.F_cp - 3.0, F_sp=friction.F_sp - 3.0)
     theta = np.array([NINE.m, NINE.F_cp, NINE.F_cn, NINE.F_vp, NINE.F_vn])
     assert levelled(less, theta).array == pytest.approx(NINE.array)
+
+
+def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    beside = next(one for one in choice.tried if one.effect.key == "stribeck")
+    more = Step(beside, 0.01, (), choice.end, choice.base)
+    both = replace(choice, steps=(*choice.steps, more))
+    kept, model = fewest(both, setting, True)
+    assert [step.candidate.effect.key for step in kept.steps] == ["spring"]
+    assert model.misfit <= COMPLETE
+    assert leading(both, 2) is both and len(leading(both, 1).steps) == 1
+
+
+def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    far = replace(setting, plain=replace(setting.plain, misfit=41.0))
+    assert followed(far, True) == pytest.approx(5.0)  # a tenth of what was left
+    assert followed(far, False) == COMPLETE
+    assert followed(replace(far, drive="force"), False) > COMPLETE
+    assert explained(choice.base) and not explained(setting.first)
