@@ -128,7 +128,8 @@ def test_effects_go_from_the_recipe_to_the_log_and_from_the_model_to_the_predict
     known = json.loads((tmp_path / "log/truth.json").read_text(encoding="utf-8"))
     coil = known["effects"]["coil"]
     bare = {"sd": None, "low": None, "high": None}
-    assert coil == {"k": {"value": 1500.0, "unit": "N/m", **bare}}
+    assert coil["k"] == {"value": 1500.0, "unit": "N/m", **bare}
+    assert coil["k_3"]["value"] == 0.0
     model = json.loads((shop / "id/model.json").read_text(encoding="utf-8"))
     model["effects"]["coil"] = coil
     (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
