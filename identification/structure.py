@@ -74,20 +74,23 @@ def model_of(
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
-    acting = []
+    acting, silent = [], dict[str, float]()
     for step in steps:
         effect = step.candidate.effect
         values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
         spreads = effect_sd(effect, values, outcomes)
         for p in effect.params:  # a signal that is not there tells nothing of its parameter
-            if untold(spreads.get(p.name), values[p.name], p.typical):
+            if p.name == "at_rest":  # nor do the equations tell a stick limit
+                silent[f"{effect.key}.{p.name}"] = np.inf
+                spreads.pop(p.name)
+            elif untold(spreads.get(p.name), values[p.name], p.typical):
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
     plant = Plant(replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h))),
                   drives, tuple(acting))  # fmt: skip
     if drive == "force" and led(outcomes[MECHANICAL]):
-        return Model(stage, outcomes, plant, prior, True)
+        return Model(stage, outcomes, plant, prior | silent, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do.
     missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
     free = loose(plant, drive)
