@@ -116,12 +116,13 @@ def without_slow(choice: Choice) -> Choice:
     While the band is not known, the passage through it may have been taken for one, and what was
     chosen after it was chosen beside it.
     """
+    return leading(choice, len(tuple(takewhile(lambda step: not _slow(step), choice.steps))))
 
-    def fast(step: Step) -> bool:
-        effect = step.candidate.effect
-        return not slow_motion(effect) and effect.acts != "bristle"
 
-    return leading(choice, len(tuple(takewhile(fast, choice.steps))))
+def _slow(step: Step) -> bool:
+    """Whether the effect of a step is one of slow or micro-motion."""
+    effect = step.candidate.effect
+    return slow_motion(effect) or effect.acts == "bristle"
 
 
 def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:
@@ -132,7 +133,7 @@ def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Mod
     short stops of a creeping body for a bristle.
     """
     for step in choice.steps:
-        if not (slow_motion(step.candidate.effect) or step.candidate.effect.acts == "bristle"):
+        if not _slow(step):
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         end, base = with_steps(stay, choice.start, choice.first)

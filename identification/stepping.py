@@ -382,9 +382,8 @@ def glided(
 def _free_response(m: float, f: float, k2: float, h: float, row: Array) -> None:
     """Exact affine step over `h` of v and dy, from three basis responses, into `row`."""
     rate = max(f / m, np.sqrt(k2 / m))
-    if (
-        rate * h > MAX_PIECES * RATE_STEP
-    ):  # lighter than any machine's: a run that cannot be followed
+    # Lighter than any machine's body: a run that cannot be followed.
+    if rate * h > MAX_PIECES * RATE_STEP:
         row[:] = np.nan
         return
     pieces = max(1, int(np.ceil(rate * h / RATE_STEP)))

@@ -87,8 +87,8 @@ def model_of(
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
-    plant = Plant(replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h))),
-                  drives, tuple(acting))  # fmt: skip
+    nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
+    plant = Plant(nine, drives, tuple(acting))
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior | silent, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do.

@@ -249,7 +249,7 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
 
     def left_by(one: Fitted) -> float:
         left = float(np.std(one.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
-        return left if one.theta[0] > 0 else np.inf
+        return left if one.theta[0] > 0 else max(left, 1.0)  # nothing follows the command
 
     left = left_by(found)
     if left > LINEAR_ACTUATOR:
