@@ -22,7 +22,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from benchmarks.outside_rig import EFFECTS, IN_COMMAND, REFERENCES, RIGS, write
+from benchmarks.outside_rig import EFFECTS, IN_COMMAND, REFERENCES, RIGS, STRANGE, write
 
 
 def traced(machine: str, effect: str, seed: int, place: int) -> tuple[str, bool]:
@@ -42,6 +42,10 @@ def traced(machine: str, effect: str, seed: int, place: int) -> tuple[str, bool]
     keys = [one["key"] for one in found["effects"]]
     wanted = [] if effect == "none" else ["spring" if effect == "stiff_spring" else effect]
     right = keys == wanted and found["verdict"] == ("effect" if wanted else "none")
+    if effect in STRANGE:
+        keys += [f"[{signal}]" for signal in found["unknown"]["depends_on"]]
+        right = found["verdict"] == "unknown" and not found["effects"]
+        right = right and bool(STRANGE[effect][1] & set(found["unknown"]["depends_on"]))
     errors = [found[when]["test"]["force_rms"] for when in ("before", "after")]
     return (
         f"{machine:10}{effect:28}{REFERENCES[(seed + place) % 3]:10}{found['verdict']:12}"
@@ -58,15 +62,20 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=100)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--machines", nargs="+", choices=RIGS, default=list(RIGS))
-    parser.add_argument("--effects", nargs="+", choices=EFFECTS, default=list(EFFECTS))
+    parser.add_argument("--effects", nargs="+", choices=[*EFFECTS, *STRANGE],
+                        default=list(EFFECTS))  # fmt: skip
+    parser.add_argument("--strange", action="store_true", help="effects that no library has")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
+    every = [*EFFECTS, *STRANGE]
+    if given.strange:
+        given.effects = list(STRANGE)
     cases = [
-        (machine, effect, seed, EFFECTS.index(effect))
+        (machine, effect, seed, every.index(effect))
         for seed in range(given.first, given.first + given.seeds)
         for machine in given.machines
         for effect in given.effects
-        if not (machine == "force" and effect in IN_COMMAND)
+        if not (machine == "force" and effect in (*IN_COMMAND, "curved_actuator"))
         and not (machine == "motor" and effect == "leakage")
     ]
     count = 0

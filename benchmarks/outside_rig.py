@@ -17,15 +17,22 @@ REFERENCES = ("steps", "multisine", "triangle")
 # Sizes of the effects, in the order in which `run` takes them; all of them 0 in a plain machine.
 SIZES = (
     "play", "late", "dead", "leak", "k", "k_cube", "ripple", "pitch", "warm", "warm_time", "along",
-    "by_load", "slow", "slow_speed", "square", "grown", "grown_time",
+    "by_load", "slow", "slow_speed", "square", "grown", "grown_time", "shake", "rate", "jump",
+    "ramp", "curve", "thick", "elastic", "way", "worn", "ledge",
 )  # fmt: skip
-LENGTHS = {"pitch": 0.012, "warm_time": 15.0, "slow_speed": 0.02, "grown_time": 1.0}
+LENGTHS = {"pitch": 0.012, "warm_time": 15.0, "slow_speed": 0.02, "grown_time": 1.0, "rate": 1.3,
+           "way": 0.015}  # fmt: skip
 NAMES = {"backlash": "play", "input_delay": "late", "valve_dead_zone": "dead", "leakage": "leak",
          "spring": "k", "stiff_spring": "k_cube", "cogging": "ripple", "warmup": "warm",
          "position_dependent_friction": "along", "load_dependent_friction": "by_load",
          "stribeck": "slow", "nonlinear_viscous": "square", "rising_stiction": "grown"}  # fmt: skip
 IN_COMMAND = ("input_delay", "valve_dead_zone", "leakage")
 EFFECTS = ("none", *NAMES)
+# Effects that the library does not have, and the signals of which one has to be named.
+STRANGE = {"vibration": ("shake", {"t"}), "jump": ("jump", {"t"}), "ramp": ("ramp", {"t"}),
+           "curved_actuator": ("curve", {"u", "F"}), "viscous_along": ("thick", {"y", "v"}),
+           "hysteresis": ("elastic", {"y", "reversal"}), "seizure": ("worn", {"t"}),
+           "ledge": ("ledge", {"y"})}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -56,7 +63,7 @@ def run(
     out = np.zeros((3, len(r)))
     sent = np.zeros(64)
     y, v, force, shown, rested = r[0], 0.0, 0.0, r[0], 0.0
-    speed, before, total, dt = 0.0, r[0], 0.0, H / SUB
+    speed, before, total, dt, held = 0.0, r[0], 0.0, H / SUB, 0.0
     for i in range(len(r)):
         shown = min(max(shown, y - 0.5 * e[0]), y + 0.5 * e[0])
         seen = shown + n_y[i]
@@ -69,10 +76,24 @@ def run(
         sent[0] = u
         given = sent[int(e[1])]
         given = np.sign(given) * max(abs(given) - e[2], 0.0)
+        if e[21] > 0.0:
+            given = e[21] * np.tanh(given / e[21])
+        late = i * H > 0.5 * SECONDS
+        outer = e[17] * np.sin(2.0 * np.pi * e[18] * i * H) + e[20] * i * H
+        outer += e[19] if late else 0.0
         for j in range(SUB):
             force = k1 * given if motor else force + dt * (k1 * given - k2 * v - e[3] * force)
-            drive = force - e[4] * y - e[5] * y**3 + e[6] * np.sin(2.0 * np.pi * y / e[7])
+            drive = (
+                force
+                + outer
+                - held
+                - (e[26] if y > 0.0 else 0.0)
+                - e[4] * y
+                - e[5] * y**3
+                + e[6] * np.sin(2.0 * np.pi * y / e[7])
+            )
             scale = 1.0 + e[8] * np.exp(-(i + j / SUB) * H / e[9]) + e[10] * y
+            scale += e[25] if late else 0.0
             more = e[11] * abs(force)
             stuck = v == 0.0
             rested = rested + dt if stuck else 0.0
@@ -87,10 +108,11 @@ def run(
                 way = 1.0 if v > 0.0 else -1.0
                 level = (f_cp if v > 0.0 else f_cn) * scale + more
                 level += e[12] * np.exp(-((v / e[13]) ** 2)) + e[14] * v * v
-                friction = way * level + (f_vp if v > 0.0 else f_vn) * v
+                friction = way * level + (f_vp if v > 0.0 else f_vn) * (1.0 + e[22] * y) * v
             after = v + dt * (drive - friction) / m
             v = 0.0 if after * v < 0.0 else after
             y += dt * v
+            held += dt * (e[23] * v - abs(v) * held) / e[24]
     return out
 
 
@@ -123,8 +145,11 @@ def sizes_of(effect: str, machine: str, coulomb: float) -> Array:
         "play": 2e-4, "late": 4.0, "dead": dead, "leak": 1.5, "k": share / REACH,
         "k_cube": share / REACH**3, "ripple": share, "warm": 0.3, "along": 0.25 / REACH,
         "by_load": 0.15, "slow": share, "square": share / SPEED**2, "grown": share,
+        "shake": share, "jump": share, "ramp": share / 30.0, "curve": 0.15 if machine == "pneumatic"
+        else 1.5 * coulomb / K_A, "thick": 0.5 / REACH, "elastic": share, "worn": 0.3,
+        "ledge": share,
     }  # fmt: skip
-    own = NAMES.get(effect)
+    own = STRANGE[effect][0] if effect in STRANGE else NAMES.get(effect)
     one = {name: LENGTHS.get(name, 0.0) for name in SIZES} | ({own: full[own]} if own else {})
     return np.array([one[name] for name in SIZES])
 
