@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray
 from identification.compiled import call_evolve, call_value, compiled
@@ -10,6 +11,7 @@ from identification.effect_step import EVOLVE, INITIAL, VALUE
 from identification.effects._base import MAX_PARAMS, Effect
 from identification.karnopp import Karnopp
 
+SMOOTH = 8  # samples, over which the force on a bristle at rest is averaged, twice
 PIECES = 8  # of a sample, in which a bristle is followed
 
 
@@ -132,14 +134,19 @@ def elastic_displacement(
     effect: Effect, values: Mapping[str, float], signals: Mapping[str, Array], h: float,
     friction: Karnopp,
 ) -> Array:  # fmt: skip
-    """What a bristle gives way under the applied force [m], (n,), but for its sliding."""
+    """What a bristle gives way under the applied force [m], (n,), but for its sliding.
+
+    The force is smoothed as a body's inertia does: along its raw noise the bristle, softer in
+    loading than in unloading, would creep.
+    """
     q = np.zeros(MAX_PARAMS)
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
+    smoothed = uniform_filter1d(uniform_filter1d(signals["F"], SMOOTH), SMOOTH)
     out = np.empty(len(signals["t"]))
     displacement_kernel(
         np.array(effect.addresses, dtype=np.int64), q, signals["t"] - signals["t"][0],
-        np.ascontiguousarray(signals["y"]), np.ascontiguousarray(signals["F"]),
+        np.ascontiguousarray(signals["y"]), smoothed,
         friction.F_cp * 1.3, friction.F_cn * 1.3, np.zeros((len(out), 1)), out,
     )  # fmt: skip
     return out

@@ -91,10 +91,15 @@ def approach(
         if share > 0.0 and by_force:  # the force that leads would be a load too
             continue
         if share == 0.0 and plant is not first:
-            errors_of = judge(first, logs, drive, FIRST)
-            plant = min((plant, first), key=lambda one: loss(errors_of(one)))
+            plant = nearer((plant, first), logs, drive)
         plant = _searched(plant, logs, drive, rng, share, around)
     return plant
+
+
+def nearer(plants: Sequence[Plant], logs: Sequence[Moving], drive: Drive) -> Plant:
+    """The plant whose run, led by nothing, leaves least in short windows."""
+    errors_of = judge(plants[-1], logs, drive, FIRST)
+    return min(plants, key=lambda one: loss(errors_of(one)))
 
 
 def closest(

@@ -35,6 +35,8 @@ FAR = 25.0  # square in noise units from which much is left
 ANY_SPEED = ("friction", "force", "command", "delay")
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
+ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
+REFUSED = 3  # candidates tried in turn
 PENALTY = 5.0  # criterion that each parameter more has to gain
 Progress = Callable[[str, float], None]
 
@@ -97,20 +99,33 @@ def choose(
     for turn in range(MOST):
         done = partial(_report, report, turn)
         tried = candidates(stage, base, library, done)
-        step = next_step(tried, stage, base, rng)
-        if step is None:
+        found = accepted(tried, stage, base, rng)
+        if found is None:
             break
-        beside, left = settled(replace(absorb(step.stage, step.candidate), scales={}))
-        told = base.keys() & left.keys()
-        if sum(left[e].criterion for e in told) > sum(base[e].criterion for e in told):
-            break  # it gained at the price of what it bends
+        step, stage, base = found
         steps.append(step)
-        stage, base = beside, left
         if len(stage.chosen) > 1:
             stage, base, steps = polished(stage, base, steps)
     if steps and rough(base):
         stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))
+
+
+def accepted(
+    tried: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome], rng: np.random.Generator
+) -> tuple[Step, Stage, Mapping[str, Outcome]] | None:
+    """The best step that does not gain at the price of what it bends, and what is then left."""
+    for _ in range(REFUSED):
+        step = next_step(tried, stage, base, rng)
+        if step is None:
+            return None
+        after, left = settled(replace(absorb(step.stage, step.candidate), scales={}))
+        told = base.keys() & left.keys()
+        if sum(left[e].criterion for e in told) <= sum(base[e].criterion for e in told):
+            return step, after, left
+        key = step.candidate.effect.key
+        tried = [one for one in tried if one.effect.key != key]
+    return None
 
 
 def rough(base: Mapping[str, Outcome]) -> bool:
@@ -195,7 +210,10 @@ def next_step(
     worth = [
         c
         for c in ranked
-        if material(c, scaled, base) and share(c, base) >= SHARE and shows_fast(c, scaled, base)
+        if material(c, scaled, base)
+        and share(c, base) >= SHARE
+        and shows_fast(c, scaled, base)
+        and gives_way(c, base)
     ]
     if not worth:
         return None
@@ -230,6 +248,17 @@ def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) 
         less = np.sum(before.fit.residual[keep] ** 2) - np.sum(after.fit.residual[keep] ** 2)
         gain += float(less) / stage.scale(equation) + before.rows.lost - after.rows.lost
     return gain > PENALTY * len(effect.params)
+
+
+def gives_way(candidate: Candidate, base: Mapping[str, Outcome]) -> bool:
+    """Whether a bristle explains most of the motion seen at rest, if it is one.
+
+    A body that creeps from one short stop to the next moves there as well, but not with the force.
+    """
+    if candidate.effect.acts != "bristle" or REST not in base or REST not in candidate.outcomes:
+        return True
+    left = spread(candidate.outcomes[REST]) - 1.0
+    return left <= ELASTIC * max(spread(base[REST]) - 1.0, 0.0)
 
 
 def share(candidate: Candidate, base: Mapping[str, Outcome]) -> float:

@@ -1,8 +1,10 @@
-"""On what a residual depends: functions of one signal at a time, judged on blocks left out."""
+"""On what a residual depends: functions of one signal at a time, or a swing of one frequency,
+judged on blocks left out."""
 
 from collections.abc import Mapping
 
 import numpy as np
+from scipy.fft import rfft
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.trace_result import Dependence
@@ -12,6 +14,11 @@ FEW = 8  # values of a signal (a switch, a gear) that are told apart each by its
 LEAST = 0.08  # share of the residual, on blocks left out, from which it depends on a signal
 MOST = 3  # signals named
 ADDED = 0.15  # share of what is left that a second signal must explain
+APART = 0.1  # of the residual, that a swing in time must explain beyond any signal: a periodic
+# motion makes all that depends on place or speed swing as well
+FINER = 4.0  # trial frequencies in each step that a log's length tells apart
+PLACES = 4  # of the even grid, on which rows are put, to a row
+FEWEST = 4.0  # rows in a period
 
 
 def hats(x: Array, levels: int) -> Array:
@@ -51,6 +58,13 @@ def dependence(
     left out in turn. Each signal may act otherwise in the two directions.
     """
     best = {name: smooth_share(r, x, up, block) for name, x in signals.items()}
+    rate = frequency(r, signals["t"]) if "t" in signals else 0.0
+    if rate > 0.0:
+        swing = swinging_share(r, signals["t"], rate, block)
+        if swing[0] > APART + max(share for share, _ in best.values()):
+            best["t"] = swing
+        else:
+            rate = 0.0
     order = sorted(best, key=lambda name: -best[name][0])
     if not order or best[order[0]][0] < LEAST:
         return Dependence((), max(0.0, best[order[0]][0]) if order else 0.0)
@@ -59,7 +73,37 @@ def dependence(
     for name in order[1:]:
         if best[name][0] > LEAST / 2 and smooth_share(left, signals[name], up, block)[0] > ADDED:
             named.append(name)
-    return Dependence(tuple(named[:MOST]), best[order[0]][0])
+    return Dependence(tuple(named[:MOST]), best[order[0]][0], rate if named[0] == "t" else 0.0)
+
+
+def frequency(r: Array, t: Array) -> float:
+    """Frequency [Hz] at which a residual (n,) at times t [s] swings most; 0 where none can be told.
+
+    t begins anew at each log; a swing keeps its frequency over the logs, not its phase.
+    """
+    logs = np.split(np.arange(len(t)), np.flatnonzero(np.diff(t) < 0.0) + 1)
+    longest = max(float(np.ptp(t[one])) for one in logs)
+    if longest == 0.0:
+        return 0.0
+    step = longest / max(map(len, logs)) / PLACES
+    size = round(FINER * longest / step)
+    power = np.zeros(size // 2 + 1)
+    for one in logs:
+        place = np.rint((t[one] - t[one[0]]) / step).astype(np.int64)
+        line = np.bincount(place, r[one] - np.mean(r[one]), size)
+        power += np.abs(np.asarray(rfft(line, size))) ** 2
+    trial = np.arange(len(power)) / (size * step)
+    told = (trial > 1.0 / longest) & (trial < 1.0 / (FEWEST * PLACES * step))
+    return float(trial[told][np.argmax(power[told])]) if np.any(told) else 0.0
+
+
+def swinging_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[float, Array]:
+    """As `smooth_share`, of a swing at this rate [Hz] whatever the motion does."""
+    log = np.cumsum(np.concatenate([[False], np.diff(t) < 0.0]))
+    phase = 2.0 * np.pi * rate * t
+    wave = np.column_stack([np.sin(phase), np.cos(phase), np.ones(len(t))])
+    own = [wave * (log == k)[:, np.newaxis] for k in range(int(log[-1]) + 1)]
+    return explained_by(r, np.column_stack(own), block)
 
 
 def smooth_share(r: Array, x: Array, up: BoolArray, block: IntArray) -> tuple[float, Array]:

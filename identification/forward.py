@@ -18,14 +18,16 @@ from identification.approach import (
     CLOSE,
     FAR,
     MIDWAY,
+    NEARLY,
     approach,
     closer,
     judge_led,
     less_load,
+    nearer,
 )
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
-from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, settled
+from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, gives_way, rough, settled
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, equations_of, slow_motion
 from identification.errors import UserError
@@ -60,6 +62,7 @@ PROMISING = 0.6  # of the misfit before, that the best may leave on the short lo
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist
+BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
 MOST_TRIED = 40  # starts of one effect
 LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
@@ -89,6 +92,18 @@ class Contender:
     misfit: float
 
 
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A trial after a first search: the plant before and after it, what that leaves, and other
+    plants to begin from."""
+
+    trial: Trial
+    start: Plant
+    plant: Plant
+    loss: float
+    others: tuple[Plant, ...]
+
+
 def judged_forward(
     choice: Choice, model: Model, setting: Setting, report: Report
 ) -> tuple[Choice, Model]:
@@ -97,11 +112,23 @@ def judged_forward(
     slow = any(acting.effect.acts == "bristle" for acting in model.plant.effects)
     if model.led or (slow and loose(model.plant, setting.drive)):
         return choice, model
-    if model.misfit > enough(setting):
+    if model.misfit > enough(setting) and hidden(choice):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found
     return pruned(choice, model, setting)
+
+
+def hidden(choice: Choice) -> bool:
+    """Whether what the run lacks may be an effect that the equations hardly show.
+
+    Where they themselves leave much, and no effect explains more of it, none is.
+    """
+    return not rough(choice.base) or any(
+        spread(o) < HALF * spread(choice.base[e])
+        for one in choice.tried
+        for e, o in one.outcomes.items()
+    )
 
 
 def contest(
@@ -109,13 +136,23 @@ def contest(
 ) -> tuple[Choice, Model] | None:
     """The best structure of one effect more, or of another in an effect's place, if decisive."""
     tried = list(_structures(choice, model, setting))
-    screened = []
+    begun: list[Begun] = []
+    for i, attempt in enumerate(tried):
+        begun += _begun(attempt, setting)
+        report("judging", 0.5 * (i + 1) / len(tried))
+    begun.sort(key=lambda one: one.loss)
+    screened: list[Contender] = []
     promising = max(NEAR, PROMISING * model.misfit)
-    for i, one in enumerate(tried):
+    settled_at = np.inf
+    for i, one in enumerate(begun):
+        if one.loss > settled_at:
+            break
         contender = _screened(one, setting, promising)
         if contender is not None:
             screened.append(contender)
-        report("judging", (i + 1) / len(tried))
+            if contender.misfit <= NEARLY:
+                settled_at = min(settled_at, BEHIND * one.loss)
+        report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
     screened.sort(key=lambda one: one.misfit)
     if not screened or screened[0].misfit > promising:
         return None
@@ -180,6 +217,8 @@ def _beside(
             continue
         if effect.acts == "bristle" and rigid(setting.first):
             continue
+        if not all(gives_way(one, setting.first) for one in tried if one.effect.key == key):
+            continue
         # Where every trial is a search, what the equations chose is not contested by all.
         if key in shown or (seen_in_run(effect) and not (instead and free)):
             values = [inside(effect, regressed[key])] if key in regressed else []
@@ -241,11 +280,8 @@ def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) ->
     return shape_grid(effect, p, logs)
 
 
-def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None:
-    """The effect at the best of its starts, refined a little on the short logs.
-
-    enough: misfit from which it may be the best; far above it no other start is tried.
-    """
+def _begun(trial: Trial, setting: Setting) -> list[Begun]:
+    """The effect at the best of its starts, after a first search; empty where it has none."""
     plants = []
     for values in trial.values:
         try:
@@ -255,7 +291,7 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
         except UserError:
             continue
     if not plants:
-        return None
+        return []
     free = loose(plants[0], setting.drive)
     if free and setting.plain.misfit > NEAR:
         errors_of = judge_led(plants[0], setting.short, setting.drive, 1.0)
@@ -265,35 +301,55 @@ def _screened(trial: Trial, setting: Setting, enough: float) -> Contender | None
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
         at = int(np.argmin(costs))
-        # The plain parameters are bent to do without it: a larger size may be the better start.
-        of_one = trial.effect.acts == "sensor" and len(trial.effect.params) == 1
-        more = LARGER if of_one and not free else 1
-        found = _near(plants[at], trial.effect, setting)
-        # What hardly shows by itself is small at its best start: another one from the middle.
+        first = _first(plants[at], trial.effect, setting)
+        others: tuple[Plant, ...] = ()
         if free and (by_load(trial.effect) or trial.effect.acts == "stiction"):
-            beside = _near(plants[len(plants) // 2], trial.effect, setting)
-            found = min(found, beside, key=lambda x: x.misfit)
-        for one in plants[at + 1 : at + more]:
-            if found.misfit > WORTH * enough:
-                break
-            found = min(found, _near(one, trial.effect, setting), key=lambda x: x.misfit)
+            # What hardly shows by itself is small at its best start: another from the middle.
+            others = (plants[len(plants) // 2],)
+        elif not free and trial.effect.acts == "sensor" and len(trial.effect.params) == 1:
+            # The plain parameters are bent to do without it: a larger size may be the better start.
+            others = tuple(plants[at + 1 : at + LARGER])
+        return [Begun(trial, plants[at], first, loss(errors_of(first)), others)]
     except UserError:  # two effects of a kind that a plant takes one of
+        return []
+
+
+def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
+    """The contender refined a little on the short logs, from its other starts too.
+
+    enough: misfit from which it may be the best; far above it no other start is tried.
+    """
+    trial = one.trial
+    free = loose(one.plant, setting.drive)
+    try:
+        found = _near(one.start, one.plant, setting)
+        for other in one.others:
+            if not free and found.misfit > WORTH * enough:
+                break
+            again = _near(other, _first(other, trial.effect, setting), setting)
+            found = min(found, again, key=lambda x: x.misfit)
+    except UserError:
         return None
     return Contender(trial.steps, trial.effect, found.plant, found.misfit)
 
 
-def _near(plant: Plant, effect: Effect, setting: Setting) -> Refit:
-    """The plant refined a little on the short logs."""
+def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
+    """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
         # Where the plain run is nearly followed, its band and limits are nearly right.
-        nearly = setting.plain.misfit <= NEAR
-        stages = ((0.0, MIDWAY) if nearly else (1.0, FAR), (0.0, CLOSE))
-        plant = approach(plant, setting.short, setting.drive, setting.rng, stages)
-        return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
+        stage = (0.0, MIDWAY) if setting.plain.misfit <= NEAR else (1.0, FAR)
+        return approach(plant, setting.short, setting.drive, setting.rng, (stage,))
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
-        band = max(p.dv_p, -p.dv_n)
-        plant = start_band(plant, setting.short, setting.drive, band)
+        return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
+    return plant
+
+
+def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
+    """The plant after a first search, or its start, refined a little on the short logs."""
+    if loose(plant, setting.drive):
+        plant = nearer((plant, start), setting.short, setting.drive)
+        plant = approach(plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE),))
     return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 

@@ -75,8 +75,6 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
         part, whole = leading(choice, n), n == len(choice.steps)
         if not whole and not explained(choice.steps[n].base):
             continue
-        if unsure and any(step.candidate.effect.acts == "bristle" for step in part.steps):
-            break  # on bristles a search takes too long to be tried
         model = fitted(part, setting)
         if model.led or model.misfit <= followed(setting, whole):
             return part, model

@@ -33,6 +33,7 @@ STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 LONG = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
+LUCK = 0.15  # of the windows, that luck may have spoilt
 LOST = 1e6  # error of a run that cannot be followed
 ROBUST = 3.0  # residual in noise units from which it counts less
 FAR = 300.0  # the same, at most, while much is far off
@@ -301,13 +302,19 @@ def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
     return np.concatenate(parts)
 
 
-def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive, bristle: float = COARSE) -> float:
+def misfit(
+    plant: Plant, logs: Sequence[Moving], drive: Drive, bristle: float = COARSE, *,
+    every: bool = False,
+) -> float:  # fmt: skip
     """What the free run leaves of that signal of that log which it follows worst.
 
     Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
-    longest sub-step of one.
+    longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
+    just reaches is a matter of luck and takes its window with it: the worst windows do not count,
+    unless every one is to.
     """
     worst = 0.0
+    free = loose(plant, drive) and not every
     for one in logs:
         least = LOST  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not walks(one, drive)
@@ -315,9 +322,23 @@ def misfit(plant: Plant, logs: Sequence[Moving], drive: Drive, bristle: float = 
             begun = starts(one, drive, seconds, bristle)
             r = left(plant, one, drive, freed(plant, one, drive, begun))
             if r is not None:
-                least = min(least, max(loss(own) / len(own) / NOISE_LOSS for own in r))
+                window = window_of(begun, len(one.log)) if free else None
+                least = min(least, max(mean_loss(own, window) for own in r))
         worst = max(worst, least)
     return worst
+
+
+def mean_loss(r: Array, window: IntArray | None = None) -> float:
+    """Robust mean square of errors (n,), 1 for noise; window (n,): numbers of the stretches of
+    which the worst do not count."""
+    if window is None:
+        return loss(r) / len(r) / NOISE_LOSS
+    square = np.log1p((r / ROBUST) ** 2) * ROBUST**2 / NOISE_LOSS
+    size = np.bincount(window)
+    each = np.bincount(window, square) / np.maximum(size, 1)
+    order = np.argsort(each)
+    kept = order[: max(1, int(np.ceil((1.0 - LUCK) * len(order))))]
+    return float(np.average(each[kept], weights=size[kept]))
 
 
 def plant_is_motor(plant: Plant) -> bool:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray
 from identification.evidence import BLOCKS, Moving, Rows
@@ -16,6 +17,7 @@ from identification.evidence import BLOCKS, Moving, Rows
 LEAST = 0.6  # of the direction's median force, below which an event is none
 RATE = 4  # samples over which the force's rate is taken
 MEAN = 8  # samples in a row of rest
+SURELY = 0.95  # of the Coulomb level, that a force may reach without moving a body at rest
 SHORTEST = 4  # rows in a stretch
 ONSET = 5.0  # times the noise at which a body has moved
 ONSETS = 30  # samples before it is seen at which a motion may have begun
@@ -51,12 +53,19 @@ def stretches(one: Moving, shortest: int) -> list[tuple[int, int]]:
     ]
 
 
-def rests(one: Moving) -> Rest:
-    """Rows of rest, without the ends of a stretch, where the body starts or stops."""
+def rests(one: Moving, up: float, down: float) -> Rest:
+    """Rows of rest, without the ends of a stretch, where the body starts or stops.
+
+    up, down: Coulomb levels [N]. Beyond them a body may creep in stops too short to be seen; below
+    them nothing rigid moves.
+    """
     margin = MEAN
     starts, number = [], []
+    load = uniform_filter1d(np.asarray(one.log["F"]), MEAN, origin=-(MEAN // 2))
+    held = (load < SURELY * up) & (load > -SURELY * down)
     for i, (low, high) in enumerate(stretches(one, (SHORTEST + 2) * MEAN)):
         own = np.arange(low + margin, high - margin - MEAN + 1, MEAN)
+        own = own[held[own]]
         if len(own) >= SHORTEST:
             starts.append(own)
             number.append(np.full(len(own), i))

@@ -94,7 +94,8 @@ class Stage:
     @cached_property
     def at_rest(self) -> tuple[Rest, ...]:
         """Rows of rest of each log."""
-        return tuple(rests(one) for one in self.logs)
+        up, down = np.maximum(self.theta[1:3], 0.0).tolist()
+        return tuple(rests(one, up, down) for one in self.logs)
 
     @cached_property
     def events(self) -> tuple[Breakaways, ...]:

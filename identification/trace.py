@@ -58,7 +58,7 @@ from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest
 from identification.outcome import Outcome, base_outcomes, rms, spread
 from identification.output_error import searched_plant
 from identification.plant import Actuator, units_of
-from identification.refit import COMPLETE, loose, refit
+from identification.refit import COMPLETE, loose, misfit, refit
 from identification.result import Drive, Estimate
 from identification.stage import Stage
 from identification.structure import Model, band, led, model_of, untold
@@ -121,8 +121,8 @@ def trace(
         known = band(before) if before.misfit <= ASTRAY else 0.0
         start = replace(start, band=known, sliding=before.plant.friction)
         first = base_outcomes(start)
-    if before.misfit <= COMPLETE:  # the plain plant's run leaves nothing but noise
-        library = {}
+    if not before.led and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
+        library = {}  # the plain plant's run leaves nothing but noise
     choice = choose(start, first, library, rng, report)
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
@@ -155,7 +155,7 @@ def trace(
         if not left.depends_on and not after.led:
             left = in_run(after, logs, drive)
     slowest = choice.base[MECHANICAL].slowest
-    remarks += _remarks(choice, after, logs, seen)
+    remarks += _remarks(choice, after, left, logs, seen)
     return Trace(
         verdict=verdict,
         before=errors_of(before, slowest, (), logs, seen, drive),
@@ -178,7 +178,7 @@ def trace(
 
 
 def _remarks(
-    choice: Choice, after: Model, logs: Sequence[Moving], seen: Sequence[Moving]
+    choice: Choice, after: Model, left: Dependence, logs: Sequence[Moving], seen: Sequence[Moving]
 ) -> Iterator[str]:
     """What whoever reads the trace has to know of it."""
     if after.led:
@@ -191,6 +191,11 @@ def _remarks(
     always = beyond_friction(choice.end.theta)
     if always is not None:
         yield constant_remark(always)
+    if left.swing > 0.0:
+        yield (
+            f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"
+            " outside, or another loop"
+        )
     if not after.led and driven_only(logs):
         yield (
             "the force hardly ever opposes the motion: friction in proportion to it would change"
@@ -353,6 +358,8 @@ def _next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
         return f"to tell {mine.key} from {other.key}: {how}"
     if verdict == "unknown" and not left.depends_on:
         return "to find what is missing: runs that vary speed, place, load and time one by one"
+    if verdict == "unknown" and left.swing > 0.0:
+        return "to find what swings: a log at standstill, without and with the machines around"
     if verdict == "unknown":
         how = RUNS.get(left.depends_on[0], f"runs in which {left.depends_on[0]} varies by itself")
         return f"to find what depends on {', '.join(left.depends_on)}: {how}"

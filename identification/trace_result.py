@@ -48,10 +48,14 @@ class Rival:
 
 @dataclass(frozen=True)
 class Dependence:
-    """What the residual depends on: signals, and the share of it that they explain."""
+    """What the residual depends on: signals, and the share of it that they explain.
+
+    swing [Hz]: where it depends on t as a vibration does, whatever the motion; else 0.
+    """
 
     depends_on: tuple[str, ...]
     explained: float
+    swing: float = 0.0
 
 
 @dataclass(frozen=True)

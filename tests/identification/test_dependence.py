@@ -49,3 +49,31 @@ def test_a_switch_is_a_signal() -> None:
     r = 2.0 * named["vibration"] + 0.3 * rng.standard_normal(n)
     found = dependence(r, named, named["v"] >= 0, np.arange(n) * 64 // n % 8)
     assert found.depends_on[0] == "vibration"
+
+
+def shaken(n: int, rng: np.random.Generator) -> tuple[dict[str, Array], Array, Array]:
+    """Signals of two logs, the time in each and the blocks."""
+    named = signals(n, rng)
+    named["t"] = np.tile(np.linspace(0.0, 60.0, n // 2), 2)
+    return named, named["t"], np.arange(n) * 64 // n % 8
+
+
+def test_a_vibration_depends_on_time() -> None:
+    rng = np.random.default_rng(5)
+    named, t, block = shaken(4000, rng)
+    phase = np.repeat([0.3, 1.9], 2000)
+    r = np.sin(2 * np.pi * 1.3 * t + phase) + 0.5 * rng.standard_normal(4000)
+    found = dependence(r, named, named["v"] >= 0, block)
+    assert found.depends_on == ("t",)
+    assert found.swing == pytest.approx(1.3, abs=0.01)
+
+
+def test_what_depends_on_a_periodic_place_is_no_vibration() -> None:
+    rng = np.random.default_rng(6)
+    named, t, block = shaken(4000, rng)
+    named["y"] = np.sin(2 * np.pi * 0.4 * t)
+    named["v"] = np.cos(2 * np.pi * 0.4 * t)
+    r = named["y"] + 0.2 * rng.standard_normal(4000)
+    found = dependence(r, named, named["v"] >= 0, block)
+    assert found.depends_on[0] == "y"
+    assert found.swing == 0.0
