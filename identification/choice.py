@@ -251,11 +251,14 @@ def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) 
 
 
 def gives_way(candidate: Candidate, base: Mapping[str, Outcome]) -> bool:
-    """Whether a bristle explains most of the motion seen at rest, if it is one.
+    """Whether a bristle that gains most at rest explains most of the motion seen there.
 
-    A body that creeps from one short stop to the next moves there as well, but not with the force.
+    What creeps from one short stop to the next moves there as well, but not with the force.
     """
     if candidate.effect.acts != "bristle" or REST not in base or REST not in candidate.outcomes:
+        return True
+    at_rest = base[REST].criterion - candidate.outcomes[REST].criterion
+    if at_rest < 0.5 * candidate.gain:
         return True
     left = spread(candidate.outcomes[REST]) - 1.0
     return left <= ELASTIC * max(spread(base[REST]) - 1.0, 0.0)

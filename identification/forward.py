@@ -27,11 +27,11 @@ from identification.approach import (
 )
 from identification.arrays import Array
 from identification.candidates import Candidate, trial
-from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, gives_way, rough, settled
+from identification.choice import ABSORBED, LEVEL, Choice, Step, absorb, gives_way, settled
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, equations_of, slow_motion
 from identification.errors import UserError
-from identification.evidence import IN_ACTUATOR, REST, Moving, shortened
+from identification.evidence import ACTUATOR, IN_ACTUATOR, MECHANICAL, REST, Moving, shortened
 from identification.grids import shape_grid
 from identification.needed import (
     DECISIVE,
@@ -50,7 +50,7 @@ from identification.rest import stretches
 from identification.result import Drive
 from identification.stage import Stage
 from identification.starts import SECONDS, freed, left, starts
-from identification.structure import Model, inside
+from identification.structure import MUCH, Model, inside
 
 HALF = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
@@ -124,10 +124,12 @@ def hidden(choice: Choice) -> bool:
 
     Where they themselves leave much, and no effect explains more of it, none is.
     """
-    return not rough(choice.base) or any(
-        spread(o) < HALF * spread(choice.base[e])
+    told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
+    return all(spread(choice.base[e]) <= MUCH**2 for e in told) or any(
+        spread(one.outcomes[e]) < HALF * spread(choice.base[e])
         for one in choice.tried
-        for e, o in one.outcomes.items()
+        for e in told
+        if e in one.outcomes
     )
 
 

@@ -76,7 +76,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
         if not whole and not explained(choice.steps[n].base):
             continue
         model = fitted(part, setting)
-        if model.led or model.misfit <= followed(setting, whole):
+        if model.led or model.misfit <= followed(part, setting, whole):
             return part, model
         best = (part, model) if best is None or model.misfit < best[1].misfit else best
     if not unsure and best is not None:
@@ -87,11 +87,13 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
     return less, fitted(less, setting) if less.steps else setting.plain
 
 
-def followed(setting: Setting, whole: bool) -> float:
+def followed(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
         return min(enough(setting), NEAR)
-    return COMPLETE if setting.drive == "command" else DECISIVE
+    # A bristle's sub-steps err.
+    bristle = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
+    return DECISIVE if bristle or setting.drive == "force" else COMPLETE
 
 
 def explained(base: Mapping[str, Outcome]) -> bool:
