@@ -12,6 +12,7 @@ from identification.forward import (
     Contender,
     decisive,
     grid,
+    hidden,
     judged_forward,
     luck,
     most_left,
@@ -138,3 +139,17 @@ def test_asymmetries_of_zero_are_held() -> None:
     held = even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1}, "spring": {"k": 1.0}}))
     assert held == {"stribeck.asymmetry": 0.0}
     assert even(plant({"stribeck": {"F_s": 1.0, "v_s": 0.1, "asymmetry": 0.1}})) == {}
+
+
+def test_no_contest_where_sliding_itself_is_not_explained() -> None:
+    t = 2e-3 * np.arange(10_000)
+    shaken = made(4)
+    push = 6.0 * np.sin(2.0 * np.pi * 3.1 * t)
+    one = seen(shaken.with_signals(F=shaken["F"] + push, u=shaken["u"] + push / K_A))
+    start, first = first_stage([one], False)
+    rng = np.random.default_rng(0)
+    library = {k: e for k, e in built_in().items() if k in ("spring", "warmup", "backlash")}
+    shown = choose(start, first, library, rng, lambda _s, _p: None)
+    assert not hidden(shown)
+    clean, none = first_stage([seen(shaken)], False)
+    assert hidden(choose(clean, none, {}, rng, lambda _s, _p: None))

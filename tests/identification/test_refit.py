@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.karnopp import Karnopp
 from identification.minimum import gauss_newton
 from identification.plant import Plant
-from identification.refit import plant_with, refit
+from identification.refit import mean_loss, plant_with, refit
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
@@ -69,3 +69,15 @@ def test_least_squares_of_a_curved_valley() -> None:
     found = gauss_newton(rosenbrock, np.array([-1.2, 1.0]), 100)
     assert found.x == pytest.approx([1.0, 1.0], abs=1e-4)
     assert found.covariance().shape == (2, 2) and found.mean < 1e-8
+
+
+def test_breakaways_lost_by_luck_do_not_count() -> None:
+    r = np.random.default_rng(8).standard_normal(20_000)
+    window = np.arange(len(r)) // 1000
+    assert mean_loss(r) == pytest.approx(1.0, abs=0.03)
+    assert mean_loss(r, window) == pytest.approx(1.0, abs=0.06)
+    r[window >= 17] += 100.0
+    assert mean_loss(r) > 10.0
+    assert mean_loss(r, window) == pytest.approx(1.0, abs=0.06)
+    r[window >= 15] += 100.0
+    assert mean_loss(r, window) > 5.0

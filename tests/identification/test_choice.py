@@ -1,0 +1,61 @@
+"""Choice on the equations: the next best where the best bends the rest, and bristles by rest."""
+
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.outside_rig import EFFECTS, write
+from identification.candidates import best_of
+from identification.choice import choose, first_stage, gives_way
+from identification.evidence import REST, moving
+from identification.library import built_in
+from identification.log import Log
+from identification.stage import Stage
+from tests.identification.motor_logs import K_A, NOISE, H, made, seen
+
+
+def quiet(_stage: str, _share: float) -> None:
+    """Progress that nobody sees."""
+
+
+def outside_log(folder: Path, effect: str, seed: int) -> Log:
+    """A motor's log of the simulator written apart."""
+    write(folder, "motor", effect, seed, EFFECTS.index(effect))
+    t, y, u = np.loadtxt(folder / "train.csv", delimiter=",", skiprows=1).T
+    return Log(effect, {"t": t, "y": y, "u": u, "F": K_A * u})
+
+
+def test_an_effect_that_bends_the_rest_does_not_hide_the_next(tmp_path: Path) -> None:
+    # On this log friction by load gains most, with nine tenths of the force taken by it.
+    one = moving(outside_log(tmp_path, "input_delay", 51), held=True, by_command=False)
+    start, first = first_stage([one], False)
+    found = choose(start, first, built_in(), np.random.default_rng(0), quiet)
+    assert [step.candidate.effect.key for step in found.steps] == ["input_delay"]
+
+
+def at_rest(log: Log, moved: float, rng: np.random.Generator) -> Stage:
+    """The stage of a log that stands still under a swinging force, and moves by random steps."""
+    n = 6000
+    F = 8.0 * np.sin(2.0 * np.pi * 0.5 * H * np.arange(n))
+    steps = np.cumsum(np.where(rng.random(n) < 0.01, moved * rng.standard_normal(n), 0.0))
+    t = log["t"][-1] + H * np.arange(1, n + 1)
+    y = log["y"][-1] + steps + NOISE * rng.standard_normal(n)
+    joined = {k: np.concatenate([log[k], v]) for k, v in (("t", t), ("y", y), ("F", F))}
+    one = seen(Log(log.name, joined | {"u": joined["F"] / K_A}))
+    return first_stage([one], False)[0]
+
+
+def test_steps_at_rest_are_no_bristle() -> None:
+    effect = built_in()["presliding"]
+    stage = at_rest(made(4), 5e-5, np.random.default_rng(3))
+    start, first = first_stage(stage.logs, False)
+    candidate = best_of(start, effect, first)
+    assert candidate is not None and REST in first
+    assert not gives_way(candidate, first)
+
+
+def test_a_bristle_that_explains_rest_gives_way() -> None:
+    log = made(4, {"presliding": {"sigma_0": 1e5}})
+    start, first = first_stage([seen(log)], False)
+    candidate = best_of(start, built_in()["presliding"], first)
+    assert candidate is not None and gives_way(candidate, first)

@@ -1,0 +1,37 @@
+"""Evidence at rest: only what cannot be sliding is rest, and a noisy force makes no creep."""
+
+import numpy as np
+
+from identification.along import elastic_displacement
+from identification.arrays import Array
+from identification.evidence import moving
+from identification.library import built_in
+from identification.log import Log
+from identification.rest import MEAN, rests
+from tests.identification.motor_logs import NINE, NOISE, H
+
+
+def standing(F: Array, rng: np.random.Generator) -> Log:
+    """A body at rest under this force [N], (n,)."""
+    t = H * np.arange(len(F), dtype=np.float64)
+    return Log("rest", {"t": t, "y": NOISE * rng.standard_normal(len(F)), "F": F})
+
+
+def test_rest_is_what_the_coulomb_level_holds() -> None:
+    F = np.concatenate([np.linspace(-14.0, 14.0, 3000), np.linspace(14.0, -14.0, 3000)])
+    one = moving(standing(F, np.random.default_rng(1)), held=False, by_command=False)
+    found = rests(one, 12.0, 10.0)
+    means = np.array([F[k : k + MEAN].mean() for k in found.start])
+    assert means.max() < 12.0 and means.min() > -10.0
+    assert means.max() > 11.0 and means.min() < -9.0
+    assert len(rests(one, 20.0, 20.0).start) > len(found.start) > 100
+
+
+def test_the_noise_of_a_force_bends_no_bristle_further() -> None:
+    rng = np.random.default_rng(2)
+    log = standing(6.0 + 0.05 * rng.standard_normal(20_000), rng)
+    one = moving(log, held=False, by_command=False)
+    bent = elastic_displacement(
+        built_in()["presliding"], {"sigma_0": 1e5}, one.signals, log.h, NINE
+    )
+    assert abs(bent[1500] - bent[1000]) < 0.1 * bent[1000]
