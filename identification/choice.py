@@ -37,6 +37,7 @@ SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
 REFUSED = 3  # candidates tried in turn
+HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
 PENALTY = 5.0  # criterion that each parameter more has to gain
 Progress = Callable[[str, float], None]
 
@@ -123,6 +124,8 @@ def accepted(
         told = base.keys() & left.keys()
         if sum(left[e].criterion for e in told) <= sum(base[e].criterion for e in told):
             return step, after, left
+        if all(spread(base[e]) <= HARDLY for e in step.candidate.outcomes):
+            return None
         key = step.candidate.effect.key
         tried = [one for one in tried if one.effect.key != key]
     return None

@@ -358,6 +358,11 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     found = refined(one.plant, setting)
+    held = not loose(found.plant, setting.drive)
+    if held and one.effect.acts == "stiction" and COMPLETE < found.misfit < NEAR:
+        # Where each start hangs on the rest before it, minima are many and narrow.
+        again = closer(found.plant, setting.logs, setting.drive, setting.rng)
+        found = again if again.misfit < found.misfit else found
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.dependence import dependence
 
 
@@ -51,7 +51,7 @@ def test_a_switch_is_a_signal() -> None:
     assert found.depends_on[0] == "vibration"
 
 
-def shaken(n: int, rng: np.random.Generator) -> tuple[dict[str, Array], Array, Array]:
+def shaken(n: int, rng: np.random.Generator) -> tuple[dict[str, Array], Array, IntArray]:
     """Signals of two logs, the time in each and the blocks."""
     named = signals(n, rng)
     named["t"] = np.tile(np.linspace(0.0, 60.0, n // 2), 2)

@@ -93,7 +93,7 @@ def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting,
 def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     far = replace(setting, plain=replace(setting.plain, misfit=41.0))
-    assert followed(far, True) == pytest.approx(5.0)  # a tenth of what was left
-    assert followed(far, False) == COMPLETE
-    assert followed(replace(far, drive="force"), False) > COMPLETE
+    assert followed(choice, far, True) == pytest.approx(5.0)  # a tenth of what was left
+    assert followed(choice, far, False) == COMPLETE
+    assert followed(choice, replace(far, drive="force"), False) > COMPLETE
     assert explained(choice.base) and not explained(setting.first)
