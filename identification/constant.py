@@ -38,10 +38,11 @@ def constant_force(logs: Sequence[Log], *, held: bool) -> float | None:
     return beyond_friction(stage.theta)
 
 
-def remark(force: float) -> str:
+def remark(force: float, unit: str) -> str:
     """What a user can do about it."""
     return (
-        f"a constant force of about {force:.3g} N acts beside the applied one and is larger than"
-        " friction (a weight, a tilt, a sensor's offset, a wrong area or supply pressure); unequal"
-        " F_cp and F_cn cannot take it up: take it out with the offset of a signal in the card"
+        f"a constant force of about {force:.3g} {unit} acts beside the applied one and is larger"
+        " than friction (a weight, a tilt, a sensor's offset, a wrong area or supply pressure);"
+        " unequal F_cp and F_cn cannot take it up: take it out with the offset of a signal in the"
+        " card"
     )

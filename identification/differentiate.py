@@ -20,6 +20,7 @@ MIN_SAMPLES = 64
 ORDER = 4
 DEGREE = 5
 MARGIN = 2.0
+RESTED, LEVELS = 0.05, 8  # share of the samples at which it stands, and levels at which it does
 MOST_STEPS = 1e8  # in the range of a position that is counted
 WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
@@ -82,8 +83,21 @@ def spectrum(y: Array, h: float) -> Spectrum:
 
 
 def resolution(x: Array) -> float:
-    """Step of a signal that takes whole multiples of one only (an encoder's), else 0."""
-    levels = np.unique(np.asarray(x, dtype=np.float64))
+    """Step of a signal that takes whole multiples of one only (an encoder's), else 0.
+
+    Put on another clock it has values in between, but stands at its own wherever it rested.
+    """
+    x = np.asarray(x, dtype=np.float64)
+    step = _step_of(np.unique(x))
+    stood = x[1:][np.diff(x) == 0.0]
+    if step > 0.0 or len(stood) < RESTED * len(x):
+        return step
+    levels = np.unique(stood)
+    return _step_of(levels) if len(levels) >= LEVELS else 0.0
+
+
+def _step_of(levels: Array) -> float:
+    """Step whose whole multiples the levels (k,) are apart, 0 where there is none."""
     if len(levels) < 2:
         return 0.0
     span = float(levels[-1] - levels[0])

@@ -25,6 +25,7 @@ from identification.weak_form import (
 )
 
 SECONDS = 0.06  # of a window
+EXACT = 1e-12  # of its range, to which any position is unsure
 FEWEST = 16  # samples in a window
 SURE = 5.0  # times the velocity's noise from which its sign is sure
 BLOCKS = 8  # stretches of a log that are left out in turn
@@ -125,8 +126,10 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     }  # fmt: skip
     up, slowest = d[sliding.middle] > 0, np.min(view[sliding.start], axis=1)
     whole = all_windows(len(log), length, h) if by_command else None
-    of_counts = resolution(log["y"]) / np.sqrt(12.0)
-    noise_y = min(motion.noise, max(local_noise(log["y"]), of_counts))
+    quiet = max(local_noise(log["y"]), resolution(log["y"]) / np.sqrt(12.0))
+    # A position that stands for a fifth of its log to the last digit hides its noise there.
+    noise_y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
+    noise_y = max(noise_y, EXACT * float(np.ptp(log["y"])))
     noise_F = _beside_control(log) if held else local_noise(log["F"])
     one = Moving(log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise)
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one

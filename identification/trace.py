@@ -76,6 +76,7 @@ Progress = Callable[[str, float], None]
 ALIKE = 10.0  # gain by which two effects that explain equally may differ
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
+HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 RUNS = {
     "v": "strokes at several constant speeds",
@@ -155,7 +156,7 @@ def trace(
         if not left.depends_on and not after.led:
             left = in_run(after, logs, drive)
     slowest = choice.base[MECHANICAL].slowest
-    remarks += _remarks(choice, after, left, logs, seen)
+    remarks += _remarks(choice, after, left, logs, seen, rig)
     return Trace(
         verdict=verdict,
         before=errors_of(before, slowest, (), logs, seen, drive),
@@ -178,8 +179,9 @@ def trace(
 
 
 def _remarks(
-    choice: Choice, after: Model, left: Dependence, logs: Sequence[Moving], seen: Sequence[Moving]
-) -> Iterator[str]:
+    choice: Choice, after: Model, left: Dependence, logs: Sequence[Moving], seen: Sequence[Moving],
+    rig: Rig,
+) -> Iterator[str]:  # fmt: skip
     """What whoever reads the trace has to know of it."""
     if after.led:
         yield "the motion is imposed (inertia is of no account): no free run is judged"
@@ -190,7 +192,7 @@ def _remarks(
         )
     always = beyond_friction(choice.end.theta)
     if always is not None:
-        yield constant_remark(always)
+        yield constant_remark(always, units_of(rig.motion)["F_cp"])
     if left.swing > 0.0:
         yield (
             f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"
@@ -209,13 +211,16 @@ def useless(choice: Choice, before: Model, after: Model) -> bool:
     """Whether effects explain neither the run nor, to the sensors' noise, the equations.
 
     Where no effect of the library is the right one, the nearest stands in for it: it lowers what
-    the equations leave, bends the other parameters, and hides on what the rest depends.
+    the equations leave (though not to a hundredth), bends the other parameters, and hides on what
+    the rest depends.
     """
     if after.led or not choice.steps:
         return False
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
     lacked = any(spread(choice.first[e]) > MUCH**2 for e in told)
-    if lacked and all(spread(choice.base[e]) <= MUCH**2 for e in told):
+    if lacked and all(
+        spread(choice.base[e]) <= max(MUCH**2, HUNDREDTH * spread(choice.first[e])) for e in told
+    ):
         return False
     return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
 

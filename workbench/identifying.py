@@ -23,7 +23,7 @@ from identification.inverse_model import ForceError, Smoothing, force_error
 from identification.karnopp import NAMES
 from identification.log import Log, Rig
 from identification.output_error import fit_karnopp
-from identification.plant import Actuator, Motor
+from identification.plant import Actuator, Motor, units_of
 from identification.residual_tests import residual_tests
 from identification.result import Drive, Estimate, KarnoppFit
 from workbench.model import ArxPlant, ArxTests, Correlation, FitSummary, LogEntry, Model, versions
@@ -76,10 +76,11 @@ def identify(
     for log in logs:  # wrong options are refused before the long part
         decimation(log.h, options.design_period)
     fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
+    unit = units_of(rig.motion)["F_cp"]
     always = None if fit.adequate else constant_force(logs, held=rig.kind == "motor")
     if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
-        why = f"m: {first}" if always is None else constant_remark(always)
+        why = f"m: {first}" if always is None else constant_remark(always, unit)
         raise NotIdentifiable(f"none of the nine parameters is identifiable: {why}")
     plant, reason = _arx_or_reason(logs, options)
     errors = _force_error(logs[0], fit, rig)
@@ -103,7 +104,7 @@ def identify(
                 force_rms=errors.rms if errors else None,
                 remarks=(
                     *fit.remarks,
-                    *([] if always is None else [constant_remark(always)]),
+                    *([] if always is None else [constant_remark(always, unit)]),
                     *closed_loop_remarks(logs),
                 ),
             ),

@@ -61,6 +61,32 @@ def test_emps_held_out_errors_do_not_rise(
         assert after[error] <= before[error]
 
 
+def test_a_seismic_bearing_gives_way_before_it_slides(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    split_of("friction_backlash", data)
+    found = traced(["--card", "friction_backlash"], tmp_path / "trace", capsys)
+    assert [one["key"] for one in found["effects"]][:1] == ["presliding"]
+    for error in ("force_rms", "force_relative"):
+        before, after = (found[when]["test"][error] for when in ("before", "after"))
+        assert after <= 0.85 * before
+
+
+def test_a_pendulum_on_a_servo_has_its_gravity(
+    data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    split_of("xl330_servo", data)
+    text = card_path("xl330_servo").read_text(encoding="utf-8")
+    card = tmp_path / "card.toml"  # the torque in parts of that at full command
+    card.write_text(text.replace("[rig]\n", "[rig]\nforce_per_command = 1.0\n"), encoding="utf-8")
+    found = traced(["--card", str(card)], tmp_path / "trace", capsys)
+    first = found["effects"][0]["key"]
+    # Within +-1.2 rad a sine, a line and a piece of either differ little.
+    assert first in ("spring", "cogging", "end_cushion")
+    before, after = (found[when]["test"]["force_rms"] for when in ("before", "after"))
+    assert after <= 0.7 * before
+
+
 def test_a_training_log_is_no_test(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -13,7 +13,7 @@ def test_a_weight_larger_than_friction_is_found(force: float) -> None:
     pulled = log.with_signals(F=log["F"] - force)  # the force that the weight spares
     found = constant_force([pulled], held=True)
     assert found == pytest.approx(force, abs=0.5 * abs(NINE.F_cp - NINE.F_cn) + 0.5)
-    assert f"{force:.3g} N" in remark(force)
+    assert f"{force:.3g} N" in remark(force, "N")
 
 
 def test_what_unequal_levels_can_hold_is_not_spoken_of() -> None:
