@@ -200,8 +200,8 @@ def _remarks(
         )
     if not after.led and driven_only(logs):
         yield (
-            "the force hardly ever opposes the motion: friction in proportion to it would change"
-            " mass and friction by one factor and not show (a run that brakes hard would show it)"
+            "the force hardly ever opposes the motion, so friction in proportion to it would not"
+            " show (a run that brakes hard would show it)"
         )
     if not seen:
         yield "no test log: the test errors are those of stretches left out in turn"

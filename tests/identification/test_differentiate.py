@@ -11,6 +11,7 @@ from identification.differentiate import (
     differentiate,
     low_pass,
     parallel_filter,
+    resolution,
     spectrum,
 )
 from identification.errors import BadLog
@@ -40,6 +41,23 @@ def test_quantisation_is_a_twelfth_of_its_square() -> None:
     y, _, _ = two_sines()
     step = 1e-5
     assert spectrum(step * np.round(y / step), h).noise == pytest.approx(step / 12**0.5, rel=0.1)
+
+
+def test_counts_are_seen_through_another_clock() -> None:
+    step, t = 1.5e-3, np.arange(2000) * 5e-3
+    counted = step * np.round(0.4 * np.sin(1.5 * t) / step)
+    clock = t + 1e-3 * np.random.default_rng(1).uniform(-1.0, 1.0, len(t))
+    again = np.interp(t, np.sort(clock), counted)
+    assert resolution(counted) == pytest.approx(step)
+    assert resolution(again) == pytest.approx(step)
+
+
+@pytest.mark.parametrize("stuck", [0.0, 0.3])
+def test_a_position_with_noise_has_no_counts(stuck: float) -> None:
+    t = np.arange(2000) * 5e-3
+    y = np.sin(1.5 * t) + 1e-4 * np.random.default_rng(2).standard_normal(len(t))
+    y[: round(stuck * len(y))] = y[0]  # a stuck transducer stands at one level
+    assert resolution(y) == 0.0
 
 
 def test_cutoff_falls_as_the_noise_rises() -> None:
