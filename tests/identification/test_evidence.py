@@ -10,7 +10,7 @@ from identification.log import Log
 @pytest.mark.parametrize("noise", [0.0, 1e-5])
 def test_noise_is_never_nothing(noise: float) -> None:
     # A position that stands for most of its log to the last digit has no third differences there.
-    t = np.arange(4000) * 2e-3
+    t = 2e-3 * np.arange(4000, dtype=np.float64)
     swing = 0.05 * np.sin(2.0 * np.pi * np.clip(t - 6.0, 0.0, None))
     y = swing + np.where(t > 6.0, noise, 0.0) * np.random.default_rng(3).standard_normal(len(t))
     log = Log("stands", {"t": t, "y": y, "F": np.cos(t)})

@@ -43,6 +43,7 @@ SIGNALS = {
     "p_p": "pressure p_p [Pa]",
     "p_n": "pressure p_n [Pa]",
     "a": "acceleration [{velocity}/s]",
+    "phase": "part of the swing's period [1]",
     "reversal": "time since the last reversal [s]",
     "du": "rate of the command [V/s]",
 }
@@ -142,8 +143,25 @@ def _unexplained(found: Trace) -> Picture | None:
         return None
     having = [r for r in found.residuals if set(wanted) & set(r.signals)]
     residual = max(having or found.residuals, key=_in_noise)
+    if found.unknown.swing > 0.0 and "t" in residual.signals:
+        folded = folded_at(residual, found.unknown.swing)
+        return Picture(folded, "phase", None, folded.before, "before", None)
     named = [name for name in (*wanted, "v", "y", *residual.signals) if name in residual.signals]
     return Picture(residual, named[0], None, residual.before, "before", None) if named else None
+
+
+def folded_at(residual: Residual, rate: float) -> Residual:
+    """The first log's rows, with the part of a swing's period [1] at `rate` [Hz] as a signal.
+
+    A swing keeps its rate from log to log, not its phase.
+    """
+    own = residual.log == residual.log[0]
+    signals = {k: v[own] for k, v in residual.signals.items()}
+    signals["phase"] = signals["t"] * rate % 1.0
+    return Residual(
+        residual.equation, residual.t[own], residual.log[own], residual.before[own],
+        residual.after[own], residual.noise[own], signals,
+    )  # fmt: skip
 
 
 def _in_noise(residual: Residual) -> float:
