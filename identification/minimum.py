@@ -64,6 +64,8 @@ def gauss_newton(
     for _ in range(steps):
         J = jacobian(fun, x, r, step_by)
         A, g = J.T @ J, J.T @ r
+        if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
+            break  # beyond what can be computed with: no direction is known
         size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
         for _ in range(TRIES):
             step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]

@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
+from identification.arrays import Array, BoolArray, IntArray
 from identification.effect_step import LONGEST_BRISTLE
 from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
@@ -147,7 +147,10 @@ def judge(
         parts = []
         for one, own, size in zip(logs, free, sizes, strict=True):
             r = left(tried, one, drive, own)
-            parts.append(np.full(size, LOST) if r is None else r.ravel())
+            if r is None or not np.all(np.isfinite(r)):
+                parts.append(np.full(size, LOST))
+                continue
+            parts.append(np.clip(r, -LOST, LOST).ravel())
         return np.concatenate(parts)
 
     return errors_of
@@ -323,21 +326,22 @@ def misfit(
             r = left(plant, one, drive, freed(plant, one, drive, begun))
             if r is not None:
                 window = window_of(begun, len(one.log)) if free else None
-                least = min(least, max(mean_loss(own, window) for own in r))
+                moves = one.signals["d"] != 0
+                least = min(least, max(mean_loss(own, window, moves) for own in r))
         worst = max(worst, least)
     return worst
 
 
-def mean_loss(r: Array, window: IntArray | None = None) -> float:
+def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None = None) -> float:
     """Robust mean square of errors (n,), 1 for noise; window (n,): numbers of the stretches of
-    which the worst do not count."""
+    which the worst do not count, of those in which the body moves (n,) at all, so many of them."""
     if window is None:
         return loss(r) / len(r) / NOISE_LOSS
     square = np.log1p((r / ROBUST) ** 2) * ROBUST**2 / NOISE_LOSS
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
-    order = np.argsort(each)
-    kept = order[: max(1, int(np.ceil((1.0 - LUCK) * len(order))))]
+    told = len(size) if moves is None else np.count_nonzero(np.bincount(window, moves))
+    kept = np.argsort(each)[: max(1, len(size) - int(LUCK * told))]
     return float(np.average(each[kept], weights=size[kept]))
 
 
