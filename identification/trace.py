@@ -77,6 +77,7 @@ ALIKE = 10.0  # gain by which two effects that explain equally may differ
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
+SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 RUNS = {
     "v": "strokes at several constant speeds",
@@ -283,6 +284,13 @@ def _enough(logs: Sequence[Moving]) -> None:
         raise NotIdentifiable(
             f"{logs[0].log.name}: {rows} stretches of sliding in one direction long enough to"
             f" judge ({FEWEST_ROWS} needed); log longer or faster motion"
+        )
+    share = float(np.mean(np.concatenate([one.signals["d"] != 0 for one in logs])))
+    if share < SLIDES and rows < MANY_ROWS:
+        raise NotIdentifiable(
+            f"{logs[0].log.name}: the body slides for {100 * share:.1f} % of the log, in {rows}"
+            f" stretches ({100 * SLIDES:.0f} %, or {MANY_ROWS} stretches, needed to tell its mass"
+            " from its friction); drive it harder, or log longer motion"
         )
 
 

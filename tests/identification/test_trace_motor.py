@@ -7,6 +7,7 @@ import pytest
 
 from identification.choice import first_stage
 from identification.differentiate import resolution
+from identification.errors import NotIdentifiable
 from identification.evidence import MECHANICAL
 from identification.library import Library, built_in
 from identification.log import Log, Rig
@@ -93,3 +94,15 @@ def test_a_force_that_never_brakes_is_said_so() -> None:
     braking = np.where(one.log["t"] % 1.0 < 0.1, -1.0, 1.0) * one.log["F"]
     assert not driven_only([replace(one, log=one.log.with_signals(F=braking))])
     assert any("hardly ever opposes" in line for line in traced(made(6)).remarks)
+
+
+def test_a_machine_that_hardly_moves_is_refused() -> None:
+    n = 30_000
+    driven = made(11, n=n)
+    stands = driven.with_signals(
+        y=np.where(np.arange(n) < 1000, driven["y"], driven["y"][999]),
+        **{k: np.where(np.arange(n) < 1000, driven[k], 0.0) for k in ("u", "F")},
+    )
+    noise = 1e-5 * np.random.default_rng(12).standard_normal(n)
+    with pytest.raises(NotIdentifiable, match=r"slides for \d\.\d % of the log"):
+        traced(stands.with_signals(y=stands["y"] + noise))
