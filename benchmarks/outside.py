@@ -1,15 +1,17 @@
 """Logs of a program written apart from ours: does `workbench trace` name what was put in them?
 
     python benchmarks/outside.py [--first 100] [--seeds 1] [--machines pneumatic force motor]
-        [--effects spring stribeck] [--jobs 2]
+        [--effects spring stribeck] [--strange] [--varied] [--jobs 2]
 
 A machine a seed is drawn around three rigs, in a plain position loop of its own, and simulated by
 Euler steps of 20 us that share no line with the package's kernels; what the effects do is written
 here too, and not always as in the library (friction along the stroke and by temperature scales the
 stick limits, Stribeck's level adds to them). Each log is written as CSV with a card and traced by
 the command line. "Right" is the verdict that an engineer would want: the effect and nothing else,
-"none" for the plain machine. Seeds 11 and 12 of an earlier form of this program served to find
-faults; those from 100 on judge. Exit status 0 in any case.
+"none" for the plain machine. `--strange`: eight effects that no library has; right is "unknown",
+with a signal on which the effect depends. `--varied`: a clock, length, noise and encoder drawn for
+each log, instead of 60 s at 500 Hz with little noise. Seeds below 100 served to find faults, as did
+102 with `--strange`; others judge. Exit status 0 in any case.
 """
 
 import argparse
@@ -25,11 +27,11 @@ from typing import Any
 from benchmarks.outside_rig import EFFECTS, IN_COMMAND, REFERENCES, RIGS, STRANGE, write
 
 
-def traced(machine: str, effect: str, seed: int, place: int) -> tuple[str, bool]:
+def traced(machine: str, effect: str, seed: int, place: int, varied: bool) -> tuple[str, bool]:
     """One line on one machine, and whether its verdict is right."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        write(folder, machine, effect, seed, place)
+        write(folder, machine, effect, seed, place, varied)
         begun = time.perf_counter()
         command = [sys.executable, "-m", "workbench", "trace", str(folder / "train.csv"), "--test",
                    str(folder / "test.csv"), "--card", str(folder / "card.toml"), "--out",
@@ -65,13 +67,14 @@ def main() -> int:
     parser.add_argument("--effects", nargs="+", choices=[*EFFECTS, *STRANGE],
                         default=list(EFFECTS))  # fmt: skip
     parser.add_argument("--strange", action="store_true", help="effects that no library has")
+    parser.add_argument("--varied", action="store_true", help="a recording of its own for each")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
     every = [*EFFECTS, *STRANGE]
     if given.strange:
         given.effects = list(STRANGE)
     cases = [
-        (machine, effect, seed, every.index(effect))
+        (machine, effect, seed, every.index(effect), given.varied)
         for seed in range(given.first, given.first + given.seeds)
         for machine in given.machines
         for effect in given.effects

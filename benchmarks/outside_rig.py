@@ -9,8 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.compiled import compiled
 
-H, SUB, SECONDS = 2e-3, 100, 60.0
-NOISE_Y, NOISE_F, NOISE_P = 1e-5, 1e-2, 10.0
+EULER = 2e-5  # s
 REACH, SPEED = 0.06, 0.1  # m, m/s, at which sizes are given
 AREA_P, AREA_N, SUPPLY, MEAN, K_A = 12.6e-4, 10e-4, 6e5, 3e5, 20.0
 REFERENCES = ("steps", "multisine", "triangle")
@@ -36,6 +35,32 @@ STRANGE = {"vibration": ("shake", {"t"}), "jump": ("jump", {"t"}), "ramp": ("ram
 
 
 @dataclass(frozen=True)
+class Recording:
+    """How a machine is logged: every h [s], so long [s], noise of y [m], F [N] and the pressures
+    [Pa], and the encoder's count [m], 0 where it has none."""
+
+    h: float = 2e-3
+    seconds: float = 60.0
+    noise_y: float = 1e-5
+    noise_F: float = 1e-2
+    noise_p: float = 10.0
+    count: float = 0.0
+
+
+def recording(rng: np.random.Generator) -> Recording:
+    """Another clock, length, noise and transducer than the usual one."""
+    worse = 10.0 ** rng.uniform(-0.5, 0.7)
+    return Recording(
+        h=float(rng.choice([1e-3, 2e-3, 4e-3, 5e-3])),
+        seconds=float(rng.choice([30.0, 60.0, 90.0])),
+        noise_y=1e-5 * worse,
+        noise_F=1e-2 * worse,
+        noise_p=10.0 * worse,
+        count=float(rng.choice([0.0, 1e-6, 2e-5])),
+    )
+
+
+@dataclass(frozen=True)
 class Rig:
     """Nine parameters, gains of the loop (k_p, k_d, k_i), and the actuator (k1, k2)."""
 
@@ -56,32 +81,37 @@ RIGS: Mapping[str, Rig] = {
 @compiled
 def run(
     p: Array, gains: Array, k1: float, k2: float, limit: float, motor: bool, e: Array, r: Array,
-    n_y: Array,
+    n_y: Array, h: float, count: float,
 ) -> Array:  # fmt: skip
-    """Position shown, command and force (3, n) at every sample, from rest."""
+    """Position shown, command and force (3, n) at every sample, every h [s], from rest."""
     m, f_cp, f_cn, f_vp, f_vn, dv_p, dv_n, f_sp, f_sn = p
     out = np.zeros((3, len(r)))
     sent = np.zeros(64)
     y, v, force, shown, rested = r[0], 0.0, 0.0, r[0], 0.0
-    speed, before, total, dt, held = 0.0, r[0], 0.0, H / SUB, 0.0
+    speed, before, total, held = 0.0, r[0], 0.0, 0.0
+    sub = round(h / EULER)
+    dt = h / sub
+    smoothed = 1.0 - 0.7 ** (h / 2e-3)  # the loop's low-pass of the speed, of one bandwidth
     for i in range(len(r)):
         shown = min(max(shown, y - 0.5 * e[0]), y + 0.5 * e[0])
         seen = shown + n_y[i]
-        speed += 0.3 * ((seen - before) / H - speed)
+        if count > 0.0:
+            seen = count * np.round(seen / count)
+        speed += smoothed * ((seen - before) / h - speed)
         before = seen
-        total = min(max(total + gains[2] * H * (r[i] - seen), -limit), limit)
+        total = min(max(total + gains[2] * h * (r[i] - seen), -limit), limit)
         u = min(max(gains[0] * (r[i] - seen) - gains[1] * speed + total, -limit), limit)
         out[0, i], out[1, i], out[2, i] = seen, u, force
         sent[1:] = sent[:-1].copy()
         sent[0] = u
-        given = sent[int(e[1])]
+        given = sent[round(e[1] / h)]
         given = np.sign(given) * max(abs(given) - e[2], 0.0)
         if e[21] > 0.0:
             given = e[21] * np.tanh(given / e[21])
-        late = i * H > 0.5 * SECONDS
-        outer = e[17] * np.sin(2.0 * np.pi * e[18] * i * H) + e[20] * i * H
+        late = i > 0.5 * len(r)
+        outer = e[17] * np.sin(2.0 * np.pi * e[18] * i * h) + e[20] * i * h
         outer += e[19] if late else 0.0
-        for j in range(SUB):
+        for j in range(sub):
             force = k1 * given if motor else force + dt * (k1 * given - k2 * v - e[3] * force)
             drive = (
                 force
@@ -92,7 +122,7 @@ def run(
                 - e[5] * y**3
                 + e[6] * np.sin(2.0 * np.pi * y / e[7])
             )
-            scale = 1.0 + e[8] * np.exp(-(i + j / SUB) * H / e[9]) + e[10] * y
+            scale = 1.0 + e[8] * np.exp(-(i + j / sub) * h / e[9]) + e[10] * y
             scale += e[25] if late else 0.0
             more = e[11] * abs(force)
             stuck = v == 0.0
@@ -116,9 +146,9 @@ def run(
     return out
 
 
-def reference(kind: str, rng: np.random.Generator) -> Array:
+def reference(kind: str, rng: np.random.Generator, h: float, seconds: float) -> Array:
     """Ramps to random places with dwells, five sines, or a triangle with a faster sine at times."""
-    t = np.arange(round(SECONDS / H)) * H
+    t = np.arange(round(seconds / h)) * h
     if kind == "multisine":
         sizes, rates = (0.6, 0.35, 0.2, 0.08, 0.03), (0.08, 0.21, 0.47, 0.9, 1.7)
         phases = rng.uniform(0.0, 2.0 * np.pi, 5)
@@ -131,8 +161,8 @@ def reference(kind: str, rng: np.random.Generator) -> Array:
     out, here = list[Array](), 0.0
     while sum(len(part) for part in out) < len(t):
         there = rng.uniform(-REACH, REACH)
-        out.append(np.linspace(here, there, round(rng.uniform(0.1, 0.8) / H)))
-        out.append(np.full(round(rng.uniform(0.7, 2.5) / H), there))
+        out.append(np.linspace(here, there, round(rng.uniform(0.1, 0.8) / h)))
+        out.append(np.full(round(rng.uniform(0.7, 2.5) / h), there))
         here = there
     return np.asarray(np.concatenate(out)[: len(t)])
 
@@ -142,7 +172,7 @@ def sizes_of(effect: str, machine: str, coulomb: float) -> Array:
     share = 0.2 * coulomb
     dead = share / K_A if machine == "motor" else 0.1
     full = {
-        "play": 2e-4, "late": 4.0, "dead": dead, "leak": 1.5, "k": share / REACH,
+        "play": 2e-4, "late": 8e-3, "dead": dead, "leak": 1.5, "k": share / REACH,
         "k_cube": share / REACH**3, "ripple": share, "warm": 0.3, "along": 0.25 / REACH,
         "by_load": 0.15, "slow": share, "square": share / SPEED**2, "grown": share,
         "shake": share, "jump": share, "ramp": share / 30.0, "curve": 0.15 if machine == "pneumatic"
@@ -154,20 +184,24 @@ def sizes_of(effect: str, machine: str, coulomb: float) -> Array:
     return np.array([one[name] for name in SIZES])
 
 
-def write(folder: Path, machine: str, effect: str, seed: int, place: int) -> None:
-    """Both logs and the card of one machine."""
+def write(
+    folder: Path, machine: str, effect: str, seed: int, place: int, varied: bool = False
+) -> None:
+    """Both logs and the card of one machine; varied: in a recording of its own."""
     rig, rng = RIGS[machine], np.random.default_rng([seed, place])
+    how = recording(np.random.default_rng([seed, place, 1])) if varied else Recording()
     nine = np.array(rig.nine) * rng.uniform(0.75, 1.3, 9)
     nine[7:] = np.sign(nine[7:]) * np.maximum(np.abs(nine[7:]), 1.15 * nine[1:3])
     e = sizes_of(effect, machine, float(np.mean(nine[1:3])))
     for name in ("train", "test"):
-        r = reference(REFERENCES[(seed + place) % 3], rng)
-        noise = NOISE_Y * rng.standard_normal(len(r))
+        r = reference(REFERENCES[(seed + place) % 3], rng, how.h, how.seconds)
+        noise = how.noise_y * rng.standard_normal(len(r))
         y, u, F = run(
-            nine, np.array(rig.gains), rig.k1, rig.k2, rig.limit, machine == "motor", e, r, noise
-        )
-        columns = {"time": np.arange(len(r)) * H, "pos": y}
-        F = F + NOISE_F * rng.standard_normal(len(r))
+            nine, np.array(rig.gains), rig.k1, rig.k2, rig.limit, machine == "motor", e, r, noise,
+            how.h, how.count,
+        )  # fmt: skip
+        columns = {"time": np.arange(len(r)) * how.h, "pos": y}
+        F = F + how.noise_F * rng.standard_normal(len(r))
         if machine != "force":
             columns["volt"] = u
         if machine == "force":
@@ -175,8 +209,10 @@ def write(folder: Path, machine: str, effect: str, seed: int, place: int) -> Non
         if machine == "pneumatic":  # eq. (7): F = S_p P_p - S_n P_n - (S_p - S_n) P_s
             both = F + (AREA_P - AREA_N) * SUPPLY
             p_n = (2.0 * AREA_P * MEAN - both) / (AREA_P + AREA_N)
-            columns["pp"] = (both + AREA_N * p_n) / AREA_P + NOISE_P * rng.standard_normal(len(r))
-            columns["pn"] = p_n + NOISE_P * rng.standard_normal(len(r))
+            columns["pp"] = (both + AREA_N * p_n) / AREA_P + how.noise_p * rng.standard_normal(
+                len(r)
+            )
+            columns["pn"] = p_n + how.noise_p * rng.standard_normal(len(r))
         table = np.column_stack(list(columns.values()))
         np.savetxt(
             folder / f"{name}.csv", table, "%.10g", ",", header=",".join(columns), comments=""

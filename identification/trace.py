@@ -5,28 +5,23 @@ The choice is made on the two equations in weak form and on rest and breakaway (
 plant with the effects found is then refined on its free run (`refit`).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from identification.approach import SHORT
 from identification.before_after import errors_of, noise_of
-from identification.candidates import Candidate, best_of
+from identification.candidates import best_of
 from identification.choice import (
-    SHARE,
     Choice,
-    Step,
     choose,
     first_stage,
-    merit,
     rough,
-    share,
 )
 from identification.constant import beyond_friction
 from identification.constant import remark as constant_remark
 from identification.drift import drift
-from identification.effects._base import Param
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import (
     ACTUATOR,
@@ -40,57 +35,43 @@ from identification.evidence import (
     solve,
     stacked,
 )
+from identification.findings import (
+    found_effect,
+    next_experiment,
+    parameters_of,
+    residuals_of,
+    rivals_of,
+    verdict_of,
+)
 from identification.forward import judged_forward, most_left
-from identification.held_out import left_out
-from identification.karnopp import NAMES
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
     MUCH,
     in_run,
     left_over,
-    signals_at,
     too_much,
 )
 from identification.library import Library
 from identification.log import Log, Rig
 from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest
-from identification.outcome import Outcome, base_outcomes, rms, spread
+from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
-from identification.plant import Actuator, units_of
+from identification.plant import units_of
 from identification.refit import COMPLETE, loose, misfit, refit
-from identification.result import Drive, Estimate
-from identification.stage import Stage
-from identification.structure import Model, band, led, model_of, untold
+from identification.result import Drive
+from identification.structure import Model, band, led, model_of
 from identification.trace_result import (
-    Change,
     Dependence,
-    FoundEffect,
-    Residual,
-    Rival,
     Trace,
-    Verdict,
 )
 
 Progress = Callable[[str, float], None]
-ALIKE = 10.0  # gain by which two effects that explain equally may differ
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
-RUNS = {
-    "v": "strokes at several constant speeds",
-    "y": "the same short stroke at several places",
-    "t": "the same motion cold and, after running warm, once more",
-    "F": "the same motion with and without an added load, and hard braking",
-    "u": "a slow triangle of the command through zero",
-    "p_p": "the same motion at several chamber pressures",
-    "p_n": "the same motion at several chamber pressures",
-    "rest": "breakaways after rests of 0.1 s to 30 s",
-    "reversal": "small slow reversals below and just above breakaway",
-}
-SHOWN = 6  # rivals of each effect
 
 
 def trace(
@@ -150,7 +131,7 @@ def trace(
     enough = DECISIVE if choice.steps else COMPLETE  # a refinement may end short of its minimum
     left = Dependence((), 0.0) if after.misfit <= enough else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
-    verdict = _verdict(choice, left, changed)
+    verdict = verdict_of(choice, left, changed)
     if verdict != "unknown" and too_much(choice, after):
         verdict = "unknown"
         left = left_over(choice, after, any_size=True)
@@ -166,15 +147,15 @@ def trace(
         noise_F=float(np.mean([one.noise_F for one in logs])),
         noise_force=noise_of(choice.base, MECHANICAL) or 0.0,
         noise_actuator=noise_of(choice.base, ACTUATOR),
-        effects=tuple(_found(s, after, choice) for s in choice.steps),
-        rivals=_rivals(choice),
+        effects=tuple(found_effect(s, after, choice) for s in choice.steps),
+        rivals=rivals_of(choice),
         unknown=left,
         drift=changed,
-        next_experiment=_next_experiment(verdict, choice, left),
-        parameters_before=_parameters(before, rig),
-        parameters_after=_parameters(after, rig),
+        next_experiment=next_experiment(verdict, choice, left),
+        parameters_before=parameters_of(before, rig),
+        parameters_after=parameters_of(after, rig),
         plant=after.plant,
-        residuals=_residuals(choice.start, choice.first, choice.end, choice.base),
+        residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
         remarks=tuple(remarks),
     )
 
@@ -292,129 +273,3 @@ def _enough(logs: Sequence[Moving]) -> None:
             f" stretches ({100 * SLIDES:.0f} %, or {MANY_ROWS} stretches, needed to tell its mass"
             " from its friction); drive it harder, or log longer motion"
         )
-
-
-def _verdict(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Verdict:
-    if left.depends_on:
-        return "unknown"
-    if any(_alike(step) for step in choice.steps):
-        return "inseparable"
-    if choice.steps:
-        return "effect"
-    return "drift" if drift else "none"
-
-
-def _alike(step: Step) -> tuple[Candidate, ...]:
-    """Rivals that explain as much as the effect taken, but for luck."""
-    mine = merit(step.candidate)
-    return tuple(c for c in step.rivals if mine - merit(c) < ALIKE and share(c, step.base) >= SHARE)
-
-
-def _found(step: Step, after: Model, choice: Choice) -> FoundEffect:
-    effect = step.candidate.effect
-    acting = next(a for a in after.plant.effects if a.key == effect.key)
-    params = {
-        p.name: _of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
-        for p in effect.params
-    }
-    explained = step.explained
-    if explained is None:
-        explained = share(step.candidate, step.base)
-    return FoundEffect(effect, params, explained, step.p_value)
-
-
-def _of_effect(p: Param, value: float, sd: float | None) -> Estimate:
-    if untold(sd, value, p.typical):
-        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
-    return _estimate(value, p.unit, sd)
-
-
-def _estimate(value: float, unit: str, sd: float | None) -> Estimate:
-    if sd is None:
-        return Estimate(value, unit, reason="held")
-    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
-
-
-def _rivals(choice: Choice) -> tuple[Rival, ...]:
-    """Rivals of each effect in the order of what they gain."""
-    out = []
-    for step in choice.steps:
-        alike = {c.effect.key for c in _alike(step)}
-        for c in step.rivals[:SHOWN]:
-            key = c.effect.key
-            share = c.gain / step.candidate.gain if step.candidate.gain > 0 else 0.0
-            why = (
-                f"explains as much as {step.candidate.effect.key} on these logs"
-                if key in alike
-                else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
-            )
-            out.append(Rival(key, _left_out_rms(step, c), why))
-    return tuple(out)
-
-
-def _left_out_rms(step: Step, rival: Candidate) -> float | None:
-    """Force error of a rival [N] on stretches left out, over the rows that count for the best."""
-    if MECHANICAL not in rival.outcomes:
-        return None
-    o = rival.outcomes[MECHANICAL]
-    return rms(left_out(o.rows, step.candidate.outcomes.get(MECHANICAL, o).slowest)[0])
-
-
-def _next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
-    if verdict == "inseparable":
-        step = next(s for s in choice.steps if _alike(s))
-        mine = step.candidate.effect
-        other = _alike(step)[0].effect
-        apart = [s for s in (*mine.depends_on, *other.depends_on)
-                 if (s in mine.depends_on) != (s in other.depends_on)]  # fmt: skip
-        how = RUNS.get(apart[0] if apart else mine.depends_on[0], "a run with richer motion")
-        return f"to tell {mine.key} from {other.key}: {how}"
-    if verdict == "unknown" and not left.depends_on:
-        return "to find what is missing: runs that vary speed, place, load and time one by one"
-    if verdict == "unknown" and left.swing > 0.0:
-        return "to find what swings: a log at standstill, without and with the machines around"
-    if verdict == "unknown":
-        how = RUNS.get(left.depends_on[0], f"runs in which {left.depends_on[0]} varies by itself")
-        return f"to find what depends on {', '.join(left.depends_on)}: {how}"
-    return ""
-
-
-def _parameters(model: Model, rig: Rig) -> dict[str, Estimate]:
-    """The nine and the actuator of a model."""
-    values = dict(zip(NAMES, model.plant.friction.array.tolist(), strict=True))
-    if isinstance(model.plant.actuator, Actuator):
-        values |= {"k1": model.plant.actuator.k1, "k2": model.plant.actuator.k2}
-    units = units_of(rig.motion)
-    return {k: _estimate(v, units[k], model.sd.get(k)) for k, v in values.items()}
-
-
-def _residuals(
-    start: Stage, first: Mapping[str, Outcome], end: Stage, base: Mapping[str, Outcome]
-) -> tuple[Residual, ...]:
-    """Rows for the pictures."""
-    out = []
-    for equation in (MECHANICAL, ACTUATOR):
-        if equation not in first or len(first[equation].rows.b) != len(base[equation].rows.b):
-            continue
-        a, b = first[equation], base[equation]
-        keep = b.rows.speed >= b.slowest
-        windows = [one.sliding if equation == MECHANICAL else one.whole for one in start.logs]
-        t, number, offset = [], [], 0.0
-        for i, (one, w) in enumerate(zip(start.logs, windows, strict=True)):
-            assert w is not None
-            t.append(offset + one.log["t"][w.middle] - one.log["t"][0])
-            number.append(np.full(len(w.start), float(i)))
-            offset += one.log.duration
-        signals = {k: v[keep] for k, v in signals_at(start, equation).items()}
-        out.append(
-            Residual(
-                equation,
-                np.concatenate(t)[keep],
-                np.concatenate(number)[keep],
-                (a.fit.residual * a.rows.sd)[keep],
-                (b.fit.residual * b.rows.sd)[keep],
-                b.rows.sd[keep],
-                signals,
-            )
-        )
-    return tuple(out)

@@ -11,12 +11,10 @@ from identification.choice import choose, first_stage
 from identification.forward import (
     Contender,
     decisive,
-    grid,
     hidden,
     judged_forward,
     luck,
     most_left,
-    rigid,
 )
 from identification.library import built_in
 from identification.log import Rig
@@ -96,17 +94,6 @@ def test_luck_grows_with_what_was_tried() -> None:
     assert luck(replace(spring, gain=-3.0), 18) == 1.0
 
 
-def test_values_to_begin_from_lie_within_bounds() -> None:
-    one = seen(made(1))
-    for key in ("backlash", "presliding", "rising_stiction", "load_dependent_friction"):
-        effect = built_in()[key]
-        values = grid(effect, plant(), [one])
-        assert values
-        for v in values:
-            effect.acting(v)
-    assert grid(built_in()["spring"], plant(), [one]) == []
-
-
 def test_the_stretch_of_which_most_is_left_is_where_the_run_errs() -> None:
     one = seen(made(2))
     y = one.log["y"].copy()
@@ -117,14 +104,6 @@ def test_the_stretch_of_which_most_is_left_is_where_the_run_errs() -> None:
     assert len(worst.log) == 2000
     assert worst.log["t"][0] <= t[6000] and worst.log["t"][-1] >= t[6999]
     assert len(most_left(plant(), disturbed, "command", 60.0).log) == len(one.log)
-
-
-def test_a_contact_is_rigid_where_nothing_moves_at_rest() -> None:
-    _, first = first_stage([seen(made(2))], False)
-    assert rigid(first)
-    _, first = first_stage([seen(made(2, {"presliding": {"sigma_0": 5e4}}))], False)
-    assert not rigid(first)
-    assert not rigid({})
 
 
 def test_friction_by_load_takes_its_share_of_the_plain() -> None:

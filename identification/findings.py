@@ -1,0 +1,170 @@
+"""What is told of a choice: verdict, effects and sizes, rivals, the run that would tell more."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from identification.candidates import Candidate
+from identification.choice import SHARE, Choice, Step, merit, share
+from identification.effects._base import Param
+from identification.evidence import ACTUATOR, MECHANICAL
+from identification.held_out import left_out
+from identification.karnopp import NAMES
+from identification.left_over import signals_at
+from identification.log import Rig
+from identification.outcome import Outcome, rms
+from identification.plant import Actuator, units_of
+from identification.result import Estimate
+from identification.stage import Stage
+from identification.structure import Model, untold
+from identification.trace_result import (
+    Change,
+    Dependence,
+    FoundEffect,
+    Residual,
+    Rival,
+    Verdict,
+)
+
+ALIKE = 10.0  # gain by which two effects that explain equally may differ
+RUNS = {
+    "v": "strokes at several constant speeds",
+    "y": "the same short stroke at several places",
+    "t": "the same motion cold and, after running warm, once more",
+    "F": "the same motion with and without an added load, and hard braking",
+    "u": "a slow triangle of the command through zero",
+    "p_p": "the same motion at several chamber pressures",
+    "p_n": "the same motion at several chamber pressures",
+    "rest": "breakaways after rests of 0.1 s to 30 s",
+    "reversal": "small slow reversals below and just above breakaway",
+}
+SHOWN = 6  # rivals of each effect
+
+
+def verdict_of(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Verdict:
+    """The verdict in one word: what is left comes first, then rivals, effects and drift."""
+    if left.depends_on:
+        return "unknown"
+    if any(_alike(step) for step in choice.steps):
+        return "inseparable"
+    if choice.steps:
+        return "effect"
+    return "drift" if drift else "none"
+
+
+def _alike(step: Step) -> tuple[Candidate, ...]:
+    """Rivals that explain as much as the effect taken, but for luck."""
+    mine = merit(step.candidate)
+    return tuple(c for c in step.rivals if mine - merit(c) < ALIKE and share(c, step.base) >= SHARE)
+
+
+def found_effect(step: Step, after: Model, choice: Choice) -> FoundEffect:
+    """An effect taken, with its sizes in the refined plant and the share it explains."""
+    effect = step.candidate.effect
+    acting = next(a for a in after.plant.effects if a.key == effect.key)
+    params = {
+        p.name: _of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
+        for p in effect.params
+    }
+    explained = step.explained
+    if explained is None:
+        explained = share(step.candidate, step.base)
+    return FoundEffect(effect, params, explained, step.p_value)
+
+
+def _of_effect(p: Param, value: float, sd: float | None) -> Estimate:
+    if untold(sd, value, p.typical):
+        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
+    return _estimate(value, p.unit, sd)
+
+
+def _estimate(value: float, unit: str, sd: float | None) -> Estimate:
+    if sd is None:
+        return Estimate(value, unit, reason="held")
+    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
+
+
+def rivals_of(choice: Choice) -> tuple[Rival, ...]:
+    """Rivals of each effect in the order of what they gain."""
+    out = []
+    for step in choice.steps:
+        alike = {c.effect.key for c in _alike(step)}
+        for c in step.rivals[:SHOWN]:
+            key = c.effect.key
+            share = c.gain / step.candidate.gain if step.candidate.gain > 0 else 0.0
+            why = (
+                f"explains as much as {step.candidate.effect.key} on these logs"
+                if key in alike
+                else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
+            )
+            out.append(Rival(key, _left_out_rms(step, c), why))
+    return tuple(out)
+
+
+def _left_out_rms(step: Step, rival: Candidate) -> float | None:
+    """Force error of a rival [N] on stretches left out, over the rows that count for the best."""
+    if MECHANICAL not in rival.outcomes:
+        return None
+    o = rival.outcomes[MECHANICAL]
+    return rms(left_out(o.rows, step.candidate.outcomes.get(MECHANICAL, o).slowest)[0])
+
+
+def next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
+    """The run that would tell rivals apart, or on what the rest depends."""
+    if verdict == "inseparable":
+        step = next(s for s in choice.steps if _alike(s))
+        mine = step.candidate.effect
+        other = _alike(step)[0].effect
+        apart = [s for s in (*mine.depends_on, *other.depends_on)
+                 if (s in mine.depends_on) != (s in other.depends_on)]  # fmt: skip
+        how = RUNS.get(apart[0] if apart else mine.depends_on[0], "a run with richer motion")
+        return f"to tell {mine.key} from {other.key}: {how}"
+    if verdict == "unknown" and not left.depends_on:
+        return "to find what is missing: runs that vary speed, place, load and time one by one"
+    if verdict == "unknown" and left.swing > 0.0:
+        return "to find what swings: a log at standstill, without and with the machines around"
+    if verdict == "unknown":
+        how = RUNS.get(left.depends_on[0], f"runs in which {left.depends_on[0]} varies by itself")
+        return f"to find what depends on {', '.join(left.depends_on)}: {how}"
+    return ""
+
+
+def parameters_of(model: Model, rig: Rig) -> dict[str, Estimate]:
+    """The nine and the actuator of a model."""
+    values = dict(zip(NAMES, model.plant.friction.array.tolist(), strict=True))
+    if isinstance(model.plant.actuator, Actuator):
+        values |= {"k1": model.plant.actuator.k1, "k2": model.plant.actuator.k2}
+    units = units_of(rig.motion)
+    return {k: _estimate(v, units[k], model.sd.get(k)) for k, v in values.items()}
+
+
+def residuals_of(
+    start: Stage, first: Mapping[str, Outcome], end: Stage, base: Mapping[str, Outcome]
+) -> tuple[Residual, ...]:
+    """Rows for the pictures."""
+    out = []
+    for equation in (MECHANICAL, ACTUATOR):
+        if equation not in first or len(first[equation].rows.b) != len(base[equation].rows.b):
+            continue
+        a, b = first[equation], base[equation]
+        keep = b.rows.speed >= b.slowest
+        windows = [one.sliding if equation == MECHANICAL else one.whole for one in start.logs]
+        t, number, offset = [], [], 0.0
+        for i, (one, w) in enumerate(zip(start.logs, windows, strict=True)):
+            assert w is not None
+            t.append(offset + one.log["t"][w.middle] - one.log["t"][0])
+            number.append(np.full(len(w.start), float(i)))
+            offset += one.log.duration
+        signals = {k: v[keep] for k, v in signals_at(start, equation).items()}
+        out.append(
+            Residual(
+                equation,
+                np.concatenate(t)[keep],
+                np.concatenate(number)[keep],
+                (a.fit.residual * a.rows.sd)[keep],
+                (b.fit.residual * b.rows.sd)[keep],
+                b.rows.sd[keep],
+                signals,
+            )
+        )
+    return tuple(out)

@@ -1,0 +1,119 @@
+"""Structures to try in the forward run, and the values from which each begins."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.candidates import Candidate
+from identification.choice import ABSORBED, Choice, Step, gives_way
+from identification.effects._base import Effect, Param
+from identification.equations import by_load, slow_motion
+from identification.evidence import IN_ACTUATOR, REST, Moving
+from identification.grids import shape_grid
+from identification.needed import Setting, without
+from identification.outcome import Outcome, spread
+from identification.plant import Plant
+from identification.refit import loose
+from identification.rest import stretches
+from identification.structure import Model, inside
+
+STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
+SHOWN = 3  # rivals of an effect taken that are tried in its place
+MOST_TRIED = 40  # starts of one effect
+LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
+GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
+REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
+IN_RUN = ("sensor", "command", "delay", "bristle", "stiction")  # seen in the run above all
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """An effect to try beside the effects of `steps`, with values to begin from."""
+
+    steps: tuple[Step, ...]
+    base: Plant
+    effect: Effect
+    values: list[dict[str, float]]
+
+
+def structures(choice: Choice, model: Model, setting: Setting) -> Iterator[Trial]:
+    """One effect more, and another in the place of each."""
+    yield from _beside(choice.steps, model.plant, choice.tried, setting, False)
+    for i, step in enumerate(choice.steps):
+        stay = (*choice.steps[:i], *choice.steps[i + 1 :])
+        yield from _beside(stay, without(model, stay, setting), step.rivals, setting, True)
+
+
+def _beside(
+    steps: tuple[Step, ...],
+    base: Plant,
+    tried: Sequence[Candidate],
+    setting: Setting,
+    instead: bool,
+) -> Iterator[Trial]:
+    """Effects not in `steps` that the run may show better than the equations do, with values to
+    begin from; instead: of an effect taken, so the best of its rivals too."""
+    keys = {step.candidate.effect.key for step in steps}
+    regressed = {one.effect.key: one.values for one in tried}
+    ranked = sorted(tried, key=lambda one: -one.gain)
+    shown = {one.effect.key for one in ranked[: SHOWN if instead else 0]}
+    free = loose(base, setting.drive)
+    for key, effect in setting.library.items():
+        if key in keys or key in ABSORBED:
+            continue
+        if setting.drive == "force" and effect.acts in IN_ACTUATOR:
+            continue
+        if effect.acts == "bristle" and rigid(setting.first):
+            continue
+        if not all(gives_way(one, setting.first) for one in tried if one.effect.key == key):
+            continue
+        # Where every trial is a search, what the equations chose is not contested by all.
+        if key in shown or (seen_in_run(effect) and not (instead and free)):
+            values = [inside(effect, regressed[key])] if key in regressed else []
+            if values and effect.acts == "stiction":  # breakaways show less of it than there is
+                values = [
+                    inside(effect, {**values[0], **{k: a * values[0][k] for k in effect.linear}})
+                    for a in GROWN
+                ]
+            values += grid(effect, base, setting.short)
+            if values:
+                yield Trial(steps, base, effect, values)
+
+
+def rigid(first: Mapping[str, Outcome]) -> bool:
+    """Whether the body is seen at rest and does not move there: on bristles it would."""
+    return REST in first and spread(first[REST]) < STILL
+
+
+def seen_in_run(effect: Effect) -> bool:
+    """Whether a free run may show the effect where the equations do not.
+
+    One with a speed of its own shows in slow motion, most of which the equations leave out: a
+    wider band stands for it there.
+    """
+    return effect.acts in IN_RUN or by_load(effect) or slow_motion(effect)
+
+
+def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
+    """Values from which an effect that the equations hardly show is tried."""
+    if not seen_in_run(effect):
+        return []
+    if effect.signals and not all(any(k in one.log for k in effect.signals) for one in logs):
+        return []
+    each = [_starts_of(effect, p, base, logs) for p in effect.params]
+    names = effect.names
+    every = [dict(zip(names, map(float, x), strict=True)) for x in product(*each)]
+    return [inside(effect, x) for x in every[:MOST_TRIED]]
+
+
+def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) -> Array:
+    """Values of one parameter to begin from."""
+    if p.unit in ("N", "N m"):
+        return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(LEVELS)
+    if effect.acts == "stiction" and p.unit == "s":
+        rests = [(high - low) * one.log.h for one in logs for low, high in stretches(one, 2)]
+        return float(np.median(rests) if rests else p.typical) * np.array(REST_SHARES)
+    return shape_grid(effect, p, logs)
