@@ -31,7 +31,7 @@ from design.servo_kernels import (
 from design.servo_loop import SERVO_ROWS, servo_kernel
 from identification.arrays import Array
 from identification.clean import slope_filter
-from identification.effect_step import ACTUATOR, effect_table, pieces
+from identification.effect_table import ACTUATOR, effect_table, pieces
 from identification.errors import BadModel
 from identification.plant import Motor, Plant
 

@@ -7,13 +7,13 @@ from identification.arrays import Array, IntArray
 from identification.compiled import compiled
 from identification.effect_run import place_of
 from identification.effect_step import (
-    BRISTLE,
     acting_command,
     delayed,
     effect_step,
     shown_position,
     start_states,
 )
+from identification.effect_table import BRISTLE
 from identification.stepping import K1, STUCK, parameters, settled_mode
 
 SERVO_ROWS = 9

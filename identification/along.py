@@ -7,7 +7,7 @@ from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray
 from identification.compiled import call_evolve, call_value, compiled
-from identification.effect_step import EVOLVE, INITIAL, VALUE
+from identification.effect_table import EVOLVE, INITIAL, VALUE
 from identification.effects._base import MAX_PARAMS, Effect
 from identification.karnopp import Karnopp
 

@@ -5,16 +5,13 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.compiled import call_value, compiled
 from identification.effect_step import (
-    ACTUATOR,
-    BRISTLE,
-    DELAY,
-    VALUE,
     acting_command,
     delayed,
     effect_step,
     shown_position,
     start_states,
 )
+from identification.effect_table import ACTUATOR, BRISTLE, DELAY, VALUE
 from identification.stepping import (
     K1,
     K2,

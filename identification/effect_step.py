@@ -4,19 +4,28 @@ Within a sub-step the effects' forces are those at its predicted middle, and the
 forces and levels is stepped exactly, switches included (`stepping`): second order in the step.
 States evolve half before it and half after, both times under what holds at the middle. With a
 bristle in place of sticking, mass, bristle and actuator are stepped by the trapezoidal rule, the
-bristle's own law by an exponential.
+bristle's own law by an exponential (`bristle`).
 """
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.bristle import bristle_step
 from identification.compiled import call_evolve, call_value, compiled, compiled_inline
-from identification.effects._base import MAX_PARAMS, MAX_SIGNALS, Acting
-from identification.errors import BadLog, BadModel
-from identification.log import Log
+from identification.effect_table import (
+    ACTUATOR,
+    COMMAND,
+    EVOLVE,
+    FORCE,
+    FRICTION,
+    INITIAL,
+    SENSOR,
+    SLIP,
+    STICTION,
+    VALUE,
+)
 from identification.stepping import (
     DV_N,
     DV_P,
@@ -38,92 +47,11 @@ from identification.stepping import (
     settled_mode,
 )
 
-SLIP, STICTION, FRICTION, BRISTLE, FORCE, ACTUATOR, COMMAND, DELAY, SENSOR = range(9)
-CODES = dict(
-    zip(
-        ("slip", "stiction", "friction", "bristle", "force", "actuator", "command", "delay",
-         "sensor"),
-        range(9), strict=True,
-    )
-)  # fmt: skip
-OUTSIDE = (COMMAND, DELAY, SENSOR)
-LONGEST = 1e-3  # s, sub-step of effects without memory
-LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
-LONGEST_BRISTLE = 1e-4  # s
 SHORTEST_WAY = 1e-9  # m, over which a force's slope is still sure
-VALUE, EVOLVE, INITIAL = range(3)
 AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to rest
-# Damping ratio of the micro-motion on a bristle: without it a body at rest would ring on. LuGre's
-# sigma_1 = 2 MICRO_DAMPING sqrt(sigma_0 m) is its authors' choice (IEEE TAC 40 (1995), table I).
-MICRO_DAMPING = 0.5
-ITERATIONS = 8  # most, of a bristle's mean slope within a sub-step
-SHARE = 1e-3  # of the level, by which the slope of a bristle is differentiated
 STATES = 1 << 9  # beside the bits of the codes
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]
-
-
-@dataclass(frozen=True, eq=False)
-class EffectTable:
-    """Chosen effects as the kernels take them: codes (k,), addresses (k, 3), parameters (k, P)."""
-
-    codes: IntArray
-    addresses: IntArray
-    p: Array
-
-    def longest(self, bristle: float) -> float:
-        """Longest sub-step [s]; bristle: of a plant with one."""
-        if np.any(self.codes == BRISTLE):
-            return bristle
-        states = (self.addresses[:, EVOLVE] != 0) & (self.codes != SENSOR)
-        return LONGEST_STATE if np.any(states) else LONGEST
-
-
-def effect_table(acting: tuple[Acting, ...]) -> EffectTable:
-    """The table of these effects; raises BadModel where two of them replace sticking."""
-    codes = np.array([CODES[a.effect.acts] for a in acting], dtype=np.int64)
-    for code, what in ((BRISTLE, "replaces sticking"), (DELAY, "delays the command")):
-        if np.count_nonzero(codes == code) > 1:
-            raise BadModel(f"more than one effect {what}: a plant takes one")
-    addresses = np.array([a.effect.addresses for a in acting], dtype=np.int64).reshape(-1, 3)
-    p = np.array([a.array for a in acting]).reshape(-1, MAX_PARAMS)
-    return EffectTable(codes, addresses, p)
-
-
-def signal_table(acting: tuple[Acting, ...], log: Log) -> Array:
-    """Signals of each effect along the log, (k, n, MAX_SIGNALS); those it may miss read as 0.
-
-    Raises BadLog where the log lacks one that an effect needs.
-    """
-    out = np.zeros((len(acting), len(log), MAX_SIGNALS))
-    for i, a in enumerate(acting):
-        if a.effect.signals and not any(name in log for name in a.effect.signals):
-            raise BadLog(
-                f"{log.name}: the effect {a.key!r} needs a signal {' or '.join(a.effect.signals)};"
-                " name its column in the card"
-            )
-        for j, name in enumerate(a.effect.signals):
-            if name in log or name in a.effect.needs:
-                out[i, :, j] = log[name]
-    return out
-
-
-def outside(codes: IntArray) -> bool:
-    """Whether the effects change only what reaches the actuator and what the transducer shows."""
-    return bool(np.all(np.isin(codes, OUTSIDE)))
-
-
-def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> int:
-    """Number of sub-steps in a sample of `h` [s]; bristle: longest of a plant with one [s]."""
-    return max(1, math.ceil(h / table.longest(bristle) - 1e-9))
-
-
-def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
-    """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
-    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
-    longest = LONGEST_STATE if np.any(states) else LONGEST
-    short = min(table.longest(bristle) / longest, 1.0)
-    return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))
 
 
 @compiled_inline
@@ -277,65 +205,6 @@ def shown_position(
             x = (t, shown, v, F, u, d, z[i], c, f)
             shown = call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i))
     return shown
-
-
-@compiled
-def bristle_slopes(
-    address: int, q: Array, s: Array, z: float, c: float, t: float, y: float, v: float, F: float,
-    u: float, d: float,
-) -> tuple[float, float, float]:  # fmt: skip
-    """Slope dF/dy of a bristle at z, its derivative by z, and its slope without load."""
-    x = (t, y, v, F, u, d, z, c, c)
-    beside = (t, y, v, F, u, d, z - d * SHARE * c, c, c)
-    free = (t, y, v, F, u, d, 0.0, c, c)
-    slope = call_value(address, x, s.ctypes.data, q.ctypes.data)
-    change = slope - call_value(address, beside, s.ctypes.data, q.ctypes.data)
-    return (
-        slope,
-        change / (d * SHARE * c),
-        max(call_value(address, free, s.ctypes.data, q.ctypes.data), 1e-300),
-    )
-
-
-@compiled_inline
-def mean_slope(slope: float, bend: float, moved: float) -> float:
-    """Mean of the slope over a way `moved`: exact where it is linear in z, as Dahl's."""
-    x = min(bend * moved, 1.0)
-    return slope * (1.0 + 0.5 * x if abs(x) < 1e-6 else math.expm1(x) / x)
-
-
-@compiled
-def bristle_step(
-    p: Parameters, address: int, q: Array, s: Array, z: float, c: float,
-    at: tuple[float, float, float, float, float, float], y: float, v: float, F: float, g: float,
-    viscous: float, extra: float, k_e: float, dt: float,
-) -> tuple[float, float, float, float]:  # fmt: skip
-    """Position, velocity, force and elastic friction after dt, by the trapezoidal rule.
-
-    m v' = F + extra - k_e dy - (viscous + damping) v - z, z' = slope(z) v, F' = g - k2 v; `at`: t,
-    y, v, F, u and direction at which the bristle's law is taken. Over a cycle it only takes energy.
-    """
-    m, k2, half = p[M], p[K2], 0.5 * dt
-    t, ym, vm, Fm, u, d = at
-    slope, bend, free = bristle_slopes(address, q, s, z, c, t, ym, vm, Fm, u, d)
-    stiffness, v_next, moved = slope, v, 0.0
-    for i in range(ITERATIONS):
-        damping = 2.0 * MICRO_DAMPING * math.sqrt(free * m) * max(slope, 0.0) / free
-        resisting = viscous + damping
-        drive = F + extra - z - resisting * v
-        # v1 = v + half (drive + drive1)/m with F1 - z1 = F - z + dt g - half (k2 + k_e + K)(v + v1)
-        elastic = half * (k2 + k_e + stiffness)
-        top = m * v + half * (drive + F + extra - z + dt * g - elastic * v)
-        before = moved
-        v_next = top / (m + half * (resisting + elastic))
-        moved = half * (v + v_next)
-        if moved * d < 0.0 and i == 0:
-            d = -d
-            slope, bend, free = bristle_slopes(address, q, s, z, c, t, ym, vm, Fm, u, d)
-        stiffness = mean_slope(slope, bend, moved)
-        if i > 0 and abs(moved - before) <= 1e-9 * abs(moved):
-            break
-    return y + moved, v_next, F + g * dt - k2 * moved, z + stiffness * moved
 
 
 @compiled_inline

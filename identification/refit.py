@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.effect_step import LONGEST_BRISTLE
+from identification.effect_table import LONGEST_BRISTLE
 from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.minimum import FINE_STEP, FOLLOWED, Minimum, gauss_newton

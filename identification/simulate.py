@@ -7,7 +7,7 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
 from identification.effect_run import effect_run_kernel, effective_commands, shown_run
-from identification.effect_step import (
+from identification.effect_table import (
     LONGEST_BRISTLE,
     effect_table,
     fewer,

@@ -8,7 +8,7 @@ from identification.along import contribution, elastic_share
 from identification.arrays import Array
 from identification.differentiate import differentiate
 from identification.effect_run import effective_commands
-from identification.effect_step import effect_table, signal_table
+from identification.effect_table import effect_table, signal_table
 from identification.effects._base import Acting, Acts
 from identification.errors import BadLog
 from identification.inverse_model import Smoothing, force_predicted

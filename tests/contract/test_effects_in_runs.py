@@ -8,7 +8,7 @@ import pytest
 
 from identification import simulate
 from identification.arrays import Array
-from identification.effect_step import EffectTable, pieces
+from identification.effect_table import EffectTable, pieces
 from identification.effects._base import Acting, Effect
 from identification.errors import BadModel
 from identification.library import built_in
