@@ -10,8 +10,9 @@ from identification.compiled import call_evolve, call_value, compiled
 from identification.effect_table import EVOLVE, INITIAL, VALUE
 from identification.effects._base import MAX_PARAMS, Effect
 from identification.karnopp import Karnopp
+from identification.rest import samples
 
-SMOOTH = 8  # samples, over which the force on a bristle at rest is averaged, twice
+SMOOTH = 8  # samples of 2 ms, over which the force on a bristle at rest is averaged, twice
 PIECES = 8  # of a sample, in which a bristle is followed
 
 
@@ -142,7 +143,8 @@ def elastic_displacement(
     q = np.zeros(MAX_PARAMS)
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
-    smoothed = uniform_filter1d(uniform_filter1d(signals["F"], SMOOTH), SMOOTH)
+    width = samples(SMOOTH, h)
+    smoothed = uniform_filter1d(uniform_filter1d(signals["F"], width), width)
     out = np.empty(len(signals["t"]))
     displacement_kernel(
         np.array(effect.addresses, dtype=np.int64), q, signals["t"] - signals["t"][0],

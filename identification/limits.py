@@ -14,11 +14,11 @@ from identification.evidence import Moving
 from identification.karnopp import Karnopp
 from identification.log import Log
 from identification.plant import Motor, Plant
-from identification.rest import LEAST, MEAN, Breakaways, stretches
+from identification.rest import LEAST, MEAN, RATE, Breakaways, samples, stretches
 from identification.result import Drive
 from identification.simulate import free_run
 
-BEFORE, AFTER = 30, 25  # samples of rest and of motion that are compared
+BEFORE, AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
 EXACT = 1e-12  # m or rad: a position without noise
 GRID = 25  # limits tried between the smallest and the largest force around the breakaway
 NARROWED = 2  # times that the grid is drawn around its best
@@ -28,12 +28,12 @@ FITS = 9.0  # mean square in noise units up to which an event counts as understo
 
 @lru_cache(maxsize=16)
 def breakaway_limits(one: Moving, friction: Karnopp) -> Breakaways:
-    """Breakaways of a log: a rest of at least 24 samples, then motion; `force` is the stick limit.
+    """Breakaways of a log: a rest of at least 48 ms, then motion; `force` is the stick limit.
 
     friction: sliding and band as the model without effects has them.
     """
     found = []
-    for low, high in stretches(one, 3 * MEAN):
+    for low, high in stretches(one, 3 * samples(MEAN, one.log.h)):
         event = _event(one, friction, low, high)
         if event is not None:
             found.append(event)
@@ -50,16 +50,17 @@ def _event(
 ) -> tuple[float, float, float, float, float] | None:
     """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
     y, F, h = one.log["y"], one.log["F"], one.log.h
-    first, last = max(low + MEAN, high - BEFORE), high + AFTER
-    if last >= len(y) or first + MEAN >= high:
+    mean, of_rate = samples(MEAN, h), samples(RATE, h)
+    first, last = max(low + mean, high - samples(BEFORE, h)), high + samples(AFTER, h)
+    if last >= len(y) or first + mean >= high:
         return None
     way = float(np.sign(one.signals["d"][high]))
-    level = float(np.mean(y[first : first + MEAN]))
+    level = float(np.mean(y[first : first + mean]))
     if way * (y[last - 1] - level) < MOVED * one.noise_y:
         return None
     part = Log(one.log.name, {key: one.log[key][first:last] for key in ("t", "y", "F")})
     part = part.with_signals(u=part["F"])  # of a motor that gives 1 N/V
-    pushed = way * F[first : high + MEAN // 2]
+    pushed = way * F[first : high + mean // 2]
     lowest, highest = float(np.min(pushed)), float(np.max(pushed))
     if highest <= max(lowest, 0.0):
         return None
@@ -76,7 +77,7 @@ def _event(
         return None
     risen = np.flatnonzero(pushed >= best)
     at = first + max(int(risen[0]) - 1, 0) if len(risen) else high
-    rate = way * float(F[at + 1] - F[max(at - 4, 0)]) / (5 * h)
+    rate = way * float(F[at + 1] - F[max(at - of_rate, 0)]) / ((of_rate + 1) * h)
     return float(at), way, (at - low + 1) * h, way * best, rate
 
 

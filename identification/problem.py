@@ -85,6 +85,7 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     if rig.kind == "motor" and not rig.force_per_command:
         raise BadLog(
             f"{logs[0].name}: a motor needs its force_per_command, not 0; set it in the card"
+            " (1 where it is not known: a force is then in units of the command)"
         )
     if rig.kind == "motor" and drive == "force":
         raise BadLog(

@@ -15,6 +15,7 @@ from identification.arrays import Array, IntArray
 from identification.evidence import BLOCKS, Moving, Rows
 
 LEAST = 0.6  # of the direction's median force, below which an event is none
+USUAL = 2e-3  # s, the clock of which samples are counted here
 RATE = 4  # samples over which the force's rate is taken
 MEAN = 8  # samples in a row of rest
 SURELY = 0.95  # of the Coulomb level, that a force may reach without moving a body at rest
@@ -44,6 +45,11 @@ class Breakaways:
     rate: Array
 
 
+def samples(count: int, h: float) -> int:
+    """The samples of h [s] in so many of 2 ms; as many of a slower clock."""
+    return max(count, round(count * USUAL / h))
+
+
 def stretches(one: Moving, shortest: int) -> list[tuple[int, int]]:
     """Stretches of samples (low, high) in which the body is not sure to move."""
     still = one.signals["d"] == 0
@@ -59,12 +65,12 @@ def rests(one: Moving, up: float, down: float) -> Rest:
     up, down: Coulomb levels [N]. Beyond them a body may creep in stops too short to be seen; below
     them nothing rigid moves.
     """
-    margin = MEAN
+    mean = samples(MEAN, one.log.h)
     starts, number = [], []
-    load = uniform_filter1d(np.asarray(one.log["F"]), MEAN, origin=-(MEAN // 2))
+    load = uniform_filter1d(np.asarray(one.log["F"]), mean, origin=-(mean // 2))
     held = (load < SURELY * up) & (load > -SURELY * down)
-    for i, (low, high) in enumerate(stretches(one, (SHORTEST + 2) * MEAN)):
-        own = np.arange(low + margin, high - margin - MEAN + 1, MEAN)
+    for i, (low, high) in enumerate(stretches(one, (SHORTEST + 2) * mean)):
+        own = np.arange(low + mean, high - 2 * mean + 1, mean)
         own = own[held[own]]
         if len(own) >= SHORTEST:
             starts.append(own)
@@ -75,9 +81,24 @@ def rests(one: Moving, up: float, down: float) -> Rest:
     return Rest(np.concatenate(starts).astype(np.int64), np.concatenate(number).astype(np.int64))
 
 
-def means(x: Array, rest: Rest) -> Array:
-    """Means of a signal over the rows, less the mean over their stretch, (r,)."""
-    view = np.lib.stride_tricks.sliding_window_view(np.asarray(x), MEAN)
+def borne(logs: Sequence[Moving]) -> tuple[float, float]:
+    """Largest forces [N] that a body at rest bore in either direction, 0 where it never rested.
+
+    Means over a row, without the ends of a stretch: the stick limits are hardly less.
+    """
+    up, down = 0.0, 0.0
+    for one in logs:
+        mean = samples(MEAN, one.log.h)
+        load = uniform_filter1d(np.asarray(one.log["F"]), mean)
+        for low, high in stretches(one, 3 * mean):
+            own = load[low + mean : high - mean]
+            up, down = max(up, float(np.max(own))), max(down, -float(np.min(own)))
+    return up, down
+
+
+def means(x: Array, rest: Rest, mean: int) -> Array:
+    """Means of a signal over the rows, of so many samples, less that over their stretch, (r,)."""
+    view = np.lib.stride_tricks.sliding_window_view(np.asarray(x), mean)
     rows: Array = np.asarray(view[rest.start].mean(axis=1))
     if not len(rows):
         return rows
@@ -89,44 +110,46 @@ def means(x: Array, rest: Rest) -> Array:
 def rest_rows(one: Moving, rest: Rest, moved: Array | None = None) -> Rows:
     """Rows of the shown position in rest [m], less what an effect makes of it, `moved` (n,)."""
     y = one.log["y"] if moved is None else one.log["y"] - moved
-    b = means(y, rest)
-    sd = np.full(len(b), one.noise_y / np.sqrt(MEAN))
+    mean = samples(MEAN, one.log.h)
+    b = means(y, rest, mean)
+    sd = np.full(len(b), one.noise_y / np.sqrt(mean))
     block = (rest.start * BLOCKS // len(one.log)).astype(np.int64)
     return Rows(b, np.zeros((len(b), 0)), sd, block, np.full(len(b), np.inf), ())
 
 
 def breakaways(one: Moving, m: float) -> Breakaways:
-    """Every sure breakaway: a rest of at least 24 samples, then motion in one direction.
+    """Every sure breakaway: a rest of at least 48 ms, then motion in one direction.
 
     m: mass [kg]. The body has let go at the sample from which the rise of the force since then,
     integrated twice, gives the motion seen; that sample's force is the limit.
     """
     y, F, h = one.log["y"], one.log["F"], one.log.h
+    mean, of_rate = samples(MEAN, h), samples(RATE, h)
     found: list[tuple[float, float, float, float, float]] = []
-    for low, high in stretches(one, 3 * MEAN):
-        if high + MEAN >= len(y):
+    for low, high in stretches(one, 3 * mean):
+        if high + mean >= len(y):
             continue
         level = (
-            float(np.mean(y[low + MEAN : high - MEAN]))
-            if high - low > 3 * MEAN
-            else float(y[low + MEAN])
+            float(np.mean(y[low + mean : high - mean]))
+            if high - low > 3 * mean
+            else float(y[low + mean])
         )
         way = float(np.sign(one.signals["d"][high]))
-        end = min(high + MEAN, len(y))
+        end = min(high + mean, len(y))
         seen = way * (y[low:end] - level)
         moved = np.flatnonzero(seen < ONSET * one.noise_y)
         if not len(moved) or seen[-1] < RUN * ONSET * one.noise_y:
             continue
         onset = _onset(seen, way * F[low:end], int(moved[-1]), h, m)
-        if onset is None or onset < 2 * MEAN:
+        if onset is None or onset < 2 * mean:
             continue
         at = int(onset)
         part = onset - at
         force = float((1 - part) * F[low + at] + part * F[low + at + 1])
         rate = (
             way
-            * float(F[low + at + 1] - F[max(low + at - RATE, 0)])
-            / ((min(RATE, low + at) + 1) * h)
+            * float(F[low + at + 1] - F[max(low + at - of_rate, 0)])
+            / ((min(of_rate, low + at) + 1) * h)
         )
         found.append((float(low + at), way, onset * h, force, rate))
     k = np.array(found).reshape(-1, 5)
@@ -144,13 +167,13 @@ def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None
     seen: displacement [m] in the direction of motion, F: force in it [N], last: latest onset.
     """
     errors = []
-    stop = min(len(seen) - 1, last + MEAN)
-    tried = range(max(0, last - ONSETS), last + 1)
+    stop, first = min(len(seen) - 1, last + samples(MEAN, h)), max(0, last - samples(ONSETS, h))
+    tried = range(first, last + 1)
     for j in tried:
         a = np.maximum(F[j : stop + 1] - F[j], 0.0) / m
         v = h * np.concatenate([[0.0], np.cumsum(0.5 * (a[1:] + a[:-1]))])
         x = h * np.concatenate([[0.0], np.cumsum(0.5 * (v[1:] + v[:-1]))])
-        head = seen[max(0, last - ONSETS) : j]
+        head = seen[first:j]
         errors.append(float(np.sum((seen[j : stop + 1] - x) ** 2) + np.sum(head**2)))
     i = int(np.argmin(errors))
     if i in (0, len(errors) - 1):

@@ -16,7 +16,7 @@ from identification.errors import BadModel
 from identification.evidence import Moving
 from identification.log import Log
 from identification.plant import Motor, Plant
-from identification.rest import stretches
+from identification.rest import samples, stretches
 from identification.result import Drive
 from identification.simulate import FreeRun, free_run
 
@@ -25,7 +25,7 @@ REACH = 0.45  # of a window, within which a rest is looked for
 FAST = 0.5  # of the usual speed, at which a window begins where there is no rest near
 LATER = 2.0  # windows by which a start is put off until there is a rest
 COARSE = 5e-4  # s, sub-step of a bristle: errs by a tenth of the noise where a spring holds it
-LEAST_REST = 24  # samples
+LEAST_REST = 24  # samples of 2 ms (as the next two: `rest.samples`)
 SURE = 3.0  # deviations of the velocity from which a body creeps
 WIDEST = 50  # samples on either side by which a creep is seen
 AROUND = 8  # samples of a rest whose mean is the position
@@ -70,11 +70,12 @@ def starts(one: Moving, drive: Drive, seconds: float = SECONDS, bristle: float =
         at.append(_calm(one, wanted, step, speed, fast) if found is None else found)
     index = np.array(at, dtype=np.int64)
     rest = np.isin(index, rests)
-    level = np.array([float(np.mean(y[max(k - AROUND // 2, 0) : k + AROUND // 2 + 1])) for k in at])
+    around = samples(AROUND, h)
+    level = np.array([float(np.mean(y[max(k - around // 2, 0) : k + around // 2 + 1])) for k in at])
     sd_F = 0.0 if one.held or drive == "force" else one.noise_F
     sd = np.array(
         [
-            np.where(rest, one.noise_y / np.sqrt(AROUND), one.noise_y),
+            np.where(rest, one.noise_y / np.sqrt(around), one.noise_y),
             np.where(rest, 0.0, one.v_noise),
             np.full(len(at), sd_F),
         ]
@@ -166,7 +167,7 @@ def _calm(one: Moving, wanted: int, step: int, speed: Array, enough: float) -> i
 def _rests(one: Moving) -> IntArray:
     """Samples in the middle of every sure rest, and the first where the log begins with one."""
     found = []
-    for low, high in stretches(one, LEAST_REST):
+    for low, high in stretches(one, samples(LEAST_REST, one.log.h)):
         v, sd = _creep(one, low, high)
         if abs(v) < SURE * sd:
             found += [0, (low + high) // 2] if low == 0 else [(low + high) // 2]
@@ -175,7 +176,8 @@ def _rests(one: Moving) -> IntArray:
 
 def _creep(one: Moving, low: int, high: int) -> tuple[float, float]:
     """Mean velocity and its deviation [m/s] in the middle of samples low to high."""
-    middle, half = (low + high) // 2, min((high - low) // 2, WIDEST)
+    middle = (low + high) // 2
+    half = min((high - low) // 2, samples(WIDEST, one.log.h))
     x = one.log.h * (np.arange(-half, half) + 0.5)
     square = float(x @ x)
     y = np.asarray(one.log["y"])[middle - half : middle + half]

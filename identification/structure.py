@@ -17,6 +17,7 @@ from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Actuator, Motor, Plant
 from identification.refit import COMPLETE, RESCUES, loose, refit
+from identification.rest import borne
 from identification.result import Drive
 from identification.stage import Stage
 
@@ -60,7 +61,8 @@ def model_of(
     sliding = outcomes[MECHANICAL]
     deviation = deviations(sliding)
     prior |= dict(zip(FIVE, deviation[:5].tolist(), strict=True))
-    stick_p, stick_n = 1.2 * five["F_cp"], -1.2 * five["F_cn"]
+    up, down = borne(logs)
+    stick_p, stick_n = max(1.2 * five["F_cp"], up), -max(1.2 * five["F_cn"], down)
     if BREAKAWAY in outcomes:
         found = outcomes[BREAKAWAY].fit.theta
         stick_p = float(found[0]) if found[0] > 0 else stick_p

@@ -66,7 +66,7 @@ def trace_sources(
     if train.rig.kind == "motor" and not train.rig.force_per_command:
         raise BadLog(
             f"{train.runs[0].file}: a motor needs its force_per_command; set it under [rig] of the"
-            " card"
+            " card (1 where it is not known: a force is then in units of the command)"
         )
     _no_twins(train.runs, seen)
     if test and test.rig != train.rig:
