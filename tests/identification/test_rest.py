@@ -7,8 +7,8 @@ from identification.arrays import Array
 from identification.evidence import moving
 from identification.library import built_in
 from identification.log import Log
-from identification.rest import MEAN, rests
-from tests.identification.motor_logs import NINE, NOISE, H
+from identification.rest import MEAN, borne, rests, samples
+from tests.identification.motor_logs import NINE, NOISE, H, made, seen
 
 
 def standing(F: Array, rng: np.random.Generator) -> Log:
@@ -35,3 +35,16 @@ def test_the_noise_of_a_force_bends_no_bristle_further() -> None:
         built_in()["presliding"], {"sigma_0": 1e5}, one.signals, log.h, NINE
     )
     assert abs(bent[1500] - bent[1000]) < 0.1 * bent[1000]
+
+
+def test_what_a_body_bore_at_rest_is_about_its_stick_limit() -> None:
+    up, down = borne([seen(made(2))])
+    assert 0.9 * NINE.F_sp < up < 1.1 * NINE.F_sp
+    assert 0.9 * -NINE.F_sn < down < 1.1 * -NINE.F_sn
+    assert borne([]) == (0.0, 0.0)
+
+
+def test_counts_of_samples_follow_a_faster_clock() -> None:
+    assert samples(MEAN, H) == MEAN
+    assert samples(MEAN, 0.5 * H) == 2 * MEAN
+    assert samples(MEAN, 3.0 * H) == MEAN  # a mean of fewer would be as noisy as a sample
