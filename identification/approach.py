@@ -63,6 +63,7 @@ class Range:
 
 
 FAR = Range(0.03, 0.0, 2.5, 4.0, True)
+SLIDING = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
 MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
 SHORT = 15.0  # s of each log on which a search from afar is made

@@ -18,6 +18,7 @@ from identification.approach import (
     FAR,
     MIDWAY,
     NEARLY,
+    SLIDING,
     approach,
     closer,
     judge_led,
@@ -35,6 +36,7 @@ from identification.needed import (
     NEAR,
     Setting,
     enough,
+    known,
     pruned,
     refined,
     with_steps,
@@ -194,7 +196,7 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
     if not plants:
         return []
     free = loose(plants[0], setting.drive)
-    if free and setting.plain.misfit > NEAR:
+    if free and not known(setting):
         errors_of = judge_led(plants[0], setting.short, setting.drive, 1.0)
     else:
         errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
@@ -238,7 +240,8 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
         # Where the plain run is nearly followed, its band and limits are nearly right.
-        stage = (0.0, MIDWAY) if setting.plain.misfit <= NEAR else (1.0, FAR)
+        near = setting.plain.misfit <= NEAR
+        stage = (0.0, MIDWAY if near else SLIDING) if known(setting) else (1.0, FAR)
         return approach(plant, setting.short, setting.drive, setting.rng, (stage,))
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction

@@ -54,6 +54,14 @@ def enough(setting: Setting) -> float:
     return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
 
 
+def known(setting: Setting) -> bool:
+    """Whether the plain plant's sliding is right: its run, or at least the equations, show no less.
+
+    Then an effect in stops and reversals is searched in the run itself, led by nothing.
+    """
+    return setting.plain.misfit <= NEAR or explained(setting.first)
+
+
 def fitted(choice: Choice, setting: Setting) -> Model:
     """The model of a choice made on the equations."""
     near = None if setting.plain.led else setting.plain.plant.friction

@@ -54,7 +54,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, NEAR, Setting, doubted, fewest
+from identification.needed import DECISIVE, Setting, doubted, fewest, known
 from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
@@ -101,8 +101,8 @@ def trace(
     if not before.led:
         logs = [replace(one, reference=before.plant.friction) for one in logs]
         # A run that is not followed may have swollen its band in place of what is missing.
-        known = band(before) if before.misfit <= ASTRAY else 0.0
-        start = replace(start, band=known, sliding=before.plant.friction)
+        slow = band(before) if before.misfit <= ASTRAY else 0.0
+        start = replace(start, band=slow, sliding=before.plant.friction)
         first = base_outcomes(start)
     if not before.led and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
         library = {}  # the plain plant's run leaves nothing but noise
@@ -118,7 +118,7 @@ def trace(
     if choice.steps:
         choice, after = fewest(choice, setting, unsure)
     short = [shortened(one, SHORT) for one in logs]
-    if free and not choice.steps and before.misfit <= NEAR:
+    if free and not choice.steps and known(setting):
         short = [most_left(before.plant, one, drive, SHORT) for one in logs]
     setting = replace(setting, short=short)
     if unsure:
