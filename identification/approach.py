@@ -32,6 +32,7 @@ from identification.refit import (
     names_of,
     plant_with,
     refit,
+    start_band,
     values_of,
 )
 from identification.rest import stretches
@@ -64,8 +65,10 @@ class Range:
 
 FAR = Range(0.03, 0.0, 2.5, 4.0, True)
 SLIDING = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
+TOLD = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
 MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
+DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
@@ -105,16 +108,21 @@ def nearer(plants: Sequence[Plant], logs: Sequence[Moving], drive: Drive) -> Pla
 
 def closest(
     begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES,
+    searches: int = SEARCHES, told: bool = False,
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
-    begins: plants to begin from in turn, as long as more is left than should be.
+    begins: plants to begin from in turn, as long as more is left than should be; told: the first
+    has everything but its band from the equations, so it is searched close by before.
     """
     short = [shortened(one, SHORT) for one in logs]
     best: Refit | None = None
-    for plant in begins:
-        near = approach(plant, short, drive, rng)
+    for i, plant in enumerate([*begins[: int(told)], *begins]):
+        if told and i == 0:
+            banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
+            near = approach(banded, short, drive, rng, ((0.0, TOLD), (0.0, CLOSE)))
+        else:
+            near = approach(plant, short, drive, rng)
         near = refit(near, short, drive, prior=even(near), effort="quick").plant
         found = closer(near, logs, drive, rng, searches)
         best = found if best is None or found.misfit < best.misfit else best

@@ -35,7 +35,10 @@ NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
 @dataclass(frozen=True, eq=False)
 class Setting:
-    """What every trial needs: logs whole and cut short, how they are driven, and the library."""
+    """What every trial needs: logs whole and cut short, how they are driven, and the library.
+
+    doubted: steps of a choice of which those of slow motion have been tried without already.
+    """
 
     logs: Sequence[Moving]
     short: Sequence[Moving]
@@ -46,6 +49,7 @@ class Setting:
     first: Mapping[str, Outcome]
     plain: Model
     rng: np.random.Generator
+    doubted: tuple[Step, ...] = ()
 
 
 def enough(setting: Setting) -> float:
@@ -164,6 +168,8 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
         free = loose(model.plant, setting.drive)
         if (len(choice.steps) < 2 and not free) or model.misfit > NEAR:
             break
+        if _slow(step) and choice.steps == setting.doubted:
+            continue
         stay = tuple(one for one in choice.steps if one is not step)
         end, outcomes = with_steps(stay, setting.start, setting.first)
         base = without(model, stay, setting)

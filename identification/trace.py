@@ -123,6 +123,7 @@ def trace(
     setting = replace(setting, short=short)
     if unsure:
         choice, after = doubted(choice, after, setting)
+        setting = replace(setting, doubted=choice.steps)
     report("judging", 0.0)
     choice, after = judged_forward(choice, after, setting, report)
     if useless(choice, before, after):
