@@ -18,10 +18,12 @@ NOISE = 1e-5
 NINE = Karnopp(3.0, 12.0, 10.0, 80.0, 100.0, 0.008, -0.01, 16.0, -14.0)
 
 
-def plant(effects: Mapping[str, Mapping[str, float]] | None = None) -> Plant:
+def plant(
+    effects: Mapping[str, Mapping[str, float]] | None = None, friction: Karnopp = NINE
+) -> Plant:
     """The motor with these effects."""
     acting = tuple(built_in()[key].acting(values) for key, values in (effects or {}).items())
-    return Plant(NINE, Motor(K_A), acting)
+    return Plant(friction, Motor(K_A), acting)
 
 
 def strokes(n: int, seed: int) -> Array:
@@ -37,12 +39,13 @@ def strokes(n: int, seed: int) -> Array:
 
 
 def made(
-    seed: int, effects: Mapping[str, Mapping[str, float]] | None = None, n: int = 10_000
-) -> Log:
+    seed: int, effects: Mapping[str, Mapping[str, float]] | None = None, n: int = 10_000,
+    friction: Karnopp = NINE,
+) -> Log:  # fmt: skip
     """20 s at 500 Hz with the paper's position noise."""
     rng, u = np.random.default_rng(seed + 1), strokes(n, seed)
     blank = Log(f"motor{seed}", {"t": H * np.arange(n, dtype=np.float64), "u": u, "y": np.zeros(n)})
-    run = free_run(plant(effects), blank, (0.0, 0.0, 0.0), "command")
+    run = free_run(plant(effects, friction), blank, (0.0, 0.0, 0.0), "command")
     return blank.with_signals(y=run.shown + NOISE * rng.standard_normal(n), F=K_A * u)
 
 

@@ -1,5 +1,6 @@
 """A run led by the measured velocity: it stays near the log, and the search on it gets there."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,8 @@ import pytest
 from identification.approach import (
     CLOSE,
     FAR,
+    TOLD,
+    Range,
     approach,
     closest,
     judge_led,
@@ -16,8 +19,11 @@ from identification.approach import (
     limits,
     more_load,
 )
+from identification.evidence import Moving
 from identification.karnopp import Karnopp
+from identification.plant import Plant
 from identification.refit import COMPLETE, even, judge, loss, names_of, refit, values_of
+from identification.result import Drive
 from identification.starts import FAST, starts
 from tests.identification.motor_logs import NINE, made, plant, seen
 
@@ -52,6 +58,27 @@ def test_the_search_finds_what_a_gradient_does_not() -> None:
     assert found.misfit <= COMPLETE
     names = names_of(found.plant, "command")
     assert values_of(found.plant, names) == pytest.approx(values_of(true, names), rel=0.06)
+
+
+def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    ranges = list[Range]()
+
+    def spied(
+        plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+        stages: Sequence[tuple[float, Range]] = ((1.0, FAR),),
+    ) -> Plant:  # fmt: skip
+        ranges.extend(around for _, around in stages)
+        return approach(plant, logs, drive, rng, stages)
+
+    monkeypatch.setattr("identification.approach.approach", spied)
+    one = seen(made(4))
+    unsure = replace(plant(), friction=replace(NINE, dv_p=0.003, dv_n=-0.003, F_sp=16.2))
+    found = closest([unsure], [one], "command", np.random.default_rng(0), 1, told=True)
+    assert ranges[0] == TOLD and FAR not in ranges
+    assert found.misfit <= COMPLETE
+    assert found.plant.friction.array == pytest.approx(NINE.array, rel=0.06)
 
 
 def test_a_search_close_by_keeps_what_is_right() -> None:

@@ -14,6 +14,7 @@ from identification.needed import (
     fewest,
     followed,
     keeping,
+    known,
     leading,
     levelled,
     pruned,
@@ -97,3 +98,27 @@ def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
     assert followed(choice, far, False) == COMPLETE
     assert followed(choice, replace(far, drive="force"), False) > COMPLETE
     assert explained(choice.base) and not explained(setting.first)
+
+
+def test_what_stops_lack_is_searched_in_the_run_where_sliding_is_explained(
+    found: tuple[Setting, Choice],
+) -> None:
+    setting, choice = found
+    far = replace(setting, plain=replace(setting.plain, misfit=41.0))
+    assert not known(far)  # its spring is missing from the equations
+    assert known(replace(far, first=choice.base))
+    assert known(replace(setting, plain=replace(setting.plain, misfit=4.0)))
+
+
+def test_what_was_doubted_is_not_tried_again(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    stribeck = next(one for one in choice.tried if one.effect.key == "stribeck")
+    both = replace(
+        choice, steps=(choice.steps[0], Step(stribeck, 0.01, (), choice.end, choice.base))
+    )
+    hardly = {"stribeck": {"F_s": 1e-3, "v_s": 0.02}}
+    model = replace(setting.plain, plant=plant({**SPRING, **hardly}), misfit=1.0)
+    kept, same = pruned(both, model, replace(setting, doubted=both.steps))
+    assert kept is both and same is model
+    less, _ = pruned(both, model, setting)
+    assert less.steps == both.steps[:1]

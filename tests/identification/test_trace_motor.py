@@ -1,6 +1,7 @@
 """Trace of motors, counted positions, noise in the logged command: what a workshop's logs are."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -8,13 +9,15 @@ import pytest
 from identification.choice import first_stage
 from identification.differentiate import resolution
 from identification.errors import NotIdentifiable
-from identification.evidence import MECHANICAL
+from identification.evidence import BREAKAWAY, MECHANICAL
 from identification.library import Library, built_in
 from identification.log import Log, Rig
 from identification.outcome import base_outcomes
-from identification.refit import misfit
+from identification.plant import Plant
+from identification.refit import COMPLETE, Refit, misfit, refit
 from identification.stage import HOPELESS, joined
 from identification.starts import starts, walks
+from identification.structure import model_of
 from identification.trace import driven_only, trace
 from identification.trace_result import Trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -106,3 +109,23 @@ def test_a_machine_that_hardly_moves_is_refused() -> None:
     noise = 1e-5 * np.random.default_rng(12).standard_normal(n)
     with pytest.raises(NotIdentifiable, match=r"slides for \d\.\d % of the log"):
         traced(stands.with_signals(y=stands["y"] + noise))
+
+
+def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun = list[Plant]()
+
+    def spied(start: Plant, *given: Any, **how: Any) -> Refit:
+        begun.append(start)
+        return refit(start, *given, **how)
+
+    monkeypatch.setattr("identification.structure.refit", spied)
+    high = replace(NINE, F_cp=8.0, F_cn=7.0, F_sp=22.0, F_sn=-19.0)
+    one = seen(made(6, friction=high))
+    start, first = first_stage([one], by_command=False)
+    told = {key: found for key, found in first.items() if key != BREAKAWAY}
+    model = model_of(start, told, (), [one], "command", RIG, np.random.default_rng(0))
+    assert begun[0].friction.F_sp == pytest.approx(high.F_sp, rel=0.1)
+    assert begun[0].friction.F_sn == pytest.approx(high.F_sn, rel=0.1)
+    assert model.misfit <= COMPLETE
