@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.approach import SEARCHES, closest, loaded
+from identification.approach import SEARCHES, STICK, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step, rough
@@ -21,6 +21,7 @@ from identification.rest import borne
 from identification.result import Drive
 from identification.stage import Stage
 
+USUAL = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
@@ -62,7 +63,7 @@ def model_of(
     deviation = deviations(sliding)
     prior |= dict(zip(FIVE, deviation[:5].tolist(), strict=True))
     up, down = borne(logs)
-    stick_p, stick_n = max(1.2 * five["F_cp"], up), -max(1.2 * five["F_cn"], down)
+    stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
     if BREAKAWAY in outcomes:
         found = outcomes[BREAKAWAY].fit.theta
         stick_p = float(found[0]) if found[0] > 0 else stick_p
@@ -114,6 +115,11 @@ def model_of(
         other = closest(begins, logs, drive, rng, 1 if missing else SEARCHES, told)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
+
+
+def _limit(coulomb: float, held: float) -> float:
+    """A stick limit [N] to begin from; a body at rest against a stop bears more than any."""
+    return min(max(USUAL * coulomb, held), STICK[2] * coulomb)
 
 
 def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:

@@ -17,7 +17,7 @@ from identification.plant import Plant
 from identification.refit import COMPLETE, Refit, misfit, refit
 from identification.stage import HOPELESS, joined
 from identification.starts import starts, walks
-from identification.structure import model_of
+from identification.structure import _limit, model_of
 from identification.trace import driven_only, trace
 from identification.trace_result import Trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -129,3 +129,9 @@ def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
     assert begun[0].friction.F_sp == pytest.approx(high.F_sp, rel=0.1)
     assert begun[0].friction.F_sn == pytest.approx(high.F_sn, rel=0.1)
     assert model.misfit <= COMPLETE
+
+
+def test_a_body_pressed_against_a_stop_tells_no_stick_limit() -> None:
+    assert _limit(10.0, 500.0) == 30.0
+    assert _limit(10.0, 20.0) == 20.0
+    assert _limit(10.0, 0.0) == 12.0
