@@ -56,7 +56,8 @@ def servo_kernel(
     """
     plant = parameters(p, 0)
     y, v, F = start
-    z, past = np.zeros(len(codes)), len(history) - len(modes)
+    z, spare = np.zeros(len(codes)), np.zeros(len(codes))
+    past = len(history) - len(modes)
     bristle = place_of(codes, BRISTLE)
     motor = k_a != 0.0
     mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
@@ -81,8 +82,9 @@ def servo_kernel(
         out[5, k], out[6, k] = memory.last[WANTED], memory.last[RAW]
         out[7, k], out[8, k] = memory.last[ADDED], memory.last[SPEED]
         state = effect_step(
-            plant, count, codes, addresses, q, s, z, bristle, now, (y, v, F, mode, a), u, g, h
-        )
+            plant, count, codes, addresses, q, s, z, spare, bristle, now, (y, v, F, mode, a), u, g,
+            h,
+        )  # fmt: skip
         # A body at rest that the new force moves has left at once.
         modes[k] = mode if v == 0.0 or mode != STUCK else state[3]
         y, v, F, mode, a = state

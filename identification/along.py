@@ -27,25 +27,31 @@ def along_kernel(
     F: Array,
     u: Array,
     d: IntArray,
-    c: Array,
-    f: Array,
+    up: tuple[float, float],
+    down: tuple[float, float],
     s: Array,
     out: Array,
 ) -> None:
-    """`value` at every sample into out (n,); d 0 is a body at rest, in the last direction."""
+    """`value` at every sample into out (n,); d 0 is a body at rest, in the last direction.
+
+    up, down: level [N] and viscous coefficient [N s/m] of either direction.
+    """
     z, way = 0.0, 1.0
     for k in range(len(out)):
         if d[k] != 0:
             way = float(d[k])
         speed = v[k] if d[k] != 0 else 0.0
-        s_k = s[k].ctypes.data
-        x = (t[k], y[k], speed, F[k], u[k], way, z, c[k], f[k])
+        s_k = s.ctypes.data + k * s.strides[0]
+        c, viscous = up if d[k] >= 0 else down
+        f = c + viscous * abs(v[k])
+        now = t[k] - t[0]
+        x = (now, y[k], speed, F[k], u[k], way, z, c, f)
         if k == 0 and addresses[INITIAL] != 0:
             z = call_value(addresses[INITIAL], x, s_k, q.ctypes.data)
         elif addresses[EVOLVE] != 0:
-            step = (h, t[k], y[k], speed, F[k], u[k], float(d[k]), z, c[k], f[k])
+            step = (h, now, y[k], speed, F[k], u[k], float(d[k]), z, c, f)
             z = call_evolve(addresses[EVOLVE], step, s_k, q.ctypes.data)
-        x = (t[k], y[k], speed, F[k], u[k], way, z, c[k], f[k])
+        x = (now, y[k], speed, F[k], u[k], way, z, c, f)
         out[k] = call_value(addresses[VALUE], x, s_k, q.ctypes.data)
 
 
@@ -62,10 +68,8 @@ def contribution(
     q = np.zeros(MAX_PARAMS)
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
-    d = signals["d"].astype(np.int64)
-    up = d >= 0
-    c = np.where(up, friction.F_cp, friction.F_cn)
-    f = c + np.where(up, friction.F_vp, friction.F_vn) * np.abs(signals["v"])
+    d = signals["d"].astype(np.int64, copy=False)
+    up, down = (friction.F_cp, friction.F_vp), (friction.F_cn, friction.F_vn)
     s = np.zeros((n, max(1, len(effect.signals))))
     for j, name in enumerate(effect.signals):
         if name in signals:
@@ -73,7 +77,7 @@ def contribution(
     out = np.empty(n)
     y, v, F, u = (np.ascontiguousarray(signals[k]) for k in ("y", "v", "F", "u"))
     addresses = np.array(effect.addresses, dtype=np.int64)
-    along_kernel(addresses, q, h, signals["t"] - signals["t"][0], y, v, F, u, d, c, f, s, out)
+    along_kernel(addresses, q, h, signals["t"], y, v, F, u, d, up, down, s, out)
     return out
 
 

@@ -54,23 +54,28 @@ NARROWER = 0.3  # of that spread, for mass and sliding friction
 @dataclass(frozen=True)
 class Range:
     """How far around a plant is searched: shares of mass and sliding friction and of the stick
-    limits, factors on the band and on effects; open: from no more than the regression tells."""
+    limits, factors on the band and on effects; open: from no more than the regression tells;
+    uneven: around an asymmetry that is 0."""
 
     five: float
     stick: float
     band: float
     effect: float
     open: bool
+    uneven: float = 0.0
 
 
 FAR = Range(0.03, 0.0, 2.5, 4.0, True)
 SLIDING = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
 TOLD = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
+BREAKS = Range(0.004, 0.03, 2.0, 2.0, False)  # where breakaways tell the stick limits
 MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
+SIDES = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be unequal
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
+AGREED = 1.03  # relative misfit of two searches that have ended in the same place
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
 NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
@@ -112,8 +117,9 @@ def closest(
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
-    begins: plants to begin from in turn, as long as more is left than should be; told: the first
-    has everything but its band from the equations, so it is searched close by before.
+    begins: plants to begin from in turn, as long as more is left than should be; searches: on the
+    whole at most, none where no search will do; told: the first has everything but its band from
+    the equations, so it is searched close by before.
     """
     short = [shortened(one, SHORT) for one in logs]
     best: Refit | None = None
@@ -123,33 +129,52 @@ def closest(
             near = approach(banded, short, drive, rng, ((0.0, TOLD), (0.0, CLOSE)))
         else:
             near = approach(plant, short, drive, rng)
-        near = refit(near, short, drive, prior=even(near), effort="quick").plant
-        found = closer(near, logs, drive, rng, searches)
+        begun = refit(near, short, drive, prior=even(near), effort="quick")
+        found = _on_whole(begun, logs, drive, rng, searches)
+        twice = best is not None and best.misfit < AGREED * found.misfit < AGREED**2 * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= (NEARLY if plant.effects else COMPLETE):
+        if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice:
             break
     assert best is not None
     return best
+
+
+def _on_whole(
+    begun: Refit, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, searches: int
+) -> Refit:
+    """What was found on short logs, refined on the whole; searched closer where it falls short."""
+    plant = begun.plant
+    if searches > 0 and begun.misfit > (NEARLY if plant.effects else COMPLETE):
+        return closer(plant, logs, drive, rng, searches)
+    found = refit(plant, logs, drive, prior=even(plant), effort="near")
+    if searches == 0 or found.misfit <= (NEARLY if _slow(plant) else COMPLETE):
+        return found
+    again = closer(plant, logs, drive, rng, searches)
+    return again if again.misfit < found.misfit else found
 
 
 def closer(
     plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES,
+    searches: int = SEARCHES, around: Range = CLOSE,
 ) -> Refit:  # fmt: skip
     """The plant searched close by and refined, so many times at most, as long as that helps."""
-    slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
     best: Refit | None = None
     for _ in range(searches):
-        near = approach(plant, part, drive, rng, ((0.0, CLOSE),))
+        near = approach(plant, part, drive, rng, ((0.0, around),))
         found = refit(near, logs, drive, prior=even(near), effort="near")
         gained = best is None or found.misfit < GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= (NEARLY if slow else COMPLETE) or not gained:
+        if best.misfit <= (NEARLY if _slow(plant) else COMPLETE) or not gained:
             break
         plant = best.plant
     assert best is not None
     return best
+
+
+def _slow(plant: Plant) -> bool:
+    """Whether its runs take long and err, as a bristle's sub-steps do."""
+    return any(acting.effect.acts == "bristle" for acting in plant.effects)
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:
@@ -270,7 +295,7 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
             most = min(max(STICK[1], BEYOND * size / coulomb), STICK[2])
             ends = [np.sign(value) * STICK[0] * coulomb, np.sign(value) * most * coulomb]
         elif name in params:
-            ends = _of_effect(params[name], value, around.effect)
+            ends = _of_effect(params[name], value, around)
         else:
             off = around.stick if name in ("F_sp", "F_sn") else five
             ends = [value - off * size, value + off * size]
@@ -279,10 +304,11 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
     return np.array(low), np.array(high)
 
 
-def _of_effect(p: Param, value: float, factor: float) -> list[float]:
-    """Bounds of one parameter of an effect; an asymmetry of 0 stays."""
+def _of_effect(p: Param, value: float, around: Range) -> list[float]:
+    """Bounds of one parameter of an effect; an asymmetry of 0 stays unless it is searched."""
+    factor = around.effect
     if p.name == "asymmetry":
-        off = UNEVEN if value != 0.0 else 0.0
+        off = UNEVEN if value != 0.0 else around.uneven
         return [max(value - off, p.low), min(value + off, p.high)]
     factor = factor if p.linear else min(factor, WIDE)
     if p.low < 0.0:

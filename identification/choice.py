@@ -1,6 +1,7 @@
 """Which effects are missing: forward choice with exchange, against a calibrated threshold."""
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -191,11 +192,12 @@ def candidates(
     taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
     keys = [k for k in library if k not in taken and k not in ABSORBED]
     found: list[Candidate] = []
-    for i, key in enumerate(keys):
-        candidate = best_of(stage, library[key], base)
-        if candidate is not None:
-            found.append(candidate)
-        report((i + 1) / len(keys))
+    with ThreadPoolExecutor(2) as pool:
+        each = pool.map(lambda key: best_of(stage, library[key], base), keys)
+        for i, candidate in enumerate(each):
+            if candidate is not None:
+                found.append(candidate)
+            report((i + 1) / len(keys))
     return found
 
 

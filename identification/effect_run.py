@@ -111,7 +111,7 @@ def effect_run_kernel(
     """
     plant = parameters(p, 0)
     k1, k2 = plant[K1], plant[K2]
-    z, z_0 = np.zeros(len(codes)), np.zeros(len(codes))
+    z, z_0, spare = np.zeros(len(codes)), np.zeros(len(codes)), np.zeros(len(codes))
     if held:  # a measured force has its losses in it
         codes = np.where(codes == ACTUATOR, -1, codes)
     bristle = place_of(codes, BRISTLE)
@@ -138,13 +138,14 @@ def effect_run_kernel(
         few = 1 if mode == STUCK and v == 0.0 and bristle < 0 else rough
         z_0[:] = z
         state = effect_step(
-            plant, few, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k], g, h
-        )
+            plant, few, codes, addresses, q, s_k, z, spare, bristle, now, (y, v, F, mode, a), u[k],
+            g, h,
+        )  # fmt: skip
         if few < count and (state[3] != mode or mode not in CALM):
             z[:] = z_0
             state = effect_step(
-                plant, count, codes, addresses, q, s_k, z, bristle, now, (y, v, F, mode, a), u[k],
-                g, h,
+                plant, count, codes, addresses, q, s_k, z, spare, bristle, now, (y, v, F, mode, a),
+                u[k], g, h,
             )  # fmt: skip
         modes[k] = mode if v == 0.0 or mode != STUCK else state[3]
         y, v, F, mode, a = state

@@ -37,19 +37,23 @@ from identification.stepping import (
     F_VP,
     K1,
     K2,
+    MAX_EVENTS,
     SLIP_N,
     SLIP_P,
     STUCK,
     M,
     Parameters,
     glided,
-    resolve,
+    resolve_until,
     settled_mode,
 )
 
 SHORTEST_WAY = 1e-9  # m, over which a force's slope is still sure
 AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to rest
 STATES = 1 << 9  # beside the bits of the codes
+ROUNDED = 1.0 + 1e-9  # of a sub-step, that the last one may be too long
+MOST_PIECES = 100  # of a sample, after which its switches are no longer told from each other
+SURE = 1e-3  # of a sub-step, after which its acceleration is sure
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]
 
@@ -216,6 +220,7 @@ def effect_step(
     q: Array,
     s: Array,
     z: Array,
+    spare: Array,
     bristle: int,
     t: float,
     state: State,
@@ -223,13 +228,19 @@ def effect_step(
     g: float,
     h: float,
 ) -> State:
-    """State after `h` [s] in `count` sub-steps; g: k1 u, or the force's slope with k2 = 0."""
+    """State after `h` [s] in `count` sub-steps and as many more as there are switches.
+
+    g: k1 u, or the force's slope with k2 = 0; spare (k,): to work in.
+    """
     y, v, F, mode, a = state
-    dt = h / count
     acts = at_hand(codes, addresses)
-    for j in range(count):
-        now = t + (j + 0.5) * dt
-        rest = mode == STUCK and bristle < 0
+    left, longest, pieces = h, h / count, 0
+    while left > 0.0:
+        dt = left if left < ROUNDED * longest else longest
+        pieces += 1
+        now = t + (h - left) + 0.5 * dt
+        still = mode == STUCK
+        rest = still and bristle < 0
         vm = 0.0 if rest else v + 0.5 * dt * a
         if vm * v < 0.0:
             vm = 0.0
@@ -240,8 +251,8 @@ def effect_step(
             early = total(ACTUATOR, codes, addresses, q, s, z, p, now, y, v, F, u, way, rest)
         Fm = F + 0.5 * dt * (g + early - p[K2] * v)
         way = direction(v, Fm)
-        still = mode == STUCK
         if acts & STATES:
+            spare[:] = z
             evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
         # Along the way the forces are a straight line in position, which is stepped exactly too.
         way_on = 2.0 * (ym - y)
@@ -256,7 +267,7 @@ def effect_step(
         g_now = g
         if acts & (1 << ACTUATOR):
             g_now += total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
-        y_0, before, F_0 = y, v, F
+        y_0, before, F_0, rests = y, v, F, 0.0
         if bristle >= 0:
             # In place of the band: a level that falls from the stick limit as LuGre's does.
             d = direction(vm, z[bristle])
@@ -304,17 +315,36 @@ def effect_step(
                 p[K2] + k_e,
             )
             mode = settled_mode(shifted, v, F + extra)
+            if still and mode != STUCK:  # what friction owes to the rest goes with the first motion
+                if acts & STATES:
+                    z[:] = spare
+                continue
             v = 0.0 if mode == STUCK else v
             moved, after, on = glided(shifted, v, F + extra, mode, g_now, dt)
             if on:
                 y, v = y + moved, after
             else:
-                y, v, _, mode = resolve(shifted, y, v, F + extra, mode, g_now, dt)
-            F += g_now * dt - p[K2] * (y - y_0)
-        a = (v - before) / dt
-        ym, vm, Fm, still = 0.5 * (y_0 + y), 0.5 * (before + v), 0.5 * (F_0 + F), mode == STUCK
-        if acts & STATES:
-            evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
+                most = 1 if pieces < MOST_PIECES else MAX_EVENTS
+                y, v, _, mode, rests = resolve_until(
+                    shifted, y, v, F + extra, mode, g_now, dt, most
+                )
+                if rests > 0.0 and (most > 1 or not np.isfinite(y)):
+                    y, rests = np.nan, 0.0  # as in `resolve`
+            F += g_now * (dt - rests) - p[K2] * (y - y_0)
+        dt -= rests
+        left -= dt
+        if mode == STUCK and bristle < 0:
+            a = 0.0
+        elif dt > SURE * longest:
+            a = (v - before) / dt
+        if not acts & STATES:
+            continue
+        ym, vm, Fm = 0.5 * (y_0 + y), 0.5 * (before + v), 0.5 * (F_0 + F)
+        if rests > 0.0:
+            z[:] = spare
+        else:
+            dt, still = 0.5 * dt, mode == STUCK
+        evolve_states(False, dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
     return y, v, F, mode, a
 
 

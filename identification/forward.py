@@ -14,10 +14,12 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification.approach import (
+    BREAKS,
     CLOSE,
     FAR,
     MIDWAY,
     NEARLY,
+    SIDES,
     SLIDING,
     approach,
     closer,
@@ -43,7 +45,17 @@ from identification.needed import (
 )
 from identification.outcome import Outcome, spread
 from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, even, judge, loose, loss, refit, start_band
+from identification.refit import (
+    COMPLETE,
+    Refit,
+    even,
+    judge,
+    loose,
+    loss,
+    misfit,
+    refit,
+    start_band,
+)
 from identification.result import Drive
 from identification.stage import Stage
 from identification.starts import SECONDS, freed, left, starts
@@ -57,7 +69,8 @@ UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
-FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist
+FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
+HARDLY = 2.5  # misfit of one that hardly falls short of being followed
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
 Report = Callable[[str, float], None]
@@ -125,7 +138,9 @@ def contest(
         report("judging", 0.5 * (i + 1) / len(tried))
     begun.sort(key=lambda one: one.loss)
     screened: list[Contender] = []
-    promising = max(NEAR, PROMISING * model.misfit)
+    # The short logs may be those stretches of which most is left.
+    short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
+    promising = max(NEAR, PROMISING * short)
     settled_at = np.inf
     for i, one in enumerate(begun):
         if one.loss > settled_at:
@@ -135,6 +150,8 @@ def contest(
             screened.append(contender)
             if contender.misfit <= NEARLY:
                 settled_at = min(settled_at, BEHIND * one.loss)
+            elif contender.misfit <= HARDLY:
+                settled_at = min(settled_at, FAR_BEHIND * one.loss)
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
     screened.sort(key=lambda one: one.misfit)
     if not screened or screened[0].misfit > promising:
@@ -240,8 +257,9 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
         # Where the plain run is nearly followed, its band and limits are nearly right.
-        near = setting.plain.misfit <= NEAR
-        stage = (0.0, MIDWAY if near else SLIDING) if known(setting) else (1.0, FAR)
+        around = MIDWAY if setting.plain.misfit <= NEAR else SLIDING
+        around = BREAKS if effect.acts == "stiction" else around
+        stage = (0.0, around) if known(setting) else (1.0, FAR)
         return approach(plant, setting.short, setting.drive, setting.rng, (stage,))
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
@@ -260,8 +278,7 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     found = refined(one.plant, setting)
-    held = not loose(found.plant, setting.drive)
-    if held and one.effect.acts == "stiction" and COMPLETE < found.misfit < NEAR:
+    if one.effect.acts == "stiction" and COMPLETE < found.misfit < UNEVEN:
         # Where each start hangs on the rest before it, minima are many and narrow.
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
         found = again if again.misfit < found.misfit else found
@@ -269,7 +286,7 @@ def _whole(one: Contender, setting: Setting) -> Refit:
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
         if found.misfit > COMPLETE and loose(found.plant, setting.drive):
-            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 1)
+            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES)
             found = again if again.misfit < found.misfit else found
     return found
 

@@ -7,12 +7,14 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect, Param
 from identification.evidence import Moving
+from identification.rest import MEAN, samples, stretches
 
 SPEEDS = (0.02, 0.04, 0.07, 0.12, 0.2, 0.33, 0.55, 0.9, 1.5)  # of the speed rarely exceeded
 PLACES = (0.1, 0.25, 0.4, 0.55, 0.65, 0.75, 0.85, 0.92, 0.97)  # of half the travel
 PLAYS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the travel
 SAMPLES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 SHARES = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
+RESTS = (0.1, 0.2, 0.4, 0.8, 1.5, 3.0, 8.0)  # of the median rest
 TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
 SHARPEST = 0.02  # s, shortest passage of one period that the windows still show
@@ -35,6 +37,8 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
         found = middle + np.sign(p.typical) * 0.5 * travel * np.array(PLACES)
     elif p.unit in ("m", "rad"):
         found = travel * np.array(PLAYS)
+    elif p.unit == "s" and effect.acts == "stiction":
+        found = median_rest(logs, p.typical) * np.array(RESTS)
     elif p.unit == "s":
         found = one.log.duration * np.array(SHARES) if p.typical >= LONG else h * np.array(SAMPLES)
     elif p.unit == "V":
@@ -46,6 +50,16 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
     else:
         found = p.typical * np.array(TYPICAL)
     return np.unique(np.clip(found, p.low, p.high))
+
+
+def median_rest(logs: Sequence[Moving], otherwise: float) -> float:
+    """Median time at rest [s] before a motion that may be a breakaway."""
+    times = [
+        (high - low) * one.log.h
+        for one in logs
+        for low, high in stretches(one, 3 * samples(MEAN, one.log.h))
+    ]
+    return float(np.median(times)) if times else otherwise
 
 
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:

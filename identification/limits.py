@@ -27,14 +27,15 @@ FITS = 9.0  # mean square in noise units up to which an event counts as understo
 
 
 @lru_cache(maxsize=16)
-def breakaway_limits(one: Moving, friction: Karnopp) -> Breakaways:
+def breakaway_limits(one: Moving, friction: Karnopp, falls: bool = False) -> Breakaways:
     """Breakaways of a log: a rest of at least 48 ms, then motion; `force` is the stick limit.
 
-    friction: sliding and band as the model without effects has them.
+    friction: sliding and band as the model without effects has them; falls: with the first motion
+    the limit falls to that of `friction`, so it is no less.
     """
     found = []
     for low, high in stretches(one, 3 * samples(MEAN, one.log.h)):
-        event = _event(one, friction, low, high)
+        event = _event(one, friction, falls, low, high)
         if event is not None:
             found.append(event)
     k = np.array(found).reshape(-1, 5)
@@ -46,7 +47,7 @@ def breakaway_limits(one: Moving, friction: Karnopp) -> Breakaways:
 
 
 def _event(
-    one: Moving, friction: Karnopp, low: int, high: int
+    one: Moving, friction: Karnopp, falls: bool, low: int, high: int
 ) -> tuple[float, float, float, float, float] | None:
     """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
     y, F, h = one.log["y"], one.log["F"], one.log.h
@@ -68,7 +69,7 @@ def _event(
     best, left, span = 0.0, np.inf, highest - lowest
     tried = np.linspace(lowest, highest, GRID)
     for _ in range(NARROWED + 1):
-        costs = [_cost(one, friction, part, level, way, float(limit)) for limit in tried]
+        costs = [_cost(one, friction, falls, part, level, way, float(limit)) for limit in tried]
         left = float(np.min(costs))
         best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # a held force jumps
         span = 2.0 * span / (GRID - 1)
@@ -82,13 +83,23 @@ def _event(
 
 
 def _cost(
-    one: Moving, friction: Karnopp, part: Log, level: float, way: float, limit: float
+    one: Moving, friction: Karnopp, falls: bool, part: Log, level: float, way: float, limit: float
 ) -> float:
     """Mean square of the position's error in noise units from rest on with this stick limit [N]."""
     side = {"F_sp": limit} if way > 0 else {"F_sn": -limit}
+    held, y_m = np.zeros(0), part["y"]
+    if falls:
+        least = min(limit, friction.F_sp if way > 0 else -friction.F_sn)
+        side = {"F_sp": least} if way > 0 else {"F_sn": -least}
+        above = np.flatnonzero(way * part["F"] > limit)
+        begin = int(above[0]) if len(above) else len(part)
+        held = np.full(begin, level)
+        part = Log(part.name, {key: x[begin:] for key, x in part.signals.items()})
     nine = replace(friction, **side)
     drive: Drive = "command" if one.held else "force"
     plant = Plant(nine, Motor(1.0) if one.held else None)
-    run = free_run(plant, part, (level, 0.0, float(part["F"][0])), drive)
-    r: Array = (run.y - part["y"]) / max(one.noise_y, EXACT)
+    y = held
+    if len(part):
+        y = np.append(held, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
+    r: Array = (y - y_m) / max(one.noise_y, EXACT)
     return float(np.mean(np.minimum(r**2, 1e4)))

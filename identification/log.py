@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import Literal
 
@@ -65,7 +66,7 @@ class Log:
     def __len__(self) -> int:
         return len(self.signals["t"])
 
-    @property
+    @cached_property
     def h(self) -> float:
         """Median sampling period [s]."""
         return float(np.median(np.diff(self.signals["t"])))

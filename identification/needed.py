@@ -81,7 +81,11 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
     Where it is not with any, the model that leaves least; but where nothing brings the run back to
     the log and its band is unknown (unsure), the one without effects of slow and micro-motion.
     """
-    unsure = unsure and loose(setting.plain.plant, setting.drive)
+    free = loose(setting.plain.plant, setting.drive)
+    unsure = unsure and free
+    choice = without_growth(choice) if free else choice
+    if not choice.steps:
+        return choice, setting.plain
     best: tuple[Choice, Model] | None = None
     for n in range(1, len(choice.steps) + 1):
         part, whole = leading(choice, n), n == len(choice.steps)
@@ -131,6 +135,22 @@ def without_slow(choice: Choice) -> Choice:
     return leading(choice, len(tuple(takewhile(lambda step: not _slow(step), choice.steps))))
 
 
+def without_growth(choice: Choice) -> Choice:
+    """The choice without stiction that grows, which is left to the run to find.
+
+    Its breakaways are few and tell its size at one time of rest; the run tells both. Where sliding
+    lacks nothing, an effect of slow motion that was chosen too is its shadow, or the run's to find.
+    """
+    kept = [step for step in choice.steps if step.candidate.effect.acts != "stiction"]
+    if len(kept) == len(choice.steps):
+        return choice
+    slides = explained(choice.first)
+    stay = tuple(step for step in kept if not (slides and _slow(step)))
+    gone = [step.candidate for step in choice.steps if step not in stay]
+    end, base = with_steps(stay, choice.start, choice.first)
+    return Choice(choice.start, choice.first, stay, end, base, (*choice.tried, *gone))
+
+
 def _slow(step: Step) -> bool:
     """Whether the effect of a step is one of slow or micro-motion."""
     effect = step.candidate.effect
@@ -172,6 +192,8 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         end, outcomes = with_steps(stay, setting.start, setting.first)
+        if free and not _slow(step) and explained(choice.base) and not explained(outcomes):
+            continue  # sliding alone calls for it: a search would not find otherwise
         base = without(model, stay, setting)
         if free:  # the search without the effect may have ended elsewhere
             base = replace(base, friction=more_load(model.plant).friction)

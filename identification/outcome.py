@@ -62,15 +62,16 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     size = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
     whitened = A / size
     bins = np.digitize(rows.speed, edges[1:])
-    grams = np.array([whitened[bins == i].T @ whitened[bins == i] for i in range(len(edges))])
+    ordered = whitened[np.argsort(bins, kind="stable")]
+    ends = np.cumsum(np.bincount(bins, minlength=len(edges)))
+    parts = np.split(ordered, ends[:-1])
+    grams = np.cumsum([part.T @ part for part in parts[::-1]], axis=0)[::-1]
     own = np.flatnonzero([name in POSITIVE for name in rows.names])
-    tried = []
-    for i in range(len(edges)):
-        theta, left = _of_gram(grams[i:].sum(axis=0), own)
-        total = left * size[-1] ** 2 / scale + TRIM * np.count_nonzero(bins < i) + rows.lost
-        tried.append((total, i, theta))
-    total, best, theta = min(tried, key=lambda each: each[0])
-    theta = theta * size[-1] / size[:-1]
+    thetas, left = _of_grams(grams, own)
+    slower = np.concatenate([[0], ends[:-1]])
+    totals = left * size[-1] ** 2 / scale + TRIM * slower + rows.lost
+    best = int(np.argmin(totals))
+    total, theta = totals[best], thetas[best] * size[-1] / size[:-1]
     residual = A[:, -1] - A[:, :-1] @ theta
     fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
     return Outcome(rows, fit, float(total), float(edges[best]))
@@ -92,15 +93,24 @@ def _robust(r: Array, scale: float) -> float:
     return float(np.sum(ROBUST * np.log1p(r**2 / (scale * ROBUST))))
 
 
-def _of_gram(G: Array, positive: IntArray) -> tuple[Array, float]:
-    """Least squares and the square sum it leaves, from the Gram matrix of [X b]."""
+def _of_grams(grams: Array, positive: IntArray) -> tuple[Array, Array]:
+    """Least squares (g, k) and the square sums (g,) left, from Gram matrices of [X b]."""
+    A, c = grams[:, :-1, :-1], grams[:, :-1, -1]
+    theta = np.einsum("gij,gj->gi", np.linalg.pinv(A, rcond=1e-12, hermitian=True), c)
+    for i in np.flatnonzero(np.any(theta[:, positive] < 0.0, axis=1)):
+        theta[i] = _not_negative(A[i], c[i], positive)
+    bent = np.einsum("gij,gj->gi", A, theta)
+    left = grams[:, -1, -1] + np.einsum("gi,gi->g", theta, bent - 2.0 * c)
+    return theta, np.maximum(left, 0.0)
+
+
+def _not_negative(A: Array, c: Array, positive: IntArray) -> Array:
+    """Least squares (k,) of A theta = c, those in `positive` not below 0."""
 
     def least_squares(at: IntArray) -> Array:
-        return np.asarray(np.linalg.lstsq(G[np.ix_(at, at)], G[at, -1], rcond=1e-12)[0])
+        return np.asarray(np.linalg.lstsq(A[np.ix_(at, at)], c[at], rcond=1e-12)[0])
 
-    theta = non_negative(least_squares, len(G) - 1, positive)
-    left = G[-1, -1] - 2 * theta @ G[:-1, -1] + theta @ G[:-1, :-1] @ theta
-    return theta, float(max(left, 0.0))
+    return non_negative(least_squares, len(c), positive)
 
 
 def told(stage: Stage, equation: str) -> bool:

@@ -51,7 +51,8 @@ class Stage:
     of theta, for the levels that effects ask for (the rows' noise stays as theta makes it); band:
     speed [m/s] up to which friction is not that of sliding; play: a transducer's play was taken
     out, and when it is crossed is not seen;
-    sliding: friction with its band, once known, by which breakaways are told exactly;
+    sliding: friction with its band, once known, by which breakaways are told exactly; falls:
+    their limit falls to that of `sliding` with the first motion;
     scales: by equation, what its rows' squares are divided by.
     """
 
@@ -65,6 +66,7 @@ class Stage:
     band: float = 0.0
     play: bool = False
     sliding: Karnopp | None = None
+    falls: bool = False
     scales: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
     @cached_property
@@ -101,7 +103,7 @@ class Stage:
     def events(self) -> tuple[Breakaways, ...]:
         """Breakaways of each log."""
         if self.sliding is not None:
-            return tuple(breakaway_limits(one, self.sliding) for one in self.logs)
+            return tuple(breakaway_limits(one, self.sliding, self.falls) for one in self.logs)
         return tuple(breakaways(one, max(float(self.theta[0]), 1e-9)) for one in self.logs)
 
     @property

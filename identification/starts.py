@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.compiled import compiled_fast
 from identification.errors import BadModel
 from identification.evidence import Moving
 from identification.log import Log
@@ -188,27 +189,44 @@ def _creep(one: Moving, low: int, high: int) -> tuple[float, float]:
 class Freed:
     """What takes the part of residuals away that the windows' states account for.
 
-    window (n,) of every sample; weight (k, n): less than 1 where the run itself is unsure; B (3, k,
-    n): change of the weighted errors with each state in units of its deviation; inverse (windows,
-    3, 3) of I + B'B.
+    weight (k, n): less than 1 where the run itself is unsure; B (3, k, n): change of the weighted
+    errors with each state in units of its deviation; inverse (windows, 3, 3) of I + B'B.
     """
 
     begun: Starts
-    window: IntArray
     weight: Array
     B: Array
     inverse: Array
 
     def __call__(self, r: Array) -> Array:
         """Errors (k, n), weighted, less their states' part."""
-        r = r * self.weight
-        return np.asarray(r - np.einsum("skn,sn->kn", self.B, self.states(r)[:, self.window]))
+        out = r * self.weight
+        freed_kernel(self.begun.at, self.B, self.inverse, out)
+        return out
 
-    def states(self, r: Array) -> Array:
-        """States' most likely errors by weighted errors, in units of their deviations, (3, k)."""
-        products = np.einsum("skn,kn->sn", self.B, r)
-        b = np.array([np.bincount(self.window, p, len(self.begun.at)) for p in products])
-        return np.asarray(np.einsum("wij,jw->iw", self.inverse, b))
+
+@compiled_fast
+def freed_kernel(at: IntArray, B: Array, inverse: Array, r: Array) -> None:
+    """Takes from the weighted errors r (k, n) what the states of their windows account for.
+
+    Those of a window, from sample at[w] on, are most likely (I + B'B)^-1 B'r in units of their
+    deviations.
+    """
+    rows, n = r.shape
+    states = np.empty(3)
+    for w in range(len(at)):
+        low, high = at[w], at[w + 1] if w + 1 < len(at) else n
+        a, b, c = 0.0, 0.0, 0.0
+        for i in range(rows):
+            for k in range(low, high):
+                a += B[0, i, k] * r[i, k]
+                b += B[1, i, k] * r[i, k]
+                c += B[2, i, k] * r[i, k]
+        for j in range(3):
+            states[j] = inverse[w, j, 0] * a + inverse[w, j, 1] * b + inverse[w, j, 2] * c
+        for i in range(rows):
+            for k in range(low, high):
+                r[i, k] -= states[0] * B[0, i, k] + states[1] * B[1, i, k] + states[2] * B[2, i, k]
 
 
 def freed(
@@ -237,7 +255,7 @@ def freed(
     count = len(begun.at)
     sums = [[np.bincount(window, gram[i, j], count) for j in range(3)] for i in range(3)]
     inverse = np.linalg.inv(np.eye(3) + np.moveaxis(np.array(sums), 2, 0))
-    return Freed(begun, window, weight, B, inverse)
+    return Freed(begun, weight, B, inverse)
 
 
 def _sureness(

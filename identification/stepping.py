@@ -173,9 +173,20 @@ def resolve(
 
     p: from `parameters`; g: k1 u, or the slope of the force [N/s].
     """
+    y, v, force, mode, left = resolve_until(p, y, v, force, mode, g, h, MAX_EVENTS)
+    # More switches, or a body lighter, than any machine's: no answer is better than one with time
+    # missing.
+    return (y if left <= 0.0 else np.nan), v, force, mode
+
+
+@compiled
+def resolve_until(
+    p: Parameters, y: float, v: float, force: float, mode: int, g: float, h: float, most: int
+) -> tuple[float, float, float, int, float]:
+    """As `resolve`, after so many switches at most, and what is then left of `h` [s]."""
     left, k2, switches = h, p[K2], 0
     pieces = 0 if np.isfinite(y) else MAX_PIECES  # a run that was lost stays so
-    while left > 0.0 and switches < MAX_EVENTS and pieces < MAX_PIECES:
+    while left > 0.0 and switches < most and pieces < MAX_PIECES:
         pieces += 1
         if mode in (STUCK, EDGE_P, EDGE_N):
             slope = g - k2 * v
@@ -215,9 +226,7 @@ def resolve(
         if found > 0:
             switches += 1
             v, mode = _after_exit(mode, p, force, found)
-    # More switches, or a body lighter, than any machine's: no answer is better than one with time
-    # missing.
-    return (y if left <= 0.0 else np.nan), v, force, mode
+    return y, v, force, mode, left
 
 
 @compiled_inline

@@ -111,8 +111,10 @@ def model_of(
         if near is not None and any(by_load(a.effect) for a in acting):
             # What the plain run tells is what the load leaves of it.
             begins = [loaded(replace(plant, friction=near)), plant]
+        if missing:  # it will not do, however closely it is searched
+            begins = begins[:1]
         told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
-        other = closest(begins, logs, drive, rng, 1 if missing else SEARCHES, told)
+        other = closest(begins, logs, drive, rng, 0 if missing else SEARCHES, told)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 

@@ -1,23 +1,23 @@
 """Structures to try in the forward run, and the values from which each begins."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.candidates import Candidate
+from identification.candidates import Candidate, best_of
 from identification.choice import ABSORBED, Choice, Step, gives_way
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, slow_motion
-from identification.evidence import IN_ACTUATOR, REST, Moving
-from identification.grids import shape_grid
+from identification.evidence import BREAKAWAY, FIVE, IN_ACTUATOR, REST, Moving
+from identification.grids import median_rest, shape_grid
 from identification.needed import Setting, without
-from identification.outcome import Outcome, spread
+from identification.outcome import Outcome, base_outcomes, spread
 from identification.plant import Plant
 from identification.refit import loose
-from identification.rest import stretches
+from identification.stage import Stage
 from identification.structure import Model, inside
 
 STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
@@ -57,7 +57,7 @@ def _beside(
     """Effects not in `steps` that the run may show better than the equations do, with values to
     begin from; instead: of an effect taken, so the best of its rivals too."""
     keys = {step.candidate.effect.key for step in steps}
-    regressed = {one.effect.key: one.values for one in tried}
+    regressed = {one.effect.key: one for one in tried}
     ranked = sorted(tried, key=lambda one: -one.gain)
     shown = {one.effect.key for one in ranked[: SHOWN if instead else 0]}
     free = loose(base, setting.drive)
@@ -72,15 +72,38 @@ def _beside(
             continue
         # Where every trial is a search, what the equations chose is not contested by all.
         if key in shown or (seen_in_run(effect) and not (instead and free)):
-            values = [inside(effect, regressed[key])] if key in regressed else []
-            if values and effect.acts == "stiction":  # breakaways show less of it than there is
-                values = [
-                    inside(effect, {**values[0], **{k: a * values[0][k] for k in effect.linear}})
-                    for a in GROWN
-                ]
+            own = base
+            values = [inside(effect, regressed[key].values)] if key in regressed else []
+            if values and effect.acts == "stiction":
+                own, values = grown(regressed[key], base, setting.start)
             values += grid(effect, base, setting.short)
             if values:
-                yield Trial(steps, base, effect, values)
+                yield Trial(steps, own, effect, values)
+
+
+def grown(one: Candidate, base: Plant, start: Stage) -> tuple[Plant, list[dict[str, float]]]:
+    """Stick limits and sizes from which stiction that grows is tried.
+
+    The first motion was told as if the limit stayed, which shows less growth than there is: the
+    breakaways are told anew, with a limit that falls to what it is without a rest.
+    """
+    effect = one.effect
+    values = [
+        inside(effect, {**one.values, **{k: a * one.values[k] for k in effect.linear}})
+        for a in GROWN
+    ]
+    up, down = (float(x) for x in one.outcomes[BREAKAWAY].fit.theta[:2])
+    if min(up, down) <= 0.0:
+        return base, values
+    friction = replace(base.friction, F_sp=up, F_sn=-down)
+    if not base.effects and np.all(start.theta > 0.0):  # the run bent its sliding
+        five = dict(zip(FIVE, start.theta.tolist(), strict=True))
+        friction = replace(friction, **five)
+    stage = replace(start, sliding=friction, falls=True)
+    outcomes = base_outcomes(stage)
+    again = best_of(stage, effect, outcomes) if BREAKAWAY in outcomes else None
+    more = [inside(effect, again.values)] if again is not None else []
+    return replace(base, friction=friction), more + values
 
 
 def rigid(first: Mapping[str, Outcome]) -> bool:
@@ -114,6 +137,5 @@ def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) ->
     if p.unit in ("N", "N m"):
         return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(LEVELS)
     if effect.acts == "stiction" and p.unit == "s":
-        rests = [(high - low) * one.log.h for one in logs for low, high in stretches(one, 2)]
-        return float(np.median(rests) if rests else p.typical) * np.array(REST_SHARES)
+        return median_rest(logs, p.typical) * np.array(REST_SHARES)
     return shape_grid(effect, p, logs)

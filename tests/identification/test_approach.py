@@ -9,6 +9,7 @@ import pytest
 from identification.approach import (
     CLOSE,
     FAR,
+    SIDES,
     TOLD,
     Range,
     approach,
@@ -127,3 +128,26 @@ def test_a_window_in_motion_begins_fast() -> None:
     usual = np.median(speed[speed > 0])
     assert np.count_nonzero(moving) > 3
     assert np.mean(np.abs(begun.v[moving][1:]) >= FAST * usual) > 0.9
+
+
+def test_an_asymmetry_is_searched_only_where_it_is_asked_for() -> None:
+    effects = {"stribeck": {"F_s": 3.0, "v_s": 0.05}}
+    names = names_of(plant(effects), "command")
+    at = names.index("stribeck.asymmetry")
+    for around, off in ((CLOSE, 0.0), (SIDES, 0.5)):
+        low, high = limits(plant(effects), names, 0.0, around)
+        assert (low[at], high[at]) == (-off, off)
+
+
+def test_a_search_that_ends_where_another_did_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = seen(made(2, {"spring": {"k": 40.0}}))
+    begun: list[Plant] = []
+
+    def nearly(tried: Plant, *_: object) -> Plant:
+        begun.append(tried)
+        return tried
+
+    monkeypatch.setattr("identification.approach.approach", nearly)
+    rng = np.random.default_rng(0)
+    found = closest([plant()] * 4, [one], "command", rng, 0)
+    assert found.misfit > 5.0 and len(begun) == 2

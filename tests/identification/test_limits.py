@@ -24,6 +24,18 @@ def test_a_limit_that_grows_with_the_rest_is_seen_to_grow() -> None:
     assert np.median(grown) > 0.5
 
 
+def test_a_limit_that_falls_with_the_first_motion_is_seen_whole() -> None:
+    F_r, tau = 5.0, 0.4
+    one = seen(made(1, {"rising_stiction": {"F_r": F_r, "tau": tau}}))
+    off = []
+    for falls in (False, True):
+        found = breakaway_limits(one, NINE, falls)
+        limit = np.where(found.direction > 0, NINE.F_sp, -NINE.F_sn)
+        true = limit + F_r * (1.0 - np.exp(-found.rested / tau))
+        off.append(float(np.median(np.abs(found.force * found.direction - true))))
+    assert off[1] < 0.25 < 0.5 < off[0]
+
+
 def test_a_body_that_never_moves_breaks_nowhere() -> None:
     log = made(1)
     still = np.random.default_rng(0).standard_normal(len(log)) * 1e-5

@@ -19,9 +19,11 @@ from identification.needed import (
     levelled,
     pruned,
     without,
+    without_growth,
     without_slow,
 )
-from identification.refit import COMPLETE
+from identification.plant import Plant
+from identification.refit import COMPLETE, Refit
 from identification.structure import model_of
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
@@ -78,6 +80,39 @@ def test_levels_taken_by_an_effect_are_given_back() -> None:
     less = replace(friction, F_cp=friction.F_cp - 3.0, F_sp=friction.F_sp - 3.0)
     theta = np.array([NINE.m, NINE.F_cp, NINE.F_cn, NINE.F_vp, NINE.F_vn])
     assert levelled(less, theta).array == pytest.approx(NINE.array)
+
+
+def test_growth_is_left_to_the_run(found: tuple[Setting, Choice]) -> None:
+    _, choice = found
+    first = choice.steps[0]
+    of = {
+        k: replace(first.candidate, effect=built_in()[k]) for k in ("rising_stiction", "stribeck")
+    }
+    grows, slow = (replace(first, candidate=one) for one in of.values())
+    kept = without_growth(replace(choice, steps=(grows, slow, first)))
+    assert kept.steps == (slow, first)  # the spring is missing from sliding: so may the other be
+    assert kept.tried == (*choice.tried, of["rising_stiction"])
+    slides = replace(choice, steps=(grows, slow, first), first=choice.base)
+    assert without_growth(slides).steps == (first,)
+    assert without_growth(choice) is choice
+
+
+def test_what_sliding_calls_for_is_not_searched_without(
+    found: tuple[Setting, Choice], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, choice = found
+    kept = without_slow(choice)
+    model = replace(setting.plain, plant=plant(SPRING), misfit=1.0)
+    searched: list[object] = []
+
+    def refined(tried: Plant, _setting: Setting) -> Refit:
+        searched.append(tried)
+        return Refit(tried, 5.0, (), {}, lambda: np.zeros((0, 0)))
+
+    monkeypatch.setattr("identification.needed.refined", refined)
+    assert pruned(kept, model, setting)[0] is kept and not searched
+    assert pruned(replace(kept, base=choice.first), model, setting)[0].steps == kept.steps
+    assert len(searched) == len(kept.steps)
 
 
 def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting, Choice]) -> None:

@@ -56,6 +56,23 @@ def test_what_unsure_states_make_of_it_is_taken_away() -> None:
     assert np.mean(raw**2) > 2.0 * np.mean(free(raw) ** 2)
 
 
+def test_what_is_taken_away_is_the_likeliest_that_the_states_can_explain() -> None:
+    one = seen(made(2))
+    begun = starts(one, "command", 0.3)
+    run = window_run(plant(), one, "command", begun)
+    free = module.freed(plant(), one, "command", begun)
+    assert run is not None and free is not None
+    r = errors(run, one, "command")
+    kept = r.copy()
+    after, ends = free(r), [*begun.at[1:], len(one.log)]
+    assert np.array_equal(r, kept)
+    for low, high in zip(begun.at, ends, strict=True):
+        B = free.B[:, :, low:high].reshape(3, -1).T
+        own = (free.weight * r)[:, low:high].ravel()
+        states = np.linalg.solve(np.eye(3) + B.T @ B, B.T @ own)
+        assert np.max(np.abs(after[:, low:high].ravel() - (own - B @ states))) < 1e-8
+
+
 def test_a_play_is_where_the_motion_left_it() -> None:
     effects = {"backlash": {"width": 4e-4}}
     one = seen(made(4, effects))

@@ -23,6 +23,7 @@ from identification.stepping import (
     kernel_parameters,
     parameters,
     resolve,
+    resolve_until,
     settled_mode,
 )
 from tests.identification.oracle import MUTANTS, euler
@@ -274,6 +275,24 @@ def test_a_short_glide_is_the_exact_step_or_none(mode: int) -> None:
             assert min(abs(after), v) < 0.08
         taken += on
     assert (taken == 0) == (mode == BAND_P)
+
+
+def test_a_step_from_switch_to_switch_is_the_whole_step() -> None:
+    p = parameters(kernel_parameters(table(1).array, 9000.0, COUPLING)[None], 0)
+    nine, switched = table(1), 0
+    for force, g in ((0.9 * nine.F_sp, 4e3), (0.9 * nine.F_sn, -4e3), (1.2 * nine.F_sp, -9e3)):
+        mode = STUCK if abs(force) < nine.F_sp else BAND_P
+        whole = resolve(p, 0.0, 0.0, force, mode, g, 2e-3)
+        y, v, f, left, pieces = 0.0, 0.0, force, 2e-3, 0
+        while left > 0.0:
+            before = mode
+            y, v, f, mode, left = resolve_until(p, y, v, f, mode, g, left, 1)
+            pieces += 1
+            assert mode != before or left == 0.0
+        switched += pieces - 1
+        assert (y, v, f, mode) == whole
+    assert switched >= 4
+    assert resolve_until(p, 0.0, 0.0, 0.0, STUCK, 0.0, 2e-3, 1)[3:] == (STUCK, 0.0)
 
 
 @pytest.mark.parametrize("m", [1e-9, 1e-5])

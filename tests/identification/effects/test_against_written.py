@@ -13,6 +13,8 @@ from identification.log import Log
 from identification.plant import Plant
 from identification.simulate import free_run
 from tests.identification.effects.oracle import Evolve, Written, euler
+from tests.identification.motor_logs import made
+from tests.identification.motor_logs import plant as motor
 from tests.identification.plants import ACTUATOR, table
 
 H, SECONDS, SUB = 1e-3, 2.0, 100
@@ -87,3 +89,22 @@ def test_it_is_the_written_equation(key: str) -> None:
 )
 def test_wrong_equations_are_found(key: str, wrong: str) -> None:
     assert differs(key, wrong)[0] > 5e-5
+
+
+@pytest.mark.parametrize(
+    ("key", "values", "most"),
+    [
+        ("rising_stiction", {"F_r": 5.0, "tau": 0.4}, 1e-9),
+        ("frictional_lag", {"tau": 0.01}, 5e-7),
+        ("stribeck", {"F_s": 4.0, "v_s": 0.03}, 5e-6),
+    ],
+)
+def test_a_switch_within_a_sub_step_is_where_it_is_in_finer_ones(
+    key: str, values: Mapping[str, float], most: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    log, one = made(1), motor({key: values})
+    coarse = free_run(one, log, (0.0, 0.0, 0.0), "command").y
+    monkeypatch.setattr("identification.simulate.pieces", lambda *_: 80)
+    monkeypatch.setattr("identification.simulate.fewer", lambda *_: 80)
+    fine = free_run(one, log, (0.0, 0.0, 0.0), "command").y
+    assert np.max(np.abs(coarse - fine)) < most
