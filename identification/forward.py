@@ -28,6 +28,7 @@ from identification.approach import (
     nearer,
 )
 from identification.candidates import Candidate, trial
+from identification.choice import FAR as FAR_OFF
 from identification.choice import LEVEL, Choice, Step, absorb, settled
 from identification.effects._base import Effect
 from identification.equations import by_load, equations_of
@@ -106,21 +107,23 @@ def judged_forward(
     slow = any(acting.effect.acts == "bristle" for acting in model.plant.effects)
     if model.led or (slow and loose(model.plant, setting.drive)):
         return choice, model
-    if model.misfit > enough(setting) and hidden(choice):
+    if model.misfit > enough(setting) and hidden(choice, loose(model.plant, setting.drive)):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found
     return pruned(choice, model, setting)
 
 
-def hidden(choice: Choice) -> bool:
+def hidden(choice: Choice, free: bool) -> bool:
     """Whether what the run lacks may be an effect that the equations hardly show.
 
-    Where they themselves leave much, and no effect explains more of it, none is.
+    Where they themselves leave much, and no effect explains more of it, none is; nor is one where
+    nothing brings the run back (free) and none brings the equations near the sensors' noise.
     """
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
+    most = FAR_OFF if free else np.inf
     return all(spread(choice.base[e]) <= MUCH**2 for e in told) or any(
-        spread(one.outcomes[e]) < HALF * spread(choice.base[e])
+        spread(one.outcomes[e]) < min(HALF * spread(choice.base[e]), most)
         for one in choice.tried
         for e in told
         if e in one.outcomes

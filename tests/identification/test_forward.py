@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.approach import less_load
-from identification.candidates import Candidate
-from identification.choice import choose, first_stage
+from identification.candidates import Candidate, best_of
+from identification.choice import FAR, Choice, choose, first_stage
 from identification.forward import (
     Contender,
     decisive,
@@ -19,6 +19,7 @@ from identification.forward import (
 from identification.library import built_in
 from identification.log import Rig
 from identification.needed import Setting
+from identification.outcome import spread
 from identification.refit import COMPLETE, even
 from identification.structure import Model, model_of
 from identification.trace import trace
@@ -129,6 +130,25 @@ def test_no_contest_where_sliding_itself_is_not_explained() -> None:
     rng = np.random.default_rng(0)
     library = {k: e for k, e in built_in().items() if k in ("spring", "warmup", "backlash")}
     shown = choose(start, first, library, rng, lambda _s, _p: None)
-    assert not hidden(shown)
+    assert not hidden(shown, True)
     clean, none = first_stage([seen(shaken)], False)
-    assert hidden(choose(clean, none, {}, rng, lambda _s, _p: None))
+    assert hidden(choose(clean, none, {}, rng, lambda _s, _p: None), True)
+
+
+def test_no_contest_where_no_effect_brings_a_free_body_near() -> None:
+    one = seen(made(4, {"spring": {"k": 40.0}}))
+    start, first = first_stage([one], False)
+    shown = choose(start, first, {}, np.random.default_rng(0), lambda _s, _p: None)
+    assert spread(first["mechanical"]) > 2.0 * FAR
+    spring = best_of(start, built_in()["spring"], first)
+    assert spring is not None
+
+    def leaving(share: float) -> Choice:
+        """As if the spring left this share of the square."""
+        r = first["mechanical"].fit.residual * np.sqrt(share)
+        o = replace(first["mechanical"], fit=replace(first["mechanical"].fit, residual=r))
+        return replace(shown, tried=(replace(spring, outcomes={"mechanical": o}),))
+
+    left = 1.1 * FAR / spread(first["mechanical"])
+    assert hidden(leaving(left), False) and not hidden(leaving(left), True)
+    assert hidden(leaving(0.5 * left), True) and not hidden(leaving(0.9), False)
