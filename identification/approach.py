@@ -30,6 +30,7 @@ from identification.refit import (
     judge,
     loss,
     names_of,
+    on_bristle,
     plant_with,
     refit,
     start_band,
@@ -147,7 +148,7 @@ def _on_whole(
     if searches > 0 and begun.misfit > (NEARLY if plant.effects else COMPLETE):
         return closer(plant, logs, drive, rng, searches)
     found = refit(plant, logs, drive, prior=even(plant), effort="near")
-    if searches == 0 or found.misfit <= (NEARLY if _slow(plant) else COMPLETE):
+    if searches == 0 or found.misfit <= (NEARLY if on_bristle(plant) else COMPLETE):
         return found
     again = closer(plant, logs, drive, rng, searches)
     return again if again.misfit < found.misfit else found
@@ -165,16 +166,11 @@ def closer(
         found = refit(near, logs, drive, prior=even(near), effort="near")
         gained = best is None or found.misfit < GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= (NEARLY if _slow(plant) else COMPLETE) or not gained:
+        if best.misfit <= (NEARLY if on_bristle(plant) else COMPLETE) or not gained:
             break
         plant = best.plant
     assert best is not None
     return best
-
-
-def _slow(plant: Plant) -> bool:
-    """Whether its runs take long and err, as a bristle's sub-steps do."""
-    return any(acting.effect.acts == "bristle" for acting in plant.effects)
 
 
 def load_share(friction: Karnopp, acting: Acting) -> float:

@@ -267,7 +267,7 @@ def effect_step(
         g_now = g
         if acts & (1 << ACTUATOR):
             g_now += total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
-        y_0, before, F_0, rests = y, v, F, 0.0
+        y_0, before, F_0, unused = y, v, F, 0.0
         if bristle >= 0:
             # In place of the band: a level that falls from the stick limit as LuGre's does.
             d = direction(vm, z[bristle])
@@ -325,13 +325,13 @@ def effect_step(
                 y, v = y + moved, after
             else:
                 most = 1 if pieces < MOST_PIECES else MAX_EVENTS
-                y, v, _, mode, rests = resolve_until(
+                y, v, _, mode, unused = resolve_until(
                     shifted, y, v, F + extra, mode, g_now, dt, most
                 )
-                if rests > 0.0 and (most > 1 or not np.isfinite(y)):
-                    y, rests = np.nan, 0.0  # as in `resolve`
-            F += g_now * (dt - rests) - p[K2] * (y - y_0)
-        dt -= rests
+                if unused > 0.0 and (most > 1 or not np.isfinite(y)):
+                    y, unused = np.nan, 0.0  # as in `resolve`
+            F += g_now * (dt - unused) - p[K2] * (y - y_0)
+        dt -= unused
         left -= dt
         if mode == STUCK and bristle < 0:
             a = 0.0
@@ -340,7 +340,7 @@ def effect_step(
         if not acts & STATES:
             continue
         ym, vm, Fm = 0.5 * (y_0 + y), 0.5 * (before + v), 0.5 * (F_0 + F)
-        if rests > 0.0:
+        if unused > 0.0:
             z[:] = spare
         else:
             dt, still = 0.5 * dt, mode == STUCK

@@ -28,8 +28,7 @@ from identification.approach import (
     nearer,
 )
 from identification.candidates import Candidate, trial
-from identification.choice import FAR as FAR_OFF
-from identification.choice import LEVEL, Choice, Step, absorb, settled
+from identification.choice import LEVEL, Choice, Step, absorb, rough, settled
 from identification.effects._base import Effect
 from identification.equations import by_load, equations_of
 from identification.errors import UserError
@@ -54,6 +53,7 @@ from identification.refit import (
     loose,
     loss,
     misfit,
+    on_bristle,
     refit,
     start_band,
 )
@@ -104,8 +104,7 @@ def judged_forward(
 ) -> tuple[Choice, Model]:
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
-    slow = any(acting.effect.acts == "bristle" for acting in model.plant.effects)
-    if model.led or (slow and loose(model.plant, setting.drive)):
+    if model.led or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
     if model.misfit > enough(setting) and hidden(choice, loose(model.plant, setting.drive)):
         found = contest(choice, model, setting, report)
@@ -121,10 +120,10 @@ def hidden(choice: Choice, free: bool) -> bool:
     nothing brings the run back (free) and none brings the equations near the sensors' noise.
     """
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    most = FAR_OFF if free else np.inf
     return all(spread(choice.base[e]) <= MUCH**2 for e in told) or any(
-        spread(one.outcomes[e]) < min(HALF * spread(choice.base[e]), most)
+        spread(one.outcomes[e]) < HALF * spread(choice.base[e])
         for one in choice.tried
+        if not (free and rough(one.outcomes))
         for e in told
         if e in one.outcomes
     )

@@ -12,6 +12,7 @@ import numpy as np
 
 from identification.approach import closer, more_load
 from identification.arrays import Array
+from identification.candidates import Candidate
 from identification.choice import Choice, Step, absorb, material, settled
 from identification.equations import slow_motion
 from identification.evidence import ACTUATOR, FIVE, MECHANICAL, Moving
@@ -121,9 +122,13 @@ def leading(choice: Choice, count: int) -> Choice:
     """The choice up to so many effects."""
     if count == len(choice.steps):
         return choice
-    stay = choice.steps[:count]
+    return only(choice, choice.steps[:count])
+
+
+def only(choice: Choice, stay: tuple[Step, ...], gone: Sequence[Candidate] = ()) -> Choice:
+    """The choice with these of its steps; gone: to be tried again beside them."""
     end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, choice.tried)
+    return Choice(choice.start, choice.first, stay, end, base, (*choice.tried, *gone))
 
 
 def without_slow(choice: Choice) -> Choice:
@@ -146,9 +151,7 @@ def without_growth(choice: Choice) -> Choice:
         return choice
     slides = explained(choice.first)
     stay = tuple(step for step in kept if not (slides and _slow(step)))
-    gone = [step.candidate for step in choice.steps if step not in stay]
-    end, base = with_steps(stay, choice.start, choice.first)
-    return Choice(choice.start, choice.first, stay, end, base, (*choice.tried, *gone))
+    return only(choice, stay, [step.candidate for step in choice.steps if step not in stay])
 
 
 def _slow(step: Step) -> bool:
@@ -168,10 +171,9 @@ def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Mod
         if not _slow(step):
             continue
         stay = tuple(one for one in choice.steps if one is not step)
-        end, base = with_steps(stay, choice.start, choice.first)
-        less = Choice(choice.start, choice.first, stay, end, base, choice.tried)
+        less = only(choice, stay)
         found = refined(keeping(after.plant, stay), setting)
-        other = Model(end, base, found.plant, found.sd, False, found.misfit)
+        other = Model(less.end, less.base, found.plant, found.sd, False, found.misfit)
         if other.misfit > COMPLETE:
             again = fitted(less, setting) if stay else setting.plain
             other = again if again.misfit < other.misfit else other
@@ -191,19 +193,19 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
         if _slow(step) and choice.steps == setting.doubted:
             continue
         stay = tuple(one for one in choice.steps if one is not step)
-        end, outcomes = with_steps(stay, setting.start, setting.first)
-        if free and not _slow(step) and explained(choice.base) and not explained(outcomes):
+        less = only(choice, stay)
+        if free and not _slow(step) and explained(choice.base) and not explained(less.base):
             continue  # sliding alone calls for it: a search would not find otherwise
         base = without(model, stay, setting)
         if free:  # the search without the effect may have ended elsewhere
             base = replace(base, friction=more_load(model.plant).friction)
         elif stay:
-            base = replace(base, friction=levelled(base.friction, end.theta))
+            base = replace(base, friction=levelled(base.friction, less.end.theta))
         found = refined(base, setting)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
-        choice = Choice(setting.start, setting.first, stay, end, outcomes, choice.tried)
-        model = Model(end, outcomes, found.plant, found.sd, False, found.misfit)
+        choice = less
+        model = Model(less.end, less.base, found.plant, found.sd, False, found.misfit)
     return choice, model
 
 

@@ -240,7 +240,7 @@ def refit(
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
         return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
 
-    slow = any(acting.effect.acts == "bristle" for acting in plant.effects)
+    slow = on_bristle(plant)
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
@@ -348,6 +348,11 @@ def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None 
 def plant_is_motor(plant: Plant) -> bool:
     """Whether a motor drives it, whose position nothing brings back."""
     return isinstance(plant.actuator, Motor)
+
+
+def on_bristle(plant: Plant) -> bool:
+    """Whether a bristle stands for sticking: its sub-steps make runs long, and err."""
+    return any(acting.effect.acts == "bristle" for acting in plant.effects)
 
 
 def loose(plant: Plant, drive: Drive) -> bool:
