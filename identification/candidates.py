@@ -72,24 +72,24 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
         dict(zip((p.name for p in free), map(float, x), strict=True)) for x in product(*grids)
     ]
 
+    bounds = [bounds_of(p, g) for p, g in zip(free, grids, strict=True)]
+    own = stage
+
     def score(shape: Values) -> float:
-        total, found = trial(stage, effect, shape, told_in)
+        total, found = trial(own, effect, shape, told_in)
         fair = needs_rounds(effect) or admissible(effect, with_sizes(effect, shape, found))
         return total if fair else OUTSIDE
 
     best = min(starts, key=score)
-    if free:
-        best = refined(
-            free, [bounds_of(p, g) for p, g in zip(free, grids, strict=True)], best, score
-        )
-    total, found = trial(stage, effect, best, told_in)
-    values = with_sizes(effect, best, found)
-    own = stage
-    for _ in range(ROUNDS if needs_rounds(effect) else 0):
+    best = refined(free, bounds, best, score) if free else best
+    total, found = trial(own, effect, best, told_in)
+    for i in range(ROUNDS if needs_rounds(effect) else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
+        if free and i == 0:  # the plain friction's levels had bent its shape
+            best = refined(free, bounds, best, score)
         total, found = trial(own, effect, best, told_in)
-        values = with_sizes(effect, best, found)
+    values = with_sizes(effect, best, found)
     if not admissible(effect, values):
         return None
     gain = sum(base[e].criterion for e in told_in) - total

@@ -47,7 +47,8 @@ Progress = Callable[[str, float], None]
 class Step:
     """One effect taken: the candidate, its p-value, its rivals in order, stage and base before.
 
-    explained: share of what is missing that it accounts for in the free run, where that decided.
+    explained: share of what is missing that it accounts for in the free run, where that decided;
+    apart: keys of rivals that the equations do not tell from it, but the free run does.
     """
 
     candidate: Candidate
@@ -56,6 +57,7 @@ class Step:
     stage: Stage
     base: Mapping[str, Outcome]
     explained: float | None = None
+    apart: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Mapping
 
-from identification.effects._base import Effect, Param
+from identification.effects._base import AT_REST, Effect, Param
 from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR, MECHANICAL, REST
 
 Values = Mapping[str, float]
@@ -56,7 +56,7 @@ def shape_params(effect: Effect) -> list[Param]:
         for p in effect.params
         if not (p.linear and in_columns(effect))
         and not (p.name == "asymmetry" and (split(effect) or by_load(effect)))
-        and p.name != "at_rest"  # no equation of sliding tells it
+        and p.name not in AT_REST  # no equation of sliding tells it
     ]
 
 

@@ -4,8 +4,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from identification.alike import alike
 from identification.candidates import Candidate
-from identification.choice import SHARE, Choice, Step, merit, share
+from identification.choice import Choice, Step, share
 from identification.effects._base import Param
 from identification.evidence import ACTUATOR, MECHANICAL
 from identification.held_out import left_out
@@ -26,7 +27,6 @@ from identification.trace_result import (
     Verdict,
 )
 
-ALIKE = 10.0  # gain by which two effects that explain equally may differ
 RUNS = {
     "v": "strokes at several constant speeds",
     "y": "the same short stroke at several places",
@@ -45,17 +45,11 @@ def verdict_of(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Ver
     """The verdict in one word: what is left comes first, then rivals, effects and drift."""
     if left.depends_on:
         return "unknown"
-    if any(_alike(step) for step in choice.steps):
+    if any(alike(step) for step in choice.steps):
         return "inseparable"
     if choice.steps:
         return "effect"
     return "drift" if drift else "none"
-
-
-def _alike(step: Step) -> tuple[Candidate, ...]:
-    """Rivals that explain as much as the effect taken, but for luck."""
-    mine = merit(step.candidate)
-    return tuple(c for c in step.rivals if mine - merit(c) < ALIKE and share(c, step.base) >= SHARE)
 
 
 def found_effect(step: Step, after: Model, choice: Choice) -> FoundEffect:
@@ -88,13 +82,15 @@ def rivals_of(choice: Choice) -> tuple[Rival, ...]:
     """Rivals of each effect in the order of what they gain."""
     out = []
     for step in choice.steps:
-        alike = {c.effect.key for c in _alike(step)}
+        equal = {c.effect.key for c in alike(step)}
         for c in step.rivals[:SHOWN]:
             key = c.effect.key
             share = c.gain / step.candidate.gain if step.candidate.gain > 0 else 0.0
             why = (
                 f"explains as much as {step.candidate.effect.key} on these logs"
-                if key in alike
+                if key in equal
+                else f"leaves more in the run than {step.candidate.effect.key} does"
+                if key in step.apart
                 else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
             )
             out.append(Rival(key, _left_out_rms(step, c), why))
@@ -112,9 +108,9 @@ def _left_out_rms(step: Step, rival: Candidate) -> float | None:
 def next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
     """The run that would tell rivals apart, or on what the rest depends."""
     if verdict == "inseparable":
-        step = next(s for s in choice.steps if _alike(s))
+        step = next(s for s in choice.steps if alike(s))
         mine = step.candidate.effect
-        other = _alike(step)[0].effect
+        other = alike(step)[0].effect
         apart = [s for s in (*mine.depends_on, *other.depends_on)
                  if (s in mine.depends_on) != (s in other.depends_on)]  # fmt: skip
         how = RUNS.get(apart[0] if apart else mine.depends_on[0], "a run with richer motion")

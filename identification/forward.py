@@ -106,7 +106,9 @@ def judged_forward(
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
     if model.led or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
         return choice, model
-    if model.misfit > enough(setting) and hidden(choice, loose(model.plant, setting.drive)):
+    if model.misfit > enough(setting, choice.steps) and hidden(
+        choice, loose(model.plant, setting.drive)
+    ):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found
@@ -283,6 +285,9 @@ def _whole(one: Contender, setting: Setting) -> Refit:
     if one.effect.acts == "stiction" and COMPLETE < found.misfit < UNEVEN:
         # Where each start hangs on the rest before it, minima are many and narrow.
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
+        found = again if again.misfit < found.misfit else found
+    elif setting.drive == "force":  # whose noise leaves less than it may: go on to the minimum
+        again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="near")
         found = again if again.misfit < found.misfit else found
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")

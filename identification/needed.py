@@ -53,10 +53,11 @@ class Setting:
     doubted: tuple[Step, ...] = ()
 
 
-def enough(setting: Setting) -> float:
-    """Misfit up to which effects that the equations call for are beyond doubt in the run too."""
-    least = DECISIVE if setting.drive == "command" else WALKED
-    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
+def enough(setting: Setting, steps: Sequence[Step]) -> float:
+    """Misfit up to which a run is not contested: the effects that the equations call for are
+    beyond doubt in it too, or nothing is missing."""
+    least = DECISIVE if setting.drive == "command" or not steps else WALKED
+    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0) if steps else 0.0)
 
 
 def known(setting: Setting) -> bool:
@@ -107,7 +108,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
 def followed(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
-        return min(enough(setting), NEAR)
+        return min(enough(setting, choice.steps), NEAR)
     # A bristle's sub-steps err.
     bristle = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
     return DECISIVE if bristle or setting.drive == "force" else COMPLETE

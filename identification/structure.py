@@ -9,7 +9,7 @@ from identification.approach import SEARCHES, STICK, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step, rough
-from identification.effects._base import Effect
+from identification.effects._base import AT_REST, Effect
 from identification.equations import by_load
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
@@ -83,7 +83,7 @@ def model_of(
         values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
         spreads = effect_sd(effect, values, outcomes)
         for p in effect.params:  # a signal that is not there tells nothing of its parameter
-            if p.name == "at_rest":  # nor do the equations tell a stick limit
+            if p.name in AT_REST:  # nor do the equations tell a stick limit
                 silent[f"{effect.key}.{p.name}"] = np.inf
                 spreads.pop(p.name)
             elif untold(spreads.get(p.name), values[p.name], p.typical):

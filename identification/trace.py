@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.alike import told_apart
 from identification.approach import SHORT
 from identification.before_after import errors_of, noise_of
 from identification.candidates import best_of
@@ -128,6 +129,7 @@ def trace(
     choice, after = judged_forward(choice, after, setting, report)
     if useless(choice, before, after):
         choice, after = Choice(start, first, (), start, first, choice.tried), before
+    choice = told_apart(choice, after, setting)
     seen = [moving(log, held=held, by_command=by_command) for log in test]
     enough = DECISIVE if choice.steps else COMPLETE  # a refinement may end short of its minimum
     left = Dependence((), 0.0) if after.misfit <= enough else left_over(choice, after)

@@ -41,6 +41,7 @@ Kernel = Callable[..., float]
 R = float
 Rs = Sequence[float]
 MAX_PARAMS = 8
+AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
 MAX_SIGNALS = 4
 
 
@@ -179,6 +180,13 @@ def asymmetry() -> Param:
     )
 
 
-def at_rest() -> Param:
-    """Share of friction added while sliding that is added to the stick limit too."""
-    return Param("at_rest", "1", 0.0, 5.0, 1.0, "share that adds to the stick limit", default=1.0)
+def at_rest() -> tuple[Param, Param]:
+    """Shares of friction added while sliding that are added to either stick limit too.
+
+    1 adds the same; the ratio of stick limit to Coulomb level scales both alike.
+    """
+    return _share_at_rest(AT_REST[0], "positive"), _share_at_rest(AT_REST[1], "negative")
+
+
+def _share_at_rest(name: str, way: str) -> Param:
+    return Param(name, "1", 0.0, 5.0, 1.0, f"share that adds to the {way} stick limit", default=1.0)

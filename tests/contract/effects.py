@@ -10,7 +10,7 @@ import pint
 import sympy  # type: ignore[import-untyped]
 
 from identification.arrays import Array
-from identification.effects._base import MAX_PARAMS, MAX_SIGNALS, Acts, Effect
+from identification.effects._base import AT_REST, MAX_PARAMS, MAX_SIGNALS, Acts, Effect
 from workbench.units import si_unit
 
 STATE = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
@@ -162,7 +162,7 @@ def check_depends_on(effect: Effect) -> None:
     """Declared signals are those that move the contribution; no parameter is idle."""
     found = {name for name in ("t", "y", "v", "F", "u") if moved_by_state(effect, name)}
     by_friction = moved_by_state(effect, "f")  # or it but tells sliding from rest
-    found |= {"v"} if by_friction and "at_rest" not in effect.names else set()
+    found |= {"v"} if by_friction and not set(AT_REST) & set(effect.names) else set()
     found |= {"u"} if effect.acts == "delay" else set()
     found |= {k for i, k in enumerate(effect.signals) if _moved_in(effect, "s", i, "value")}
     history = {"rest", "reversal"} & set(effect.depends_on)
