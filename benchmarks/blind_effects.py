@@ -9,6 +9,7 @@ turns a force into a length; band: mean width of the Karnopp band. "Drawn" is fr
 | nonlinear_viscous | k v95^n = s F_c; n drawn, 1.5 to 3 (linear friction absorbs a part) |
 | presliding | F_c/sigma_0 = s 0.5 mm |
 | position_dependent_friction | sine of peak s F_c, period 0.3 to 1 A; or slope, s F_c at A |
+| tight_spot | peak 2 s F_c within 0.6 A of the middle, width 0.08 to 0.25 A |
 | pressure_dependent_friction | s F_c from smallest to largest in the run; both chambers or one |
 | load_dependent_friction | mu rms(F in sliding) = s F_c |
 | spring | k A = s F_c |
@@ -132,6 +133,11 @@ def position_dependent_friction(s: float, at: Place, rng: np.random.Generator) -
     return {"a": 0.0, "b": 0.0, "c1": slope, "c2": 0.0, "period": period}
 
 
+def tight_spot(s: float, at: Place, rng: np.random.Generator) -> Values:
+    place, width = at.reach * rng.uniform(-0.6, 0.6), at.reach * rng.uniform(0.08, 0.25)
+    return {"size": 2.0 * s * at.coulomb, "y_0": place, "width": width}
+
+
 def pressure_dependent_friction(s: float, at: Place, rng: np.random.Generator) -> Values:
     p_p, p_n = at.signals["p_p"], at.signals["p_n"]
     if rng.random() < 0.5:
@@ -216,7 +222,7 @@ SIZES: Mapping[str, Size] = {
         stribeck, nonlinear_viscous, presliding, position_dependent_friction,
         pressure_dependent_friction, load_dependent_friction, spring, cogging, warmup,
         frictional_lag, rising_stiction, end_cushion, backlash, compliance, sensor_nonlinearity,
-        valve_dead_zone, input_delay, leakage,
+        valve_dead_zone, input_delay, leakage, tight_spot,
     )
 }  # fmt: skip
 

@@ -24,7 +24,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-from benchmarks.outside_rig import EFFECTS, IN_COMMAND, REFERENCES, RIGS, STRANGE, write
+from benchmarks.outside_rig import EFFECTS, IN_COMMAND, LAWS, REFERENCES, RIGS, STRANGE, write
 
 
 def traced(machine: str, effect: str, seed: int, place: int, varied: bool) -> tuple[str, bool]:
@@ -43,6 +43,7 @@ def traced(machine: str, effect: str, seed: int, place: int, varied: bool) -> tu
         found: dict[str, Any] = json.loads((folder / "out" / "trace.json").read_text("utf-8"))
     keys = [one["key"] for one in found["effects"]]
     wanted = [] if effect == "none" else ["spring" if effect == "stiff_spring" else effect]
+    wanted = [LAWS[effect][1]] if effect in LAWS else wanted
     right = keys == wanted and found["verdict"] == ("effect" if wanted else "none")
     if effect in STRANGE:
         keys += [f"[{signal}]" for signal in found["unknown"]["depends_on"]]
@@ -64,15 +65,16 @@ def main() -> int:
     parser.add_argument("--first", type=int, default=100)
     parser.add_argument("--seeds", type=int, default=1)
     parser.add_argument("--machines", nargs="+", choices=RIGS, default=list(RIGS))
-    parser.add_argument("--effects", nargs="+", choices=[*EFFECTS, *STRANGE],
+    parser.add_argument("--effects", nargs="+", choices=[*EFFECTS, *STRANGE, *LAWS],
                         default=list(EFFECTS))  # fmt: skip
     parser.add_argument("--strange", action="store_true", help="effects that no library has")
+    parser.add_argument("--laws", action="store_true", help="known effects by other laws")
     parser.add_argument("--varied", action="store_true", help="a recording of its own for each")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()
-    every = [*EFFECTS, *STRANGE]
-    if given.strange:
-        given.effects = list(STRANGE)
+    every = [*EFFECTS, *STRANGE, *LAWS]
+    if given.strange or given.laws:
+        given.effects = list(STRANGE if given.strange else LAWS)
     cases = [
         (machine, effect, seed, every.index(effect), given.varied)
         for seed in range(given.first, given.first + given.seeds)

@@ -18,6 +18,7 @@ SIZES = (
     "play", "late", "dead", "leak", "k", "k_cube", "ripple", "pitch", "warm", "warm_time", "along",
     "by_load", "slow", "slow_speed", "square", "grown", "grown_time", "shake", "rate", "jump",
     "ramp", "curve", "thick", "elastic", "way", "worn", "ledge",
+    "slow_tustin", "grown_rational", "harmonic", "spot", "worn_in",
 )  # fmt: skip
 LENGTHS = {"pitch": 0.012, "warm_time": 15.0, "slow_speed": 0.02, "grown_time": 1.0, "rate": 1.3,
            "way": 0.015}  # fmt: skip
@@ -27,6 +28,12 @@ NAMES = {"backlash": "play", "input_delay": "late", "valve_dead_zone": "dead", "
          "stribeck": "slow", "nonlinear_viscous": "square", "rising_stiction": "grown"}  # fmt: skip
 IN_COMMAND = ("input_delay", "valve_dead_zone", "leakage")
 EFFECTS = ("none", *NAMES)
+# Known effects by other laws than the library's, and the keys that have to be named.
+LAWS = {"stribeck_tustin": ("slow_tustin", "stribeck"),
+        "rising_rational": ("grown_rational", "rising_stiction"),
+        "cogging_harmonic": ("harmonic", "cogging"),
+        "tight_spot": ("spot", "tight_spot"),
+        "wearing_in": ("worn_in", "warmup")}  # fmt: skip
 # Effects that the library does not have, and the signals of which one has to be named.
 STRANGE = {"vibration": ("shake", {"t"}), "jump": ("jump", {"t"}), "ramp": ("ramp", {"t"}),
            "curved_actuator": ("curve", {"u", "F"}), "viscous_along": ("thick", {"y", "v"}),
@@ -121,15 +128,18 @@ def run(
                 - e[4] * y
                 - e[5] * y**3
                 + e[6] * np.sin(2.0 * np.pi * y / e[7])
+                + e[29] * (np.sin(2.0 * np.pi * y / e[7]) + 0.5 * np.cos(4.0 * np.pi * y / e[7]))
             )
             scale = 1.0 + e[8] * np.exp(-(i + j / sub) * h / e[9]) + e[10] * y
             scale += e[25] if late else 0.0
-            more = e[11] * abs(force)
+            scale += e[30] * np.exp(-0.5 * ((y - 0.015) / 0.008) ** 2) - e[31] * (i + j / sub) * h
+            more, slow = e[11] * abs(force), e[12] + e[27]
             stuck = v == 0.0
             rested = rested + dt if stuck else 0.0
             grown = e[15] * (1.0 - np.exp(-rested / e[16])) if stuck else 0.0
+            grown += e[28] * rested / (rested + e[16]) if stuck else 0.0
             if dv_n < v < dv_p:
-                high, low = f_sp * scale + e[12] + more, f_sn * scale - e[12] - more
+                high, low = f_sp * scale + slow + more, f_sn * scale - slow - more
                 if low - grown <= drive <= high + grown:
                     v = 0.0
                     continue
@@ -138,6 +148,7 @@ def run(
                 way = 1.0 if v > 0.0 else -1.0
                 level = (f_cp if v > 0.0 else f_cn) * scale + more
                 level += e[12] * np.exp(-((v / e[13]) ** 2)) + e[14] * v * v
+                level += e[27] * np.exp(-abs(v) / e[13])
                 friction = way * level + (f_vp if v > 0.0 else f_vn) * (1.0 + e[22] * y) * v
             after = v + dt * (drive - friction) / m
             v = 0.0 if after * v < 0.0 else after
@@ -177,9 +188,10 @@ def sizes_of(effect: str, machine: str, coulomb: float) -> Array:
         "by_load": 0.15, "slow": share, "square": share / SPEED**2, "grown": share,
         "shake": share, "jump": share, "ramp": share / 30.0, "curve": 0.15 if machine == "pneumatic"
         else 1.5 * coulomb / K_A, "thick": 0.5 / REACH, "elastic": share, "worn": 0.3,
-        "ledge": share,
+        "ledge": share, "slow_tustin": share, "grown_rational": share, "harmonic": share,
+        "spot": 0.4, "worn_in": 0.004,
     }  # fmt: skip
-    own = STRANGE[effect][0] if effect in STRANGE else NAMES.get(effect)
+    own = {**STRANGE, **LAWS}[effect][0] if effect not in EFFECTS else NAMES.get(effect)
     one = {name: LENGTHS.get(name, 0.0) for name in SIZES} | ({own: full[own]} if own else {})
     return np.array([one[name] for name in SIZES])
 

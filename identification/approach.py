@@ -76,7 +76,7 @@ SIDES = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be uneq
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
-AGREED = 1.03  # relative misfit of two searches that have ended in the same place
+AGREED = 1.1  # relative misfit of two searches that have ended in the same place
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
 NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
@@ -306,6 +306,8 @@ def _of_effect(p: Param, value: float, around: Range) -> list[float]:
     if p.name == "asymmetry":
         off = UNEVEN if value != 0.0 else around.uneven
         return [max(value - off, p.low), min(value + off, p.high)]
+    if p.held(value):
+        return [value, value]
     factor = factor if p.linear else min(factor, WIDE)
     if p.low < 0.0:
         off = (factor - 1.0) * (abs(value) if value else p.typical)

@@ -30,6 +30,7 @@ from identification.stage import Stage, joined
 
 REFINED = 30  # evaluations of the refinement for each parameter
 ROUNDS = 4  # of substitution where a contribution depends on the friction itself
+CALLED = 10.0  # criterion that each parameter has to gain, to leave its default
 OUTSIDE = 1e12  # criterion of parameters outside their bounds
 
 
@@ -81,13 +82,17 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
         return total if fair else OUTSIDE
 
     best = min(starts, key=score)
-    best = refined(free, bounds, best, score) if free else best
+    defaults = {p.name: p.default for p in free if p.default is not None}
+    best = shaped(free, bounds, best, score)
+    half = best | {p.name: 0.5 * best[p.name] for p in free if p.name == "period"}
+    if half != best and score(half) < score(best) + CALLED:
+        best = half  # a harmonic had taken the whole of it
     total, found = trial(own, effect, best, told_in)
     for i in range(ROUNDS if needs_rounds(effect) else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
         if free and i == 0:  # the plain friction's levels had bent its shape
-            best = refined(free, bounds, best, score)
+            best = shaped(free, bounds, best | defaults, score)
         total, found = trial(own, effect, best, told_in)
     values = with_sizes(effect, best, found)
     if not admissible(effect, values):
@@ -96,9 +101,26 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     return Candidate(effect, values, found, float(gain))
 
 
+def shaped(
+    free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
+    score: Callable[[Values], float],
+) -> dict[str, float]:  # fmt: skip
+    """Shape parameters at their best; those with a default stay there unless that gains enough."""
+    best = dict(shape)
+    told = [i for i, p in enumerate(free) if p.default is None]
+    if told:
+        own = refined([free[i] for i in told], [bounds[i] for i in told], best, score)
+        best |= own
+    if len(told) < len(free):
+        other = refined(free, bounds, best, score)
+        if score(other) < score(best) - CALLED * (len(free) - len(told)):
+            best = other
+    return best
+
+
 def bounds_of(p: Param, tried: Array) -> tuple[float, float]:
-    """Where a parameter is refined: between the first values tried, an asymmetry anywhere."""
-    if p.name == "asymmetry":
+    """Where a parameter is refined: between the first values tried, one with a default anywhere."""
+    if p.default is not None:
         return p.low, p.high
     return float(np.min(tried)), float(np.max(tried))
 
@@ -107,14 +129,14 @@ def refined(
     free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
     score: Callable[[Values], float],
 ) -> dict[str, float]:  # fmt: skip
-    """Shape parameters at the nearest minimum of `score`, within bounds."""
+    """These parameters of the shape at the nearest minimum of `score`, within bounds."""
     start = np.array([shape[p.name] for p in free])
     unit = np.where(start != 0, np.abs(start), 1.0)
     low, high = np.array(bounds).T
 
     def at(x: Array) -> dict[str, float]:
         inside = np.clip(x * unit, low, high)
-        return dict(zip((p.name for p in free), inside.tolist(), strict=True))
+        return {**shape, **dict(zip((p.name for p in free), inside.tolist(), strict=True))}
 
     first = start / unit
     step = np.array([0.02 if p.name == "period" else 0.15 for p in free])

@@ -11,6 +11,7 @@ from identification.rest import MEAN, samples, stretches
 
 SPEEDS = (0.02, 0.04, 0.07, 0.12, 0.2, 0.33, 0.55, 0.9, 1.5)  # of the speed rarely exceeded
 PLACES = (0.1, 0.25, 0.4, 0.55, 0.65, 0.75, 0.85, 0.92, 0.97)  # of half the travel
+SPOTS, WIDTHS = 13, (0.015, 0.04, 0.1, 0.25)  # places along the travel, and shares of it
 PLAYS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the travel
 SAMPLES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
 SHARES = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
@@ -27,10 +28,14 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
     y, h = one.log["y"], one.log.h
     travel, middle = float(np.ptp(y)), 0.5 * float(np.max(y) + np.min(y))
     speed = float(np.quantile(np.abs(one.signals["v"]), 0.95))
-    if p.name == "asymmetry":
-        return np.zeros(1)
+    if p.default is not None and not p.linear:
+        return np.array([p.default])
     if p.name == "period":
         found = _periods(effect, one, travel)
+    elif p.name == "y_0":
+        found = middle + travel * np.linspace(-0.5, 0.5, SPOTS)
+    elif p.name == "width" and effect.acts == "friction":
+        found = travel * np.array(WIDTHS)
     elif p.unit in ("m/s", "rad/s"):
         found = speed * np.array(SPEEDS)
     elif p.unit in ("m", "rad") and p.low < 0:

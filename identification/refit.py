@@ -119,12 +119,12 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
 
 
 def even(plant: Plant) -> dict[str, float]:
-    """A prior that holds every asymmetry that is 0, and nothing else."""
+    """A prior that holds every shape that is at its default (an asymmetry of 0), nothing else."""
     return {
-        f"{a.key}.{name}": 0.0
+        f"{a.key}.{p.name}": 0.0
         for a in plant.effects
-        for name, value in a.values.items()
-        if name == "asymmetry" and value == 0.0
+        for p, value in zip(a.effect.params, a.p, strict=True)
+        if p.held(value)
     }
 
 

@@ -167,7 +167,7 @@ def effect_sd(
     """Standard deviations of an effect's parameters for the prior; 0 holds one at its value."""
     out: dict[str, float] = {}
     for p in effect.params:
-        if p.name == "asymmetry" and values[p.name] == 0.0:
+        if p.held(values[p.name]):
             out[p.name] = 0.0
         else:
             out[p.name] = SHAPE * abs(values[p.name]) if values[p.name] else 0.0

@@ -61,6 +61,12 @@ class Param:
     linear: bool = False
     default: float | None = None
 
+    def held(self, value: float) -> bool:
+        """Whether it is part of a law's shape and at its default: there it stays unless the logs
+        call for another value."""
+        own = self.default is not None and not self.linear and self.name not in AT_REST
+        return own and value == self.default
+
 
 @dataclass(frozen=True)
 class Effect:

@@ -6,15 +6,17 @@ from identification.effects._base import Effect, Param, R, Rs
 
 
 def value(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
-    """a sin(2 pi y/period) + b cos(2 pi y/period)."""
+    """a sin(2 pi y/period) + b cos(2 pi y/period), and the same at half the period."""
     turn = 2.0 * math.pi * y / p[2]
-    return p[0] * math.sin(turn) + p[1] * math.cos(turn)
+    twice = p[3] * math.sin(2.0 * turn) + p[4] * math.cos(2.0 * turn)
+    return p[0] * math.sin(turn) + p[1] * math.cos(turn) + twice
 
 
 EFFECT = Effect(
     key="cogging",
     meaning="a force that repeats along the stroke (magnets, gear teeth)",
-    equation="a*sin(2*pi*y/period) + b*cos(2*pi*y/period)",
+    equation="a*sin(2*pi*y/period) + b*cos(2*pi*y/period)"
+    " + a_2*sin(4*pi*y/period) + b_2*cos(4*pi*y/period)",
     source="Otten, de Vries, van Amerongen, Rankers, Gaal, IEEE/ASME Transactions on Mechatronics 2"
     " (1997) 179",
     acts="force",
@@ -22,6 +24,8 @@ EFFECT = Effect(
         Param("a", "N", -1e6, 1e6, 2.0, "size of the sine", True),
         Param("b", "N", -1e6, 1e6, 2.0, "size of the cosine", True, 0.0),
         Param("period", "m", 1e-5, 1e2, 0.02, "length over which it repeats"),
+        Param("a_2", "N", -1e6, 1e6, 0.5, "size of the sine at half the period", True, 0.0),
+        Param("b_2", "N", -1e6, 1e6, 0.5, "size of the cosine at half the period", True, 0.0),
     ),
     value=value,
     depends_on=("y",),

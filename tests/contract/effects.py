@@ -123,7 +123,7 @@ def check_linear(effect: Effect) -> None:
             plain(effect, "value", Draw(one.x, one.s, p, one.dt))
             for p in (first, second, middle, nought)
         )
-        size = 1e-9 * (abs(a) + abs(b) + abs(none))
+        size = 1e-9 * (abs(a) + abs(b) + abs(none)) + 1e-300  # a number may lose its digits
         assert abs(share * a + (1.0 - share) * b - c) <= size
         if effect.acts != "sensor":  # its value is the position, with nothing added
             assert none == 0.0

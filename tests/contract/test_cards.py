@@ -79,7 +79,7 @@ def test_demo_has_an_effect_and_speeds_that_show_it() -> None:
     recipe = CARDS["demo"].recipe
     assert recipe is not None
     (stribeck,) = recipe.plant.effects
-    assert stribeck.values == {"F_s": 3.5, "v_s": 0.05, "asymmetry": 0.0}
+    assert stribeck.values == {"F_s": 3.5, "v_s": 0.05, "asymmetry": 0.0, "delta": 2.0}
     p = recipe.plant.friction
     assert stribeck.values["v_s"] > 4 * max(p.dv_p, -p.dv_n)
     v = np.abs(differentiate(record("demo", recipe)["y"], recipe.h).v)

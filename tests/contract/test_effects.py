@@ -60,7 +60,7 @@ def test_sliding_friction_can_be_unequal(effect: Effect) -> None:
 
 def swapped(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
     """Stribeck with its parameters in the wrong order."""
-    return p[1] * (1.0 + p[2] * d) * math.exp(-((v / p[0]) ** 2))
+    return p[1] * (1.0 + p[2] * d) * math.exp(-((abs(v) / p[0]) ** p[3]))
 
 
 def lopsided(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
@@ -70,7 +70,7 @@ def lopsided(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs)
 
 def symmetric(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
     """Stribeck that forgets the asymmetry."""
-    return p[0] * math.exp(-((v / p[1]) ** 2))
+    return p[0] * math.exp(-((abs(v) / p[1]) ** p[3]))
 
 
 @pytest.mark.parametrize(

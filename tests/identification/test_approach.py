@@ -107,7 +107,7 @@ def test_an_asymmetry_of_zero_stays() -> None:
 
 
 def test_bounds_hold_every_value() -> None:
-    own = plant({"stribeck": {"F_s": 2.0, "v_s": 0.05, "asymmetry": 0.3}})
+    own = plant({"stribeck": {"F_s": 2.0, "v_s": 0.05, "asymmetry": 0.3, "delta": 1.5}})
     names = names_of(own, "command")
     for around in (FAR, CLOSE):
         low, high = limits(own, names, 0.005, around)
@@ -151,3 +151,13 @@ def test_a_search_that_ends_where_another_did_is_the_last(monkeypatch: pytest.Mo
     rng = np.random.default_rng(0)
     found = closest([plant()] * 4, [one], "command", rng, 0)
     assert found.misfit > 5.0 and len(begun) == 2
+
+
+def test_a_shape_at_its_default_is_not_searched() -> None:
+    for delta, searched in ((2.0, False), (1.5, True)):
+        own = plant({"stribeck": {"F_s": 3.0, "v_s": 0.05, "delta": delta}})
+        names = names_of(own, "command")
+        low, high = limits(own, names, 0.0, FAR)
+        at = names.index("stribeck.delta")
+        assert (low[at] < delta < high[at]) == searched
+        assert low[at] <= delta <= high[at]

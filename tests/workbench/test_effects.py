@@ -141,6 +141,7 @@ def test_the_truth_has_every_parameter_with_its_unit() -> None:
             "F_s": {"value": 4.0, "unit": "N", **bare},
             "v_s": {"value": 0.1, "unit": "m/s", **bare},
             "asymmetry": {"value": 0.0, "unit": "1", **bare},
+            "delta": {"value": 2.0, "unit": "1", **bare},
         }
     }
     turning = truth("x", with_effects(acting("spring")), motion="rotary")

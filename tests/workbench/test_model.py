@@ -67,7 +67,7 @@ def test_effects_come_back_and_are_simulated(tmp_path: Path) -> None:
     found = read_model(written(tmp_path, document))
     assert model_document(found) == document
     (one,) = found.simulated.effects
-    assert (one.key, one.p) == ("stribeck", (4.0, 0.03, 0.0))
+    assert (one.key, one.p) == ("stribeck", (4.0, 0.03, 0.0, 2.0))
 
 
 def test_effects_are_converted_when_read(tmp_path: Path, document: dict[str, Any]) -> None:
@@ -80,7 +80,9 @@ def test_effects_are_converted_when_read(tmp_path: Path, document: dict[str, Any
     }
     found = read_model(written(tmp_path, document))
     stribeck, viscous = found.simulated.effects
-    assert stribeck.values == pytest.approx({"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0})
+    assert stribeck.values == pytest.approx(
+        {"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0, "delta": 2.0}
+    )
     assert viscous.values["k"] == pytest.approx(2.0 * 1e3**1.5)
     assert found.effects["nonlinear_viscous"]["k"].unit == "N (s/m)**n"
     assert found.effects["stribeck"]["v_s"].sd == pytest.approx(1e-3)

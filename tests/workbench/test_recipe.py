@@ -104,7 +104,7 @@ def test_every_position_controller(tmp_path: Path, text: str, value: object) -> 
         (
             'stribeck = { F_s = "4 N", v_s = "30 mm/s" }',
             "stribeck",
-            {"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0},
+            {"F_s": 4.0, "v_s": 0.03, "asymmetry": 0.0, "delta": 2.0},
         ),
         ('input_delay = { tau = "12 ms" }', "input_delay", {"tau": 0.012}),
         (

@@ -30,7 +30,7 @@ ROWS = 400
 NINE = TABLES["paper_table1"]
 UNITS = ("kg", "N", "N", "N s/m", "N s/m", "m/s", "m/s", "N", "N")
 VALUES = {
-    "stribeck": {"F_s": 3.5, "v_s": 0.05, "asymmetry": 0.0},
+    "stribeck": {"F_s": 3.5, "v_s": 0.05, "asymmetry": 0.0, "delta": 2.0},
     "spring": {"k": 40.0, "k_3": 0.0},
     "valve_dead_zone": {"u_d": 0.2, "asymmetry": 0.0},
     "rising_stiction": {"F_r": 2.0, "tau": 3.0, "asymmetry": 0.0},

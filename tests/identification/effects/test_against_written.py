@@ -20,13 +20,21 @@ from tests.identification.plants import ACTUATOR, table
 H, SECONDS, SUB = 1e-3, 2.0, 100
 NINE: Karnopp = table(1)
 VALUES: Mapping[str, Mapping[str, float]] = {
-    "stribeck": {"F_s": 6.0, "v_s": 0.06, "asymmetry": 0.4},
+    "stribeck": {"F_s": 6.0, "v_s": 0.06, "asymmetry": 0.4, "delta": 1.4},
     "nonlinear_viscous": {"k": 400.0, "n": 2.0, "asymmetry": -0.3},
-    "position_dependent_friction": {"c1": 80.0, "a": 4.0, "b": 2.0, "period": 0.02},
+    "position_dependent_friction": {
+        "c1": 80.0,
+        "a": 4.0,
+        "b": 2.0,
+        "period": 0.02,
+        "at_rest_p": 1.5,
+        "at_rest_n": 0.5,
+    },
+    "tight_spot": {"size": 6.0, "y_0": 0.002, "width": 0.002, "at_rest_p": 1.5, "at_rest_n": 0.5},
     "load_dependent_friction": {"mu": 0.3, "asymmetry": 0.4},
-    "warmup": {"a": -0.4, "b": 100.0, "tau": 1.0, "asymmetry": 0.2},
+    "warmup": {"a": -0.4, "b": 100.0, "tau": 1.0, "asymmetry": 0.2, "at_rest_p": 0.5},
     "spring": {"k": 400.0},
-    "cogging": {"a": 8.0, "b": 4.0, "period": 0.01},
+    "cogging": {"a": 8.0, "b": 4.0, "period": 0.01, "a_2": 3.0, "b_2": -2.0},
     "end_cushion": {"k_p": 5e3, "k_n": 5e4, "y_p": 0.005, "y_n": -0.005},
     "leakage": {"leak": 5.0},
     "rising_stiction": {"F_r": 10.0, "tau": 0.1, "asymmetry": -0.3},
@@ -82,7 +90,8 @@ def test_it_is_the_written_equation(key: str) -> None:
     ("key", "wrong"),
     [
         ("spring", "k*y"),
-        ("stribeck", "F_s*exp(-(v/v_s)**2)"),
+        ("stribeck", "F_s*exp(-(Abs(v)/v_s)**delta)"),
+        ("cogging", "a*sin(2*pi*y/period) + b*cos(2*pi*y/period)"),
         ("load_dependent_friction", "mu*(1 + asymmetry*d)*F"),
         ("warmup", "(a*c + b*Abs(v))*(1 + asymmetry*d)"),
     ],
