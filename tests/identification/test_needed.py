@@ -9,7 +9,10 @@ from identification.choice import Choice, Step, choose, first_stage
 from identification.library import built_in
 from identification.log import Rig
 from identification.needed import (
+    DECISIVE,
+    WALKED,
     Setting,
+    enough,
     explained,
     fewest,
     followed,
@@ -157,3 +160,13 @@ def test_what_was_doubted_is_not_tried_again(found: tuple[Setting, Choice]) -> N
     assert kept is both and same is model
     less, _ = pruned(both, model, setting)
     assert less.steps == both.steps[:1]
+
+
+def test_without_effects_a_measured_force_is_contested_sooner(
+    found: tuple[Setting, Choice],
+) -> None:
+    setting, choice = found
+    forced = replace(setting, drive="force", plain=replace(setting.plain, misfit=2.0))
+    assert enough(forced, ()) == DECISIVE < WALKED == enough(forced, choice.steps)
+    astray = replace(forced, plain=replace(setting.plain, misfit=200.0))
+    assert enough(astray, ()) == DECISIVE < WALKED < enough(astray, choice.steps)

@@ -1,0 +1,53 @@
+"""An effect at its best: sizes at its own levels, shapes held at defaults, the shortest period."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import pytest
+
+from identification.candidates import Candidate, best_of
+from identification.choice import first_stage
+from identification.library import built_in
+from tests.identification.motor_logs import NINE, made, seen
+
+
+def best(key: str, effects: Mapping[str, Mapping[str, float]], n: int = 10_000) -> Candidate:
+    """The effect `key` at its best on the log of a motor with these effects."""
+    stage, base = first_stage([seen(made(3, effects, n=n))], by_command=False)
+    found = best_of(stage, built_in()[key], base)
+    assert found is not None
+    return found
+
+
+def test_a_change_in_time_is_even_where_the_directions_are_not() -> None:
+    uneven = replace(NINE, F_cn=0.6 * NINE.F_cn, F_sn=0.7 * NINE.F_sn)
+    effects = {"warmup": {"a": -0.3, "b": 0.0, "tau": 6.0}}
+    stage, base = first_stage([seen(made(3, effects, friction=uneven))], by_command=False)
+    found = best_of(stage, built_in()["warmup"], base)
+    assert found is not None
+    assert found.values["asymmetry"] == 0.0
+    assert found.values["a"] == pytest.approx(-0.3, rel=0.02)
+    assert found.values["tau"] == pytest.approx(6.0, rel=0.1)
+    assert found.outcomes["mechanical"].fit.theta[2] == pytest.approx(uneven.F_cn, rel=0.02)
+
+
+@pytest.mark.parametrize(("delta", "held"), [(2.0, True), (1.0, False)])
+def test_an_exponent_stays_unless_the_log_calls_for_another(delta: float, held: bool) -> None:
+    found = best("stribeck", {"stribeck": {"F_s": 6.0, "v_s": 0.06, "delta": delta}})
+    assert (found.values["delta"] == 2.0) == held
+    assert found.values["delta"] == pytest.approx(delta, rel=0.3)
+
+
+@pytest.mark.parametrize("harmonic", [0.0, 2.0])
+def test_a_period_is_the_shortest_that_will_do(harmonic: float) -> None:
+    found = best("cogging", {"cogging": {"a": 3.0, "period": 0.01, "a_2": harmonic}})
+    assert found.values["period"] == pytest.approx(0.01, rel=0.01)
+    assert found.values["a"] == pytest.approx(3.0, rel=0.05)
+    assert found.values["a_2"] == pytest.approx(harmonic, abs=0.15)
+
+
+def test_a_tight_spot_is_found_where_it_is() -> None:
+    values = {"size": 6.0, "y_0": 0.02, "width": 0.008}
+    found = best("tight_spot", {"tight_spot": values})
+    for name, value in values.items():
+        assert found.values[name] == pytest.approx(value, rel=0.05), name
