@@ -8,8 +8,9 @@ from identification.effects._base import Effect, Param, R, Rs
 def value(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) -> R:
     """a sin(2 pi y/period) + b cos(2 pi y/period), and the same at half the period."""
     turn = 2.0 * math.pi * y / p[2]
-    twice = p[3] * math.sin(2.0 * turn) + p[4] * math.cos(2.0 * turn)
-    return p[0] * math.sin(turn) + p[1] * math.cos(turn) + twice
+    sine, cosine = math.sin(turn), math.cos(turn)
+    twice = p[3] * 2.0 * sine * cosine + p[4] * (1.0 - 2.0 * sine * sine)
+    return p[0] * sine + p[1] * cosine + twice
 
 
 EFFECT = Effect(
