@@ -103,12 +103,11 @@ def judged_forward(
     choice: Choice, model: Model, setting: Setting, report: Report
 ) -> tuple[Choice, Model]:
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
+    free = loose(model.plant, setting.drive)
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
-    if model.led or (on_bristle(model.plant) and loose(model.plant, setting.drive)):
+    if model.led or (on_bristle(model.plant) and free):
         return choice, model
-    if model.misfit > enough(setting, choice.steps) and hidden(
-        choice, loose(model.plant, setting.drive)
-    ):
+    if model.misfit > enough(setting, choice.steps) and hidden(choice, free):
         found = contest(choice, model, setting, report)
         if found is not None:
             choice, model = found
@@ -287,7 +286,8 @@ def _whole(one: Contender, setting: Setting) -> Refit:
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
         found = again if again.misfit < found.misfit else found
     elif setting.drive == "force":  # whose noise leaves less than it may: go on to the minimum
-        again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="near")
+        prior = even(found.plant)
+        again = refit(found.plant, setting.logs, setting.drive, prior=prior, effort="near")
         found = again if again.misfit < found.misfit else found
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")

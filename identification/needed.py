@@ -54,10 +54,12 @@ class Setting:
 
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
-    """Misfit up to which a run is not contested: the effects that the equations call for are
-    beyond doubt in it too, or nothing is missing."""
-    least = DECISIVE if setting.drive == "command" or not steps else WALKED
-    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0) if steps else 0.0)
+    """Misfit up to which a run is not contested: nothing is missing, or the effects that the
+    equations call for are beyond doubt in it too."""
+    if not steps:
+        return DECISIVE
+    least = DECISIVE if setting.drive == "command" else WALKED
+    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
 
 
 def known(setting: Setting) -> bool:
