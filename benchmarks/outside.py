@@ -1,7 +1,7 @@
 """Logs of a program written apart from ours: does `workbench trace` name what was put in them?
 
     python benchmarks/outside.py [--first 100] [--seeds 1] [--machines pneumatic force motor]
-        [--effects spring stribeck] [--strange] [--varied] [--jobs 2]
+        [--effects spring stribeck] [--strange] [--laws] [--varied] [--jobs 2]
 
 A machine a seed is drawn around three rigs, in a plain position loop of its own, and simulated by
 Euler steps of 20 us that share no line with the package's kernels; what the effects do is written
@@ -9,9 +9,12 @@ here too, and not always as in the library (friction along the stroke and by tem
 stick limits, Stribeck's level adds to them). Each log is written as CSV with a card and traced by
 the command line. "Right" is the verdict that an engineer would want: the effect and nothing else,
 "none" for the plain machine. `--strange`: eight effects that no library has; right is "unknown",
-with a signal on which the effect depends. `--varied`: a clock, length, noise and encoder drawn for
+with a signal on which the effect depends. `--laws`: five known effects by another law than the
+library's (Tustin's exponential, a rational growth, a harmonic, a bell along the stroke, a straight
+line in time). `--varied`: a clock, length, noise and encoder drawn for
 each log, instead of 60 s at 500 Hz with little noise. Seeds below 100 served to find faults, as did
-102 with `--strange` and, for two small changes, 101; others judge. Exit status 0 in any case.
+102 with `--strange`, 104 with `--laws`, 103 and, for two small changes, 101; others judge. Exit
+status 0 in any case.
 """
 
 import argparse

@@ -135,3 +135,13 @@ def test_a_body_pressed_against_a_stop_tells_no_stick_limit() -> None:
     assert _limit(10.0, 500.0) == 30.0
     assert _limit(10.0, 20.0) == 20.0
     assert _limit(10.0, 0.0) == 12.0
+
+
+def test_either_stick_limit_has_its_own_share_of_friction_along_the_stroke() -> None:
+    values = {"c1": 100.0, "period": 0.05, "at_rest_p": 1.33, "at_rest_n": 0.5}
+    effects = {"position_dependent_friction": values}
+    found = traced(made(3, effects, n=15_000), made(4, effects))
+    assert [e.effect.key for e in found.effects] == ["position_dependent_friction"]
+    params = found.effects[0].params
+    for name in ("c1", "at_rest_p", "at_rest_n"):
+        assert params[name].value == pytest.approx(values[name], rel=0.1), name
