@@ -61,7 +61,7 @@ from identification.result import Drive
 from identification.stage import Stage
 from identification.starts import SECONDS, freed, left, starts
 from identification.structure import MUCH, Model
-from identification.trials import Trial, seen_in_run, structures
+from identification.trials import Trial, driven_only, seen_in_run, structures
 
 HALF = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
@@ -175,10 +175,17 @@ def contest(
     bound = decisive(model.misfit, rivals)
     if winner.effect.acts == "bristle" and loose(done.plant, setting.drive):
         bound = 1.0 + OF_STEPS * (bound - 1.0)
-    if done.misfit > bound:
+    if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
         return None
     found = _taken(winner, done, rivals, setting, model.misfit)
     return found if found[0].steps[-1].p_value <= LEVEL else None
+
+
+def scales_alone(effect: Effect, plant: Plant, logs: Sequence[Moving]) -> bool:
+    """Whether an effect of the plant is friction by load, alike in both directions, where nothing
+    brakes: it but scales the other parameters there, and a better run was found by luck."""
+    values = next(acting.values for acting in plant.effects if acting.key == effect.key)
+    return by_load(effect) and values.get("asymmetry", 0.0) == 0.0 and driven_only(logs)
 
 
 def decisive(before: float, others: Sequence[Contender]) -> float:

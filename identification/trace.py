@@ -66,10 +66,10 @@ from identification.trace_result import (
     Dependence,
     Trace,
 )
+from identification.trials import driven_only
 
 Progress = Callable[[str, float], None]
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
-BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
@@ -223,14 +223,6 @@ def searched(
     if found.misfit >= model.misfit:
         return model
     return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
-
-
-def driven_only(logs: Sequence[Moving]) -> bool:
-    """Whether the force points along the motion in all sliding but a trace of it."""
-    against = [
-        (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
-    ]
-    return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
 def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:

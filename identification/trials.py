@@ -26,6 +26,7 @@ MOST_TRIED = 40  # starts of one effect
 LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
 GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
 REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
+BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
 IN_RUN = ("sensor", "command", "delay", "bristle", "stiction")  # seen in the run above all
 
 
@@ -109,6 +110,14 @@ def grown(one: Candidate, base: Plant, start: Stage) -> tuple[Plant, list[dict[s
 def rigid(first: Mapping[str, Outcome]) -> bool:
     """Whether the body is seen at rest and does not move there: on bristles it would."""
     return REST in first and spread(first[REST]) < STILL
+
+
+def driven_only(logs: Sequence[Moving]) -> bool:
+    """Whether the force points along the motion in all sliding but a trace of it."""
+    against = [
+        (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
+    ]
+    return bool(np.mean(np.concatenate(against)) < BRAKES)
 
 
 def seen_in_run(effect: Effect) -> bool:

@@ -18,8 +18,9 @@ from identification.refit import COMPLETE, Refit, misfit, refit
 from identification.stage import HOPELESS, joined
 from identification.starts import starts, walks
 from identification.structure import _limit, model_of
-from identification.trace import driven_only, trace
+from identification.trace import trace
 from identification.trace_result import Trace
+from identification.trials import driven_only
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
 RIG = Rig("motor", force_per_command=K_A)
