@@ -90,6 +90,8 @@ def changes(
                 continue
             at = [*free, i]
             step = np.linalg.lstsq(gram[np.ix_(at, at)], slope[at], rcond=1e-8)[0]
+            if np.any(theta[at] + step < np.minimum(theta[at], 0.0)):
+                continue  # none of them is ever negative: something else has changed
             options.append((float(r @ r - step @ slope[at]), i, step))
         if not options:
             break

@@ -82,7 +82,7 @@ def _curves(found: Trace, after: Karnopp, speeds: list[Acting]) -> list[Curve]:
         return [(before, [], REFERENCE, "before"), (after, speeds, MODEL, "after")]
     if not _drifted(found):
         return [(after, speeds, MODEL, "model")]
-    changed = {change.name: change.after for change in found.drift if change.name in NAMES}
+    changed = {one.name: max(one.after, 0.0) for one in found.drift if one.name in NAMES}
     return [
         (after, [], REFERENCE, "on the training logs"),
         (replace(after, **changed), [], MODEL, "on the test logs"),

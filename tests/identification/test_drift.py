@@ -1,0 +1,39 @@
+"""What changed between training and test logs: the fewest parameters, and none that cannot be."""
+
+import numpy as np
+
+from identification.choice import first_stage
+from identification.drift import changes
+from identification.evidence import FIVE, MECHANICAL, Rows
+from identification.outcome import Outcome
+from tests.identification.motor_logs import made, seen
+
+
+def trained() -> tuple[Outcome, Rows]:
+    """What a motor's log leaves, and the rows of another log of it."""
+    _, first = first_stage([seen(made(3))], by_command=False)
+    stage, _ = first_stage([seen(made(4))], by_command=False)
+    (rows,) = stage.parts[MECHANICAL]
+    return first[MECHANICAL], rows
+
+
+def found(mine: Outcome, rows: Rows, more: float) -> list[tuple[str, float, float, float]]:
+    """The changes, where the friction towards + is higher by so much [N]."""
+    keep = rows.speed >= mine.slowest
+    shifted = Rows(**{**vars(rows), "b": rows.b + more * (rows.X[:, 1] != 0)})
+    return changes(mine, shifted, keep, FIVE, np.zeros(5))
+
+
+def test_the_parameter_that_changed_is_named_alone() -> None:
+    mine, rows = trained()
+    assert found(mine, rows, 0.0) == []
+    ((name, before, after, sd),) = found(mine, rows, 3.0)
+    assert name == "F_cp"
+    assert abs(after - before - 3.0) < 5.0 * sd < 0.5
+
+
+def test_no_parameter_becomes_negative() -> None:
+    mine, rows = trained()
+    changed = found(mine, rows, -40.0)
+    assert all(after >= 0.0 for _, _, after, _ in changed)
+    assert "F_cp" not in [name for name, *_ in changed]
