@@ -11,10 +11,9 @@ the command line. "Right" is the verdict that an engineer would want: the effect
 "none" for the plain machine. `--strange`: eight effects that no library has; right is "unknown",
 with a signal on which the effect depends. `--laws`: five known effects by another law than the
 library's (Tustin's exponential, a rational growth, a harmonic, a bell along the stroke, a straight
-line in time). `--varied`: a clock, length, noise and encoder drawn for
-each log, instead of 60 s at 500 Hz with little noise. Seeds below 100 served to find faults, as did
-102 with `--strange`, 104 with `--laws`, 103 and, for two small changes, 101; others judge. Exit
-status 0 in any case.
+line in time). `--varied`: a clock, length, noise and encoder drawn for each log, instead of 60 s at
+500 Hz with little noise. Seeds below 100 served to find faults, as did 102 with `--strange`, 104
+with `--laws`, 103 and, for two small changes, 101; others judge. Exit status 0 in any case.
 """
 
 import argparse
@@ -70,8 +69,9 @@ def main() -> int:
     parser.add_argument("--machines", nargs="+", choices=RIGS, default=list(RIGS))
     parser.add_argument("--effects", nargs="+", choices=[*EFFECTS, *STRANGE, *LAWS],
                         default=list(EFFECTS))  # fmt: skip
-    parser.add_argument("--strange", action="store_true", help="effects that no library has")
-    parser.add_argument("--laws", action="store_true", help="known effects by other laws")
+    other = parser.add_mutually_exclusive_group()
+    other.add_argument("--strange", action="store_true", help="effects that no library has")
+    other.add_argument("--laws", action="store_true", help="known effects by other laws")
     parser.add_argument("--varied", action="store_true", help="a recording of its own for each")
     parser.add_argument("--jobs", type=int, default=2)
     given = parser.parse_args()

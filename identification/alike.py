@@ -5,9 +5,8 @@ from dataclasses import replace
 
 from identification.candidates import Candidate
 from identification.choice import SHARE, Choice, Step, merit, share
-from identification.needed import Setting, fitted, only
+from identification.needed import Setting, fitted, only, windows
 from identification.refit import COMPLETE
-from identification.starts import starts
 from identification.structure import Model
 
 ALIKE = 10.0  # gain by which two effects that explain equally may differ
@@ -32,13 +31,12 @@ def told_apart(choice: Choice, after: Model, setting: Setting) -> Choice:
     """
     if after.led or after.misfit > COMPLETE:
         return choice
-    count = sum(len(starts(one, setting.drive).at) for one in setting.logs)
 
     def short(step: Step) -> Iterator[str]:
         for rival in alike(step):
             stay = tuple(replace(x, candidate=rival) if x is step else x for x in choice.steps)
             run = fitted(only(choice, stay), setting)
-            lost = count * (run.misfit - after.misfit)  # every window counted as one sample
+            lost = windows(setting) * (run.misfit - after.misfit)  # each counted as one sample
             if not run.led and run.misfit > COMPLETE and lost > ALIKE:
                 yield rival.effect.key
 

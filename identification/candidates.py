@@ -82,7 +82,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
         return total if fair else OUTSIDE
 
     best = min(starts, key=score)
-    defaults = {p.name: p.default for p in free if p.default is not None}
+    defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
     best = shaped(free, bounds, best, score)
     half = best | {p.name: 0.5 * best[p.name] for p in free if p.name == "period"}
     if half != best and score(half) < score(best) + CALLED:
@@ -91,7 +91,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     for i in range(ROUNDS if needs_rounds(effect) else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
-        if free and i == 0:  # the plain friction's levels had bent its shape
+        if i == 0:  # the plain friction's levels had bent its shape
             best = shaped(free, bounds, best | defaults, score)
         total, found = trial(own, effect, best, told_in)
     values = with_sizes(effect, best, found)
@@ -105,12 +105,11 @@ def shaped(
     free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
     score: Callable[[Values], float],
 ) -> dict[str, float]:  # fmt: skip
-    """Shape parameters at their best; those with a default stay there unless that gains enough."""
+    """Shape parameters at their best; optional ones stay where they are unless it gains enough."""
     best = dict(shape)
-    told = [i for i, p in enumerate(free) if p.default is None]
+    told = [i for i, p in enumerate(free) if not p.optional]
     if told:
-        own = refined([free[i] for i in told], [bounds[i] for i in told], best, score)
-        best |= own
+        best = refined([free[i] for i in told], [bounds[i] for i in told], best, score)
     if len(told) < len(free):
         other = refined(free, bounds, best, score)
         if score(other) < score(best) - CALLED * (len(free) - len(told)):

@@ -41,6 +41,7 @@ from identification.needed import (
     known,
     pruned,
     refined,
+    windows,
     with_steps,
 )
 from identification.outcome import Outcome, spread
@@ -311,7 +312,7 @@ def _taken(
     """The choice with the winner as its last step, and the model."""
     stage, base = with_steps(winner.steps, setting.start, setting.first)
     values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
-    count = sum(len(starts(one, setting.drive).at) for one in setting.logs)
+    count = windows(setting)
     scaled = [_as_candidate(one, stage, base, count * (before - one.misfit)) for one in rivals]
     mine = _as_candidate(
         replace(winner, plant=done.plant), stage, base, count * (before - done.misfit)

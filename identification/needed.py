@@ -24,6 +24,7 @@ from identification.plant import Plant
 from identification.refit import COMPLETE, Refit, even, loose, refit
 from identification.result import Drive
 from identification.stage import Stage
+from identification.starts import starts
 from identification.structure import MUCH, Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
@@ -60,6 +61,11 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
         return DECISIVE
     least = DECISIVE if setting.drive == "command" else WALKED
     return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
+
+
+def windows(setting: Setting) -> int:
+    """Number of the windows of the free run over all logs."""
+    return sum(len(starts(one, setting.drive).at) for one in setting.logs)
 
 
 def known(setting: Setting) -> bool:

@@ -41,8 +41,8 @@ Kernel = Callable[..., float]
 R = float
 Rs = Sequence[float]
 MAX_PARAMS = 8
-AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
 MAX_SIGNALS = 4
+AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
 
 
 @dataclass(frozen=True)
@@ -61,11 +61,15 @@ class Param:
     linear: bool = False
     default: float | None = None
 
+    @property
+    def optional(self) -> bool:
+        """Whether it is part of a law's shape that stays at its default unless the logs call for
+        another value."""
+        return self.default is not None and not self.linear and self.name not in AT_REST
+
     def held(self, value: float) -> bool:
-        """Whether it is part of a law's shape and at its default: there it stays unless the logs
-        call for another value."""
-        own = self.default is not None and not self.linear and self.name not in AT_REST
-        return own and value == self.default
+        """Whether it is such a part, and at its default."""
+        return self.optional and value == self.default
 
 
 @dataclass(frozen=True)

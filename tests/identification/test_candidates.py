@@ -7,13 +7,16 @@ import pytest
 
 from identification.candidates import Candidate, best_of
 from identification.choice import first_stage
+from identification.karnopp import Karnopp
 from identification.library import built_in
 from tests.identification.motor_logs import NINE, made, seen
 
 
-def best(key: str, effects: Mapping[str, Mapping[str, float]], n: int = 10_000) -> Candidate:
+def best(
+    key: str, effects: Mapping[str, Mapping[str, float]], friction: Karnopp = NINE
+) -> Candidate:
     """The effect `key` at its best on the log of a motor with these effects."""
-    stage, base = first_stage([seen(made(3, effects, n=n))], by_command=False)
+    stage, base = first_stage([seen(made(3, effects, friction=friction))], by_command=False)
     found = best_of(stage, built_in()[key], base)
     assert found is not None
     return found
@@ -21,10 +24,7 @@ def best(key: str, effects: Mapping[str, Mapping[str, float]], n: int = 10_000) 
 
 def test_a_change_in_time_is_even_where_the_directions_are_not() -> None:
     uneven = replace(NINE, F_cn=0.6 * NINE.F_cn, F_sn=0.7 * NINE.F_sn)
-    effects = {"warmup": {"a": -0.3, "b": 0.0, "tau": 6.0}}
-    stage, base = first_stage([seen(made(3, effects, friction=uneven))], by_command=False)
-    found = best_of(stage, built_in()["warmup"], base)
-    assert found is not None
+    found = best("warmup", {"warmup": {"a": -0.3, "b": 0.0, "tau": 6.0}}, uneven)
     assert found.values["asymmetry"] == 0.0
     assert found.values["a"] == pytest.approx(-0.3, rel=0.02)
     assert found.values["tau"] == pytest.approx(6.0, rel=0.1)
@@ -51,3 +51,10 @@ def test_a_tight_spot_is_found_where_it_is() -> None:
     found = best("tight_spot", {"tight_spot": values})
     for name, value in values.items():
         assert found.values[name] == pytest.approx(value, rel=0.05), name
+
+
+def test_what_a_sensor_adds_is_refined_though_a_recipe_may_leave_it_out() -> None:
+    optional = {p.name for e in built_in().values() for p in e.params if p.optional}
+    assert optional == {"asymmetry", "delta"}
+    found = best("sensor_nonlinearity", {"sensor_nonlinearity": {"a": 0.0, "b": 9.0}})
+    assert found.values["b"] == pytest.approx(9.0, rel=0.15)
