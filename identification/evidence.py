@@ -9,10 +9,12 @@ Each row is divided by what the sensors' noise makes of it, so a complete model 
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
+from identification.between import kinks
 from identification.differentiate import differentiate, resolution
 from identification.karnopp import Karnopp
 from identification.log import Log
@@ -62,6 +64,16 @@ class Moving:
     held: bool
     v_noise: float
     reference: Karnopp | None = None
+
+    @cached_property
+    def kinks(self) -> Array:
+        """By how much the measured force lies beyond the lines through its samples [N], (n,)."""
+        return kinks(np.asarray(self.log["F"]), self.noise_F)
+
+    @cached_property
+    def driving(self) -> Log:
+        """The log with the force that drives a run, between its samples too."""
+        return self.log.with_signals(F=self.log["F"] + self.kinks)
 
 
 @dataclass(frozen=True, eq=False)

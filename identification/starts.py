@@ -104,7 +104,7 @@ def window_run(
 
     shift: (3, k) on y, v, F; log: driven by this one in place of its own.
     """
-    driven = one.log if log is None else log
+    driven = driven_by(one, drive) if log is None else log
     more = np.zeros((3, len(begun.at))) if shift is None else shift
     y, v, F = begun.y + more[0], begun.v + more[1], begun.F + more[2]
 
@@ -133,6 +133,11 @@ def window_run(
         return run
     except BadModel:
         return None
+
+
+def driven_by(one: Moving, drive: Drive) -> Log:
+    """The log that drives a run: with the measured force between its samples where that does."""
+    return one.driving if drive == "force" else one.log
 
 
 def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
@@ -285,12 +290,14 @@ def walks(one: Moving, drive: Drive) -> bool:
 def _walk(plant: Plant, one: Moving, drive: Drive, begun: Starts, base: FreeRun) -> Array:
     """Variance (n,) of a run by the force's noise, in units of the position's."""
     square = np.zeros(len(one.log))
+    own = driven_by(one, drive)
+    sd = np.hypot(one.noise_F, one.kinks) if drive == "force" else one.noise_F
     for seed in range(WALKS):
-        noise = one.noise_F * np.random.default_rng(seed).standard_normal(len(one.log))
-        more = {"F": one.log["F"] + noise}
+        noise = sd * np.random.default_rng(seed).standard_normal(len(one.log))
+        more = {"F": own["F"] + noise}
         if isinstance(plant.actuator, Motor):
-            more["u"] = one.log["u"] + noise / plant.actuator.k_a
-        run = window_run(plant, one, drive, begun, log=one.log.with_signals(**more))
+            more["u"] = own["u"] + noise / plant.actuator.k_a
+        run = window_run(plant, one, drive, begun, log=own.with_signals(**more))
         if run is not None:
             square += ((run.shown - base.shown) / one.noise_y) ** 2 / WALKS
     return square
