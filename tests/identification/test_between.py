@@ -57,7 +57,9 @@ def pneumatic(seed: int) -> Log:
         size, length = rng.uniform(0.01, 0.1), round(rng.uniform(0.3, 0.9) / fine)
         u += [way * size] * length
         way = -way
-    blank = Log("slow", {"t": fine * np.arange(n), "u": np.array(u[:n]), "y": np.zeros(n)})
+    blank = Log(
+        "slow", {"t": fine * np.arange(n, dtype=np.float64), "u": np.array(u[:n]), "y": np.zeros(n)}
+    )
     run = free_run(Plant(NINE, Actuator(1.8e4, 1.8e4)), blank, (0.0, 0.0, 0.0), "command")
     t = fine * every * np.arange(count, dtype=np.float64)
     y = run.y[::every] + 1e-5 * rng.standard_normal(count)
