@@ -7,7 +7,7 @@ from identification.arrays import Array
 # A kink at tau in [0, 1] of a sample lies tau (1 - tau) of the change of slope beyond the line; a
 # part of the second differences raises the line there by tau^2 + (1 - tau)^2 of it. Means over tau:
 BEYOND = (1.0 / 6.0) / (2.0 / 3.0)
-SHARP = 1.5  # deviations by noise, from which a second difference is a change of slope
+SHARP = 2.0  # deviations by noise, from which a second difference is a change of slope
 
 
 def kinks(F: Array, noise: float) -> Array:
