@@ -8,15 +8,16 @@ Kostuk, SIAM Journal on Applied Dynamical Systems 8 (2009) 1341), so what is lef
 with the parameters. It is searched in a wide range first, then without leading in a narrow one.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.effects._base import MAX_SIGNALS, Acting, Param
-from identification.equations import by_load
+from identification.equations import by_load, in_columns
 from identification.evidence import FIVE, SURE, Moving, shortened
 from identification.karnopp import Karnopp
 from identification.plant import Motor, Plant
@@ -56,7 +57,7 @@ NARROWER = 0.3  # of that spread, for mass and sliding friction
 class Range:
     """How far around a plant is searched: shares of mass and sliding friction and of the stick
     limits, factors on the band and on effects; open: from no more than the regression tells;
-    uneven: around an asymmetry that is 0."""
+    uneven: around an asymmetry that is 0; known: by name, how far at most, where that is less."""
 
     five: float
     stick: float
@@ -64,6 +65,7 @@ class Range:
     effect: float
     open: bool
     uneven: float = 0.0
+    known: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
 FAR = Range(0.03, 0.0, 2.5, 4.0, True)
@@ -115,12 +117,14 @@ def nearer(plants: Sequence[Plant], logs: Sequence[Moving], drive: Drive) -> Pla
 def closest(
     begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, told: bool = False,
+    known: Mapping[str, float] = MappingProxyType({}),
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
     begins: plants to begin from in turn, as long as more is left than should be; searches: on the
     whole at most, none where no search will do; told: the first has everything but its band from
-    the equations, so it is searched close by before.
+    the equations, so it is searched close by before; known: by name, how far the equations leave
+    a parameter open.
     """
     short = [shortened(one, SHORT) for one in logs]
     best: Refit | None = None
@@ -129,9 +133,10 @@ def closest(
             banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
             near = approach(banded, short, drive, rng, ((0.0, TOLD), (0.0, CLOSE)))
         else:
-            near = approach(plant, short, drive, rng)
+            stages = ((1.0, replace(FAR, known=known)), (0.0, replace(CLOSE, known=known)))
+            near = approach(plant, short, drive, rng, stages)
         begun = refit(near, short, drive, prior=even(near), effort="quick")
-        found = _on_whole(begun, logs, drive, rng, searches)
+        found = _on_whole(begun, logs, drive, rng, searches, replace(CLOSE, known=known))
         twice = best is not None and best.misfit < AGREED * found.misfit < AGREED**2 * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
         if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice:
@@ -141,16 +146,17 @@ def closest(
 
 
 def _on_whole(
-    begun: Refit, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, searches: int
-) -> Refit:
+    begun: Refit, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, searches: int,
+    around: Range,
+) -> Refit:  # fmt: skip
     """What was found on short logs, refined on the whole; searched closer where it falls short."""
     plant = begun.plant
     if searches > 0 and begun.misfit > (NEARLY if plant.effects else COMPLETE):
-        return closer(plant, logs, drive, rng, searches)
+        return closer(plant, logs, drive, rng, searches, around)
     found = refit(plant, logs, drive, prior=even(plant), effort="near")
     if searches == 0 or found.misfit <= (NEARLY if on_bristle(plant) else COMPLETE):
         return found
-    again = closer(plant, logs, drive, rng, searches)
+    again = closer(plant, logs, drive, rng, searches, around)
     return again if again.misfit < found.misfit else found
 
 
@@ -279,6 +285,7 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
     stops = bool(plant.effects) and all(a.effect.acts == "stiction" for a in plant.effects)
     five = min(around.five, KNOWN) if stops else around.five
     params = {f"{a.key}.{one.name}": one for a in plant.effects for one in a.effect.params}
+    columns = [f"{a.key}.{one}" for a in plant.effects if in_columns(a.effect) for one in a.values]
     low, high = [], []
     for name, value in zip(names, values_of(plant, names).tolist(), strict=True):
         size = abs(value)
@@ -290,13 +297,16 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
             coulomb = p.F_cp if name == "F_sp" else p.F_cn
             most = min(max(STICK[1], BEYOND * size / coulomb), STICK[2])
             ends = [np.sign(value) * STICK[0] * coulomb, np.sign(value) * most * coulomb]
+        elif name in columns and params[name].spare and value == 0.0:
+            ends = [0.0, 0.0]  # sliding calls for none
         elif name in params:
             ends = _of_effect(params[name], value, around)
         else:
-            off = around.stick if name in ("F_sp", "F_sn") else five
-            ends = [value - off * size, value + off * size]
-        low.append(ends[0])
-        high.append(ends[1])
+            part = around.stick if name in ("F_sp", "F_sn") else five
+            ends = [value - part * size, value + part * size]
+        off = around.known.get(name, np.inf)
+        low.append(max(ends[0], value - off))
+        high.append(min(ends[1], value + off))
     return np.array(low), np.array(high)
 
 

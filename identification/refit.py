@@ -93,6 +93,15 @@ def values_of(plant: Plant, names: Sequence[str]) -> Array:
     return np.array([every[name] for name in names])
 
 
+def units_in(plant: Plant, names: Sequence[str], x: Array) -> Array:
+    """Sizes (k,) in whose parts the values x (k,) are changed; of a value of 0 the typical one."""
+    typical = {f"{a.key}.{p.name}": p.typical for a in plant.effects for p in a.effect.params}
+    of_none = np.array([abs(typical.get(name, 1.0)) or 1.0 for name in names])
+    unit = np.where(x != 0.0, np.abs(x), of_none)
+    unit[[name.endswith("asymmetry") for name in names]] = 1.0
+    return np.asarray(unit)
+
+
 def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
     """The plant with these values, put at their bounds where they lie outside."""
     every = dict(zip(names, x.tolist(), strict=True))
@@ -213,8 +222,7 @@ def refit(
     evaluations = FEW if quick else STEPS
     names = names_of(plant, drive)
     x0 = values_of(plant, names)
-    unit = np.where(x0 != 0, np.abs(x0), 1.0)
-    unit[[name.endswith("asymmetry") for name in names]] = 1.0
+    unit = units_in(plant, names, x0)
     trust = np.array([prior.get(name, np.inf) for name in names])
     tied = np.flatnonzero(np.isfinite(trust) & (trust > 0))
     # A shape at its bound, or an effect's default, has no say.

@@ -10,7 +10,7 @@ from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step, rough
 from identification.effects._base import AT_REST, Effect
-from identification.equations import by_load
+from identification.equations import by_load, in_columns
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
 from identification.log import Rig
@@ -26,6 +26,8 @@ INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
+SURELY = 4.0  # deviations within which a search keeps what the equations tell
+SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
@@ -77,17 +79,20 @@ def model_of(
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
-    acting, silent = [], dict[str, float]()
+    acting, sized, silent = [], list[str](), dict[str, float]()
     for step in steps:
         effect = step.candidate.effect
         values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
         spreads = effect_sd(effect, values, outcomes)
+        none = slight(effect, values, spreads)
         for p in effect.params:  # a signal that is not there tells nothing of its parameter
             if p.name in AT_REST:  # nor do the equations tell a stick limit
                 silent[f"{effect.key}.{p.name}"] = np.inf
                 spreads.pop(p.name)
-            elif untold(spreads.get(p.name), values[p.name], p.typical):
+            elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
+        if in_columns(effect):
+            sized += [f"{effect.key}.{k}" for k in effect.linear if spreads.get(k, 0.0) > 0.0]
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
@@ -114,7 +119,10 @@ def model_of(
         if missing:  # it will not do, however closely it is searched
             begins = begins[:1]
         told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
-        other = closest(begins, logs, drive, rng, 0 if missing else SEARCHES, told)
+        slides = bool(acting) and not missing
+        slides &= all(in_columns(a.effect) and a.effect.acts != "stiction" for a in acting)
+        known = {k: SURELY * prior[k] for k in (*FIVE, *sized)} if slides else {}
+        other = closest(begins, logs, drive, rng, 0 if missing else SEARCHES, told, known)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
@@ -144,6 +152,18 @@ def led(o: Outcome) -> bool:
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
     return inertia < INERT * left
+
+
+def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:
+    """Names of sizes that are no more than chance makes of none, where another one is more.
+
+    A search would follow them to wherever they happen to help.
+    """
+    if not in_columns(effect):
+        return set()
+    small = {name for name in effect.linear if abs(values[name]) < SLIGHT * sd.get(name, 0.0)}
+    spare = {p.name for p in effect.params if p.spare}
+    return small & spare if small < set(effect.linear) else set()
 
 
 def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:

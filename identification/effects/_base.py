@@ -67,6 +67,11 @@ class Param:
         another value."""
         return self.default is not None and not self.linear and self.name not in AT_REST
 
+    @property
+    def spare(self) -> bool:
+        """Whether it is a size that an effect may do without."""
+        return self.linear and self.default == 0.0
+
     def held(self, value: float) -> bool:
         """Whether it is such a part, and at its default."""
         return self.optional and value == self.default

@@ -161,3 +161,30 @@ def test_a_shape_at_its_default_is_not_searched() -> None:
         at = names.index("stribeck.delta")
         assert (low[at] < delta < high[at]) == searched
         assert low[at] <= delta <= high[at]
+
+
+def test_what_the_equations_tell_is_searched_no_wider() -> None:
+    key = "position_dependent_friction"
+    one = plant({key: {"c1": 40.0, "period": 0.05}})
+    names = names_of(one, "command")
+    known = {"F_cp": 0.01, f"{key}.c1": 0.5}
+    value = values_of(one, names)
+    for around in (FAR, CLOSE):
+        low, high = limits(one, names, 1e-4, around)
+        less, more = limits(one, names, 1e-4, replace(around, known=known))
+        for i, name in enumerate(names):
+            if name in known:
+                assert less[i] == pytest.approx(value[i] - known[name])
+                assert more[i] == pytest.approx(value[i] + known[name])
+            else:
+                assert (less[i], more[i]) == (low[i], high[i])
+
+
+def test_a_size_that_sliding_does_not_call_for_stays_at_none() -> None:
+    key = "position_dependent_friction"
+    one = plant({key: {"c1": 40.0, "period": 0.05}})
+    names = names_of(one, "command")
+    low, high = limits(one, names, 1e-4, FAR)
+    closed = {name for name, a, b in zip(names, low, high, strict=True) if a == b == 0.0}
+    assert {f"{key}.{size}" for size in ("c2", "a", "b")} <= closed
+    assert f"{key}.c1" not in closed

@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.karnopp import Karnopp
 from identification.minimum import gauss_newton
 from identification.plant import Plant
-from identification.refit import mean_loss, plant_with, refit
+from identification.refit import mean_loss, names_of, plant_with, refit, units_in, values_of
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
@@ -83,3 +83,14 @@ def test_breakaways_lost_by_luck_do_not_count() -> None:
     assert mean_loss(r, window, few) > 5.0
     r[window >= 15] += 100.0
     assert mean_loss(r, window) > 5.0
+
+
+def test_a_size_of_none_is_changed_by_parts_of_a_typical_one() -> None:
+    key = "pressure_dependent_friction"
+    one = plant({key: {"mu_p": 3e-5, "mu_n": 0.0, "asymmetry": -0.1}})
+    names = names_of(one, "command")
+    units = dict(zip(names, units_in(one, names, values_of(one, names)).tolist(), strict=True))
+    assert units["F_sn"] == 14.0
+    assert units[f"{key}.mu_p"] == 3e-5
+    assert units[f"{key}.mu_n"] == 2e-5
+    assert units[f"{key}.asymmetry"] == 1.0
