@@ -9,7 +9,7 @@ from identification.approach import SEARCHES, STICK, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step, rough
-from identification.effects._base import AT_REST, Effect
+from identification.effects._base import AT_REST, Acting, Effect
 from identification.equations import by_load, in_columns
 from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
 from identification.karnopp import Karnopp
@@ -79,7 +79,7 @@ def model_of(
         prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
-    acting, sized, silent = [], list[str](), dict[str, float]()
+    acting, silent = [], dict[str, float]()
     for step in steps:
         effect = step.candidate.effect
         values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
@@ -91,8 +91,6 @@ def model_of(
                 spreads.pop(p.name)
             elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
-        if in_columns(effect):
-            sized += [f"{effect.key}.{k}" for k in effect.linear if spreads.get(k, 0.0) > 0.0]
         acting.append(effect.acting(values))
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
@@ -119,9 +117,7 @@ def model_of(
         if missing:  # it will not do, however closely it is searched
             begins = begins[:1]
         told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
-        slides = bool(acting) and not missing
-        slides &= all(in_columns(a.effect) and a.effect.acts != "stiction" for a in acting)
-        known = {k: SURELY * prior[k] for k in (*FIVE, *sized)} if slides else {}
+        known = {} if missing else left_open(acting, prior)
         other = closest(begins, logs, drive, rng, 0 if missing else SEARCHES, told, known)
         done = other if other.misfit < done.misfit else done
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
@@ -152,6 +148,19 @@ def led(o: Outcome) -> bool:
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
     left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
     return inertia < INERT * left
+
+
+def left_open(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, float]:
+    """How far sliding, which these effects explain, leaves mass, friction and sizes open, by name.
+
+    Nothing is known so well of a plant without effects, or where one is told by more than sliding.
+    """
+    if not effects or not all(
+        in_columns(a.effect) and a.effect.acts != "stiction" for a in effects
+    ):
+        return {}
+    sizes = (f"{a.key}.{name}" for a in effects for name in a.effect.linear)
+    return {name: SURELY * sd[name] for name in (*FIVE, *sizes) if sd.get(name, 0.0) > 0.0}
 
 
 def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:
