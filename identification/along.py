@@ -27,14 +27,14 @@ def along_kernel(
     F: Array,
     u: Array,
     d: IntArray,
-    up: tuple[float, float],
-    down: tuple[float, float],
+    up: tuple[float, float, float],
+    down: tuple[float, float, float],
     s: Array,
     out: Array,
 ) -> None:
     """`value` at every sample into out (n,); d 0 is a body at rest, in the last direction.
 
-    up, down: level [N] and viscous coefficient [N s/m] of either direction.
+    up, down: level [N], viscous coefficient [N s/m] and stick limit [N] of either direction.
     """
     z, way = 0.0, 1.0
     for k in range(len(out)):
@@ -42,14 +42,17 @@ def along_kernel(
             way = float(d[k])
         speed = v[k] if d[k] != 0 else 0.0
         s_k = s.ctypes.data + k * s.strides[0]
-        c, viscous = up if d[k] >= 0 else down
+        c, viscous, _ = up if d[k] >= 0 else down
         f = c + viscous * abs(v[k])
+        borne = f
+        if d[k] == 0:
+            borne = up[2] if F[k] >= 0.0 else down[2]
         now = t[k] - t[0]
         x = (now, y[k], speed, F[k], u[k], way, z, c, f)
         if k == 0 and addresses[INITIAL] != 0:
             z = call_value(addresses[INITIAL], x, s_k, q.ctypes.data)
         elif addresses[EVOLVE] != 0:
-            step = (h, now, y[k], speed, F[k], u[k], float(d[k]), z, c, f)
+            step = (h, now, y[k], speed, F[k], u[k], float(d[k]), z, c, borne)
             z = call_evolve(addresses[EVOLVE], step, s_k, q.ctypes.data)
         x = (now, y[k], speed, F[k], u[k], way, z, c, f)
         out[k] = call_value(addresses[VALUE], x, s_k, q.ctypes.data)
@@ -69,7 +72,8 @@ def contribution(
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
     d = signals["d"].astype(np.int64, copy=False)
-    up, down = (friction.F_cp, friction.F_vp), (friction.F_cn, friction.F_vn)
+    up = friction.F_cp, friction.F_vp, friction.F_sp
+    down = friction.F_cn, friction.F_vn, -friction.F_sn
     s = np.zeros((n, max(1, len(effect.signals))))
     for j, name in enumerate(effect.signals):
         if name in signals:

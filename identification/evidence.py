@@ -49,6 +49,7 @@ QUIET = 0.2  # share of a log in which its force is taken to be free of fast con
 class Moving:
     """One log with its motion, and its windows in the two equations (actuator: None without u).
 
+    kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
     plant that walks more must not be forgiven for it.
     """
@@ -63,12 +64,8 @@ class Moving:
     noise_F: float
     held: bool
     v_noise: float
+    kinks: Array
     reference: Karnopp | None = None
-
-    @cached_property
-    def kinks(self) -> Array:
-        """By how much the measured force lies beyond the lines through its samples [N], (n,)."""
-        return kinks(np.asarray(self.log["F"]), self.noise_F)
 
     @cached_property
     def driving(self) -> Log:
@@ -143,7 +140,10 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     noise_y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
     noise_y = max(noise_y, EXACT * float(np.ptp(log["y"])))
     noise_F = _beside_control(log) if held else local_noise(log["F"])
-    one = Moving(log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise)
+    beyond = kinks(np.asarray(log["F"]), noise_F)
+    one = Moving(
+        log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond
+    )
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 

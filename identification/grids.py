@@ -13,7 +13,8 @@ SPEEDS = (0.02, 0.04, 0.07, 0.12, 0.2, 0.33, 0.55, 0.9, 1.5)  # of the speed rar
 PLACES = (0.1, 0.25, 0.4, 0.55, 0.65, 0.75, 0.85, 0.92, 0.97)  # of half the travel
 SPOTS, WIDTHS = 13, (0.015, 0.04, 0.1, 0.25)  # places along the travel, and shares of it
 PLAYS = (1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2)  # of the travel
-SAMPLES = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0)
+SHORTEST, MANY = 0.5, 32.0  # samples, between which a short time is tried
+LATE = 0.2  # s, up to which a short time is tried too
 SHARES = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
 RESTS = (0.1, 0.2, 0.4, 0.8, 1.5, 3.0, 8.0)  # of the median rest
 TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
@@ -45,7 +46,7 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
     elif p.unit == "s" and effect.acts == "stiction":
         found = median_rest(logs, p.typical) * np.array(RESTS)
     elif p.unit == "s":
-        found = one.log.duration * np.array(SHARES) if p.typical >= LONG else h * np.array(SAMPLES)
+        found = one.log.duration * np.array(SHARES) if p.typical >= LONG else _short_times(h)
     elif p.unit == "V":
         found = float(np.quantile(np.abs(one.signals["u"]), 0.7)) * np.array(SPEEDS)
     elif p.name == "n":
@@ -65,6 +66,12 @@ def median_rest(logs: Sequence[Moving], otherwise: float) -> float:
         for low, high in stretches(one, 3 * samples(MEAN, one.log.h))
     ]
     return float(np.median(times)) if times else otherwise
+
+
+def _short_times(h: float) -> Array:
+    """Times [s] of a few samples, and doubled from there up to LATE."""
+    most = max(MANY, LATE / h)
+    return h * 2.0 ** np.arange(np.log2(SHORTEST), np.ceil(np.log2(most)) + 0.5)
 
 
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:

@@ -32,6 +32,7 @@ WALKED = 3.0  # the same, where the noise of a measured force may leave as much
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 NEAR = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
+EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
 
@@ -88,8 +89,9 @@ def fitted(choice: Choice, setting: Setting) -> Model:
 def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Model]:
     """The fewest of the leading effects with which the run is followed, and the model.
 
-    Where it is not with any, the model that leaves least; but where nothing brings the run back to
-    the log and its band is unknown (unsure), the one without effects of slow and micro-motion.
+    Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
+    brings the run back to the log and its band is unknown (unsure), the one without effects of slow
+    and micro-motion.
     """
     free = loose(setting.plain.plant, setting.drive)
     unsure = unsure and free
@@ -104,7 +106,8 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
         model = fitted(part, setting)
         if model.led or model.misfit <= followed(part, setting, whole):
             return part, model
-        best = (part, model) if best is None or model.misfit < best[1].misfit else best
+        if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):
+            best = part, model
     if not unsure and best is not None:
         return best
     less = without_slow(choice) if unsure else choice

@@ -10,7 +10,7 @@ import numpy as np
 from identification.along import contribution, elastic_displacement, elastic_share
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Effect
-from identification.equations import Values, by_load, equations_of, split
+from identification.equations import Values, by_load, equations_of, needs_rounds, split
 from identification.evidence import (
     ACTUATOR,
     EQUATIONS,
@@ -38,6 +38,7 @@ BLURRED = 1e3  # times the noise, of a row that says nothing
 LOCKED = 0.1  # of the applied force, at least left to drive
 SMALL = 1e-6  # of the largest command, a step by which its passing is told
 FLAT = 0.2  # of the time in sliding, that a command may leave a motor without force
+SLIGHTLY = 1e-3  # of a level of friction, over which a slope is taken
 HOPELESS = 1e3  # times the force to be explained
 
 
@@ -74,7 +75,10 @@ class Stage:
         """The five parameters as a model, for the levels that effects ask for; no band."""
         theta = self.theta if self.theta_f is None else self.theta_f
         m, F_cp, F_cn, F_vp, F_vn = np.maximum(theta, 1e-9).tolist()
-        return Karnopp(m, F_cp, F_cn, F_vp, F_vn, 0.0, 0.0, F_cp, -F_cn)
+        up, down = F_cp, F_cn
+        if self.sliding is not None:
+            up, down = max(F_cp, self.sliding.F_sp), max(F_cn, -self.sliding.F_sn)
+        return Karnopp(m, F_cp, F_cn, F_vp, F_vn, 0.0, 0.0, up, -down)
 
     @cached_property
     def parts(self) -> Mapping[str, list[Rows]]:
@@ -173,6 +177,8 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
         own, fixed = _stiction(effect, shape, i, stage)
     else:
         own, fixed = columns(effect, shape, one, stage)
+        if not effect.linear and needs_rounds(effect):
+            return _bent(effect, shape, one, stage, rows, fixed)
     names = tuple(f"{effect.key}.{name}" for name in effect.linear)
     if split(effect):
         up: BoolArray = one.up if equation == MECHANICAL else stage.events[i].direction > 0
@@ -221,6 +227,27 @@ def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[l
         else:
             out.append(np.where(one.up, 1.0, -1.0) * (one.sliding.mean @ raw))
     return (out, np.zeros(0)) if effect.linear else ([], out[0])
+
+
+def _bent(
+    effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows, fixed: Array
+) -> Rows:
+    """Rows with what the effect makes of the friction that is fitted beside it.
+
+    fixed (r,): its contribution at the stage's friction; how that changes with each of the four
+    sliding parameters joins their columns, or substitution would creep to them in many rounds.
+    """
+    now = np.maximum(stage.theta if stage.theta_f is None else stage.theta_f, 1e-9)
+    level = float(np.mean(now[1:3]))
+    pace = level / max(float(np.max(one.speed)), 1e-300)
+    X, b = rows.X.copy(), rows.b - fixed
+    for i, step in ((1, level), (2, level), (3, pace), (4, pace)):
+        theta = now + SLIGHTLY * step * (np.arange(len(now)) == i)
+        _, more = columns(effect, shape, one, replace(stage, theta_f=theta))
+        slope = (more - fixed) / (SLIGHTLY * step)
+        X[:, i] += slope
+        b += slope * now[i]
+    return replace(rows, b=b, X=X)
 
 
 def _implicit(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
