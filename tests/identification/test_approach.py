@@ -16,6 +16,7 @@ from identification.approach import (
     closest,
     judge_led,
     leading,
+    led,
     less_load,
     limits,
     more_load,
@@ -35,10 +36,10 @@ def test_a_led_run_stays_near_the_log_where_a_free_one_is_lost() -> None:
     one = seen(made(2))
     wrong = replace(plant(), friction=OFF)
     free = judge(wrong, [one], "command", 1.0)(wrong)
-    led = judge_led(wrong, [one], "command", 1.0)(wrong)
-    assert np.median(np.abs(led)) < 0.4 * np.median(np.abs(free))
+    near = judge_led(wrong, [one], "command", 1.0)(wrong)
+    assert np.median(np.abs(near)) < 0.4 * np.median(np.abs(free))
     right = judge_led(plant(), [one], "command", 1.0)(plant())
-    assert loss(right) < 0.3 * loss(led)
+    assert loss(right) < 0.3 * loss(near)
 
 
 def test_noise_does_not_shake_a_led_body() -> None:
@@ -47,6 +48,13 @@ def test_noise_does_not_shake_a_led_body() -> None:
     assert tight == pytest.approx(1.5 * NINE.F_vn)
     rough = replace(one, v_noise=1.0)
     assert leading(plant(), [rough]) == pytest.approx(0.1 * NINE.F_cn)
+
+
+def test_what_leads_a_body_is_no_kink_of_its_force() -> None:
+    one = replace(seen(made(2)), held=False)
+    by_velocity = led(one, plant(), 500.0)
+    assert np.std(by_velocity.log["F"] - one.log["F"]) > np.std(one.log["F"])
+    assert np.allclose(by_velocity.driving["F"] - by_velocity.log["F"], one.kinks, atol=1e-9)
 
 
 def test_the_search_finds_what_a_gradient_does_not() -> None:

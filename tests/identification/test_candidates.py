@@ -58,3 +58,11 @@ def test_what_a_sensor_adds_is_refined_though_a_recipe_may_leave_it_out() -> Non
     assert optional == {"asymmetry", "delta"}
     found = best("sensor_nonlinearity", {"sensor_nonlinearity": {"a": 0.0, "b": 9.0}})
     assert found.values["b"] == pytest.approx(9.0, rel=0.15)
+
+
+@pytest.mark.parametrize("tau", [0.02, 0.12])
+def test_a_lag_is_fitted_with_the_friction_that_lags(tau: float) -> None:
+    found = best("frictional_lag", {"frictional_lag": {"tau": tau}})
+    assert found.values["tau"] == pytest.approx(tau, rel=0.05)
+    truth = NINE.array[:5]
+    assert found.outcomes["mechanical"].fit.theta[:5] == pytest.approx(truth, rel=0.05)

@@ -129,6 +129,24 @@ def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting,
     assert leading(both, 2) is both and len(leading(both, 1).steps) == 1
 
 
+@pytest.mark.parametrize(("less", "count"), [(5.0, 1), (4.0, 2)])
+def test_one_effect_more_has_to_earn_its_place_in_the_run(
+    found: tuple[Setting, Choice], monkeypatch: pytest.MonkeyPatch, less: float, count: int
+) -> None:
+    setting, choice = found
+    beside = next(one for one in choice.tried if one.effect.key == "stribeck")
+    both = replace(choice, steps=(*choice.steps, Step(beside, 0.01, (), choice.end, choice.base)))
+    plain = replace(setting.plain, misfit=90.0)
+    misfits = {1: 5.4, 2: less}
+    monkeypatch.setattr(
+        "identification.needed.fitted",
+        lambda part, _setting: replace(plain, misfit=misfits[len(part.steps)]),
+    )
+    monkeypatch.setattr("identification.needed.followed", lambda *_: COMPLETE)
+    kept, model = fewest(both, replace(setting, plain=plain), unsure=False)
+    assert (len(kept.steps), model.misfit) == (count, misfits[count])
+
+
 def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     far = replace(setting, plain=replace(setting.plain, misfit=41.0))
