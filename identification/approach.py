@@ -162,9 +162,12 @@ def _on_whole(
 
 def closer(
     plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES, around: Range = CLOSE,
+    searches: int = SEARCHES, around: Range = CLOSE, hopeless: float = np.inf,
 ) -> Refit:  # fmt: skip
-    """The plant searched close by and refined, so many times at most, as long as that helps."""
+    """The plant searched close by and refined, so many times at most, as long as that helps.
+
+    hopeless: misfit beyond which no other search will do.
+    """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
     best: Refit | None = None
     for _ in range(searches):
@@ -172,7 +175,8 @@ def closer(
         found = refit(near, logs, drive, prior=even(near), effort="near")
         gained = best is None or found.misfit < GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= (NEARLY if on_bristle(plant) else COMPLETE) or not gained:
+        enough = NEARLY if on_bristle(plant) else COMPLETE
+        if best.misfit <= enough or best.misfit > hopeless or not gained:
             break
         plant = best.plant
     assert best is not None

@@ -68,6 +68,13 @@ class Moving:
     reference: Karnopp | None = None
 
     @cached_property
+    def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
+        """Samples (n,) in which the body surely moves, and the first, and the signals in them."""
+        own = self.signals["d"] != 0
+        own[:1] = True  # from which time counts
+        return own, {key: x[own] for key, x in self.signals.items()}
+
+    @cached_property
     def driving(self) -> Log:
         """The log with the force that drives a run, between its samples too."""
         return self.log.with_signals(F=self.log["F"] + self.kinks)

@@ -141,33 +141,20 @@ def contest(
         begun += _begun(attempt, setting)
         report("judging", 0.5 * (i + 1) / len(tried))
     begun.sort(key=lambda one: one.loss)
-    screened: list[Contender] = []
     # The short logs may be those stretches of which most is left.
     short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
     promising = max(NEAR, PROMISING * short)
-    settled_at = np.inf
-    for i, one in enumerate(begun):
-        if one.loss > settled_at:
-            break
-        contender = _screened(one, setting, promising)
-        if contender is not None:
-            screened.append(contender)
-            if contender.misfit <= NEARLY:
-                settled_at = min(settled_at, BEHIND * one.loss)
-            elif contender.misfit <= HARDLY:
-                settled_at = min(settled_at, FAR_BEHIND * one.loss)
-        report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
-    screened.sort(key=lambda one: one.misfit)
+    screened, whole = _screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
     for finalist in screened[:FINALISTS]:
         if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
             break
-        done = _whole(finalist, setting)
-        if best is None or done.misfit < best[0].misfit:
-            best = done, finalist
-        if done.misfit <= COMPLETE:
+        found = whole.get(finalist) or _whole(finalist, setting)
+        if best is None or found.misfit < best[0].misfit:
+            best = found, finalist
+        if found.misfit <= COMPLETE:
             break
     if best is None:
         return None
@@ -178,8 +165,34 @@ def contest(
         bound = 1.0 + OF_STEPS * (bound - 1.0)
     if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
         return None
-    found = _taken(winner, done, rivals, setting, model.misfit)
-    return found if found[0].steps[-1].p_value <= LEVEL else None
+    taken = _taken(winner, done, rivals, setting, model.misfit)
+    return taken if taken[0].steps[-1].p_value <= LEVEL else None
+
+
+def _screening(
+    begun: Sequence[Begun], setting: Setting, promising: float, report: Report
+) -> tuple[list[Contender], dict[Contender, Refit]]:
+    """The contenders refined a little on the short logs, the best first, and those of them that
+    were refined on the whole logs too.
+
+    begun: from the least loss up. Once one is followed, those far behind it are not tried.
+    """
+    screened, whole = list[Contender](), dict[Contender, Refit]()
+    settled_at = np.inf
+    for i, one in enumerate(begun):
+        if one.loss > settled_at:
+            break
+        found = _screened(one, setting, promising)
+        if found is not None:
+            screened.append(found)
+            followed = found.misfit <= NEARLY
+            if NEARLY < found.misfit <= HARDLY:
+                whole[found] = _whole(found, setting)
+                followed = whole[found].misfit <= COMPLETE
+            if followed or found in whole:
+                settled_at = min(settled_at, (BEHIND if followed else FAR_BEHIND) * one.loss)
+        report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
+    return sorted(screened, key=lambda one: one.misfit), whole
 
 
 def scales_alone(effect: Effect, plant: Plant, logs: Sequence[Moving]) -> bool:

@@ -218,15 +218,27 @@ def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[l
     ] or [dict(shape)]
     out = []
     for values in trials:
-        raw = contribution(effect, values, one.signals, one.log.h, stage.friction)
         if effect.acts == "actuator":
             assert one.whole is not None
+            raw = contribution(effect, values, one.signals, one.log.h, stage.friction)
             out.append(one.whole.mean @ raw)
-        elif effect.acts == "force":
+            continue
+        raw = _in_sliding(effect, values, one, stage.friction)
+        if effect.acts == "force":
             out.append(-(one.sliding.mean @ raw))
         else:
             out.append(np.where(one.up, 1.0, -1.0) * (one.sliding.mean @ raw))
     return (out, np.zeros(0)) if effect.linear else ([], out[0])
+
+
+def _in_sliding(effect: Effect, values: Values, one: Moving, friction: Karnopp) -> Array:
+    """What an effect contributes, (n,), right where the body slides."""
+    if effect.evolve is not None:
+        return contribution(effect, values, one.signals, one.log.h, friction)
+    own, signals = one.in_motion
+    raw = np.zeros(len(own))
+    raw[own] = contribution(effect, values, signals, one.log.h, friction)
+    return raw
 
 
 def _bent(
