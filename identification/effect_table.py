@@ -82,6 +82,8 @@ def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> in
 
 def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
     """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
+    if np.all(np.isin(table.codes, (STICTION, *OUTSIDE))):
+        return 1  # it slides as the plain plant does
     states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
     longest = LONGEST_STATE if np.any(states) else LONGEST
     short = min(table.longest(bristle) / longest, 1.0)
