@@ -19,6 +19,7 @@ from identification.approach import (
     FAR,
     MIDWAY,
     NEARLY,
+    SHORT,
     SIDES,
     SLIDING,
     approach,
@@ -108,11 +109,24 @@ def judged_forward(
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
     if model.led or (on_bristle(model.plant) and free):
         return choice, model
+    called_for = choice.steps
     if model.misfit > enough(setting, choice.steps) and hidden(choice, free):
-        found = contest(choice, model, setting, report)
+        short = cut_short(choice, model, setting)
+        found = contest(choice, model, replace(setting, short=short), report)
         if found is not None:
             choice, model = found
-    return pruned(choice, model, setting)
+    choice, model = pruned(choice, model, setting)
+    if called_for and not choice.steps:  # the equations were wrong: what the run lacks is open
+        return judged_forward(choice, model, setting, report)
+    return choice, model
+
+
+def cut_short(choice: Choice, model: Model, setting: Setting) -> list[Moving]:
+    """The logs' beginnings or, where the run alone tells what is missing, what it follows least."""
+    logs, drive = setting.logs, setting.drive
+    if not choice.steps and loose(model.plant, drive) and known(setting):
+        return [most_left(model.plant, one, drive, SHORT) for one in logs]
+    return [shortened(one, SHORT) for one in logs]
 
 
 def hidden(choice: Choice, free: bool) -> bool:
@@ -306,7 +320,7 @@ def _whole(one: Contender, setting: Setting) -> Refit:
         # Where each start hangs on the rest before it, minima are many and narrow.
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
         found = again if again.misfit < found.misfit else found
-    elif setting.drive == "force":  # whose noise leaves less than it may: go on to the minimum
+    elif loose(found.plant, setting.drive) and not on_bristle(found.plant):  # on to the minimum
         prior = even(found.plant)
         again = refit(found.plant, setting.logs, setting.drive, prior=prior, effort="near")
         found = again if again.misfit < found.misfit else found

@@ -59,7 +59,8 @@ def _event(
     level = float(np.mean(y[first : first + mean]))
     if way * (y[last - 1] - level) < MOVED * one.noise_y:
         return None
-    part = Log(one.log.name, {key: one.log[key][first:last] for key in ("t", "y", "F")})
+    driven = one.log if one.held else one.driving
+    part = Log(one.log.name, {key: driven[key][first:last] for key in ("t", "y", "F")})
     part = part.with_signals(u=part["F"])  # of a motor that gives 1 N/V
     pushed = way * F[first : high + mean // 2]
     lowest, highest = float(np.min(pushed)), float(np.max(pushed))
@@ -93,6 +94,7 @@ def _cost(
         side = {"F_sp": least} if way > 0 else {"F_sn": -least}
         above = np.flatnonzero(way * part["F"] > limit)
         begin = int(above[0]) if len(above) else len(part)
+        begin = begin if len(part) - begin > 1 else len(part)  # no motion in one sample
         held = np.full(begin, level)
         part = Log(part.name, {key: x[begin:] for key, x in part.signals.items()})
     nine = replace(friction, **side)

@@ -250,7 +250,7 @@ def _bent(
     sliding parameters joins their columns, or substitution would creep to them in many rounds.
     """
     now = np.maximum(stage.theta if stage.theta_f is None else stage.theta_f, 1e-9)
-    level = float(np.mean(now[1:3]))
+    level = max(float(np.mean(now[1:3])), SLIGHTLY * float(np.std(one.log["F"])), 1e-12)
     pace = level / max(float(np.max(one.speed)), 1e-300)
     X, b = rows.X.copy(), rows.b - fixed
     for i, step in ((1, level), (2, level), (3, pace), (4, pace)):

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from identification.alike import told_apart
-from identification.approach import SHORT
 from identification.before_after import errors_of, noise_of
 from identification.candidates import best_of
 from identification.choice import (
@@ -32,7 +31,6 @@ from identification.evidence import (
     Moving,
     actuator,
     moving,
-    shortened,
     solve,
     stacked,
 )
@@ -44,7 +42,7 @@ from identification.findings import (
     rivals_of,
     verdict_of,
 )
-from identification.forward import judged_forward, most_left
+from identification.forward import judged_forward
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
@@ -55,7 +53,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, Setting, doubted, fewest, known
+from identification.needed import DECISIVE, Setting, doubted, fewest
 from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
@@ -112,16 +110,11 @@ def trace(
     sliding = choice.base[MECHANICAL]
     # What was missing may have hidden the inertia.
     imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
-    free = free or (before.led and not imposed)
     unsure = start.band == 0.0 and not imposed
     setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
     after = before
     if choice.steps:
         choice, after = fewest(choice, setting, unsure)
-    short = [shortened(one, SHORT) for one in logs]
-    if free and not choice.steps and known(setting):
-        short = [most_left(before.plant, one, drive, SHORT) for one in logs]
-    setting = replace(setting, short=short)
     if unsure:
         choice, after = doubted(choice, after, setting)
         setting = replace(setting, doubted=choice.steps)

@@ -5,11 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.approach import less_load
+from identification.approach import SHORT, less_load
 from identification.candidates import Candidate, best_of
-from identification.choice import FAR, Choice, choose, first_stage
+from identification.choice import FAR, Choice, Step, choose, first_stage
+from identification.evidence import Moving
 from identification.forward import (
     Contender,
+    cut_short,
     decisive,
     hidden,
     judged_forward,
@@ -50,6 +52,31 @@ def test_play_shows_in_the_run_alone_and_is_named() -> None:
     assert model.misfit <= COMPLETE
     assert step.p_value < 1e-6 and step.explained is not None and step.explained > 0.97
     assert step.rivals and all(c.gain < step.candidate.gain for c in step.rivals)
+
+
+def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    setting, plain = setting_of(4, 4e-4)
+    library = {"stribeck": built_in()["stribeck"]}
+    tried = choose(setting.start, setting.first, {}, setting.rng, lambda _s, _p: None)
+    beside = best_of(setting.start, library["stribeck"], setting.first)
+    assert beside is not None
+    step = Step(beside, 0.01, (), setting.start, setting.first)
+    seen_short: list[list[Moving]] = []
+
+    def contest(choice: Choice, _model: Model, own: Setting, _report: object) -> None:
+        assert not choice.steps
+        seen_short.append(list(own.short))
+
+    monkeypatch.setattr("identification.forward.contest", contest)
+    monkeypatch.setattr("identification.forward.pruned", lambda *_: (tried, plain))
+    followed = replace(plain, misfit=1.2)
+    kept, model = judged_forward(
+        replace(tried, steps=(step,)), followed, setting, lambda _s, _p: None
+    )
+    assert not kept.steps and model is plain and len(seen_short) == 1
+    worst = most_left(plain.plant, setting.logs[0], "command", SHORT)
+    assert np.array_equal(seen_short[0][0].log["t"], worst.log["t"])
+    assert cut_short(replace(tried, steps=(step,)), plain, setting)[0].log["t"][0] == 0.0
 
 
 def test_an_effect_taken_out_of_the_library_is_not_replaced_by_a_helper() -> None:

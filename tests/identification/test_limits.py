@@ -1,8 +1,11 @@
 """Stick limits by simulation: the limit of every breakaway, and what it grows with."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from identification.limits import breakaway_limits
+from identification.limits import _cost, breakaway_limits
+from identification.log import Log
 from tests.identification.motor_logs import NINE, made, seen
 
 
@@ -34,6 +37,15 @@ def test_a_limit_that_falls_with_the_first_motion_is_seen_whole() -> None:
         true = limit + F_r * (1.0 - np.exp(-found.rested / tau))
         off.append(float(np.median(np.abs(found.force * found.direction - true))))
     assert off[1] < 0.25 < 0.5 < off[0]
+
+
+def test_a_limit_reached_with_the_last_sample_moves_nothing() -> None:
+    one = replace(seen(made(1)), held=False)
+    force = np.linspace(0.0, 20.0, 60)
+    signals = {"t": 2e-3 * np.arange(60.0), "y": np.zeros(60), "F": force, "u": force}
+    for limit in (force[-2], force[-1]):  # one sample beyond it, and none
+        cost = _cost(one, NINE, True, Log("part", signals), 0.0, 1.0, float(limit))
+        assert cost == 0.0
 
 
 def test_a_body_that_never_moves_breaks_nowhere() -> None:
