@@ -184,7 +184,7 @@ def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Mod
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
-        found = refined(keeping(after.plant, stay), setting, NEAR * max(after.misfit, 1.0))
+        found = refined(keeping(after.plant, stay), setting, after.misfit)
         other = Model(less.end, less.base, found.plant, found.sd, False, found.misfit)
         if other.misfit > COMPLETE:
             again = fitted(less, setting) if stay else setting.plain
@@ -213,7 +213,7 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
             base = replace(base, friction=more_load(model.plant).friction)
         elif stay:
             base = replace(base, friction=levelled(base.friction, less.end.theta))
-        found = refined(base, setting, NEAR * max(model.misfit, 1.0))
+        found = refined(base, setting, model.misfit)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
         choice = less
@@ -257,9 +257,12 @@ def with_steps(
     return stage, outcomes
 
 
-def refined(plant: Plant, setting: Setting, hopeless: float = np.inf) -> Refit:
-    """The plant refined on the whole logs from close by; hopeless: as in `closer`."""
+def refined(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
+    """The plant refined on the whole logs from close by.
+
+    rival: misfit of what it stands against; one far beyond that is not searched again.
+    """
     logs, drive = setting.logs, setting.drive
     if loose(plant, drive):
-        return closer(plant, logs, drive, setting.rng, hopeless=hopeless)
+        return closer(plant, logs, drive, setting.rng, hopeless=NEAR * max(rival, 1.0))
     return refit(plant, logs, drive, prior=even(plant), effort="near")

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.approach import SHORT, less_load
+from identification.approach import less_load
 from identification.candidates import Candidate, best_of
 from identification.choice import FAR, Choice, Step, choose, first_stage
-from identification.evidence import Moving
+from identification.evidence import Moving, shortened
 from identification.forward import (
     Contender,
     cut_short,
@@ -68,14 +68,16 @@ def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyP
         seen_short.append(list(own.short))
 
     monkeypatch.setattr("identification.forward.contest", contest)
+    monkeypatch.setattr(
+        "identification.forward.most_left", lambda _p, one, _d, size: shortened(one, size, 2000)
+    )
     monkeypatch.setattr("identification.forward.pruned", lambda *_: (tried, plain))
     followed = replace(plain, misfit=1.2)
     kept, model = judged_forward(
         replace(tried, steps=(step,)), followed, setting, lambda _s, _p: None
     )
     assert not kept.steps and model is plain and len(seen_short) == 1
-    worst = most_left(plain.plant, setting.logs[0], "command", SHORT)
-    assert np.array_equal(seen_short[0][0].log["t"], worst.log["t"])
+    assert seen_short[0][0].log["t"][0] == pytest.approx(4.0)
     assert cut_short(replace(tried, steps=(step,)), plain, setting)[0].log["t"][0] == 0.0
 
 
