@@ -62,7 +62,7 @@ def _event(
     driven = one.log if one.held else one.driving
     part = Log(one.log.name, {key: driven[key][first:last] for key in ("t", "y", "F")})
     part = part.with_signals(u=part["F"])  # of a motor that gives 1 N/V
-    pushed = way * F[first : high + mean // 2]
+    pushed = way * driven["F"][first : high + mean // 2]
     lowest, highest = float(np.min(pushed)), float(np.max(pushed))
     if highest <= max(lowest, 0.0):
         return None
