@@ -32,6 +32,7 @@ from identification.refit import (
     loss,
     names_of,
     on_bristle,
+    onward,
     plant_with,
     refit,
     start_band,
@@ -117,17 +118,17 @@ def nearer(plants: Sequence[Plant], logs: Sequence[Moving], drive: Drive) -> Pla
 def closest(
     begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, told: bool = False,
-    known: Mapping[str, float] = MappingProxyType({}),
+    known: Mapping[str, float] = MappingProxyType({}), done: Refit | None = None,
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
     begins: plants to begin from in turn, as long as more is left than should be; searches: on the
     whole at most, none where no search will do; told: the first has everything but its band from
     the equations, so it is searched close by before; known: by name, how far the equations leave
-    a parameter open.
+    a parameter open; done: found already, and beside the searches one that may be agreed with.
     """
     short = [shortened(one, SHORT) for one in logs]
-    best: Refit | None = None
+    best = done
     for i, plant in enumerate([*begins[: int(told)], *begins]):
         if told and i == 0:
             banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
@@ -169,14 +170,21 @@ def closer(
     hopeless: misfit beyond which no other search will do.
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
+    enough = NEARLY if on_bristle(plant) else COMPLETE
     best: Refit | None = None
+    if not on_bristle(plant):
+        best = onward(refit(plant, logs, drive, prior=even(plant), effort="near"), logs, drive)
+        plant = best.plant
     for _ in range(searches):
+        if best is not None and (best.misfit <= enough or best.misfit > hopeless):
+            break
         near = approach(plant, part, drive, rng, ((0.0, around),))
         found = refit(near, logs, drive, prior=even(near), effort="near")
+        if not on_bristle(near):
+            found = onward(found, logs, drive)
         gained = best is None or found.misfit < GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
-        enough = NEARLY if on_bristle(plant) else COMPLETE
-        if best.misfit <= enough or best.misfit > hopeless or not gained:
+        if not gained:
             break
         plant = best.plant
     assert best is not None

@@ -24,11 +24,16 @@ from identification.result import Drive
 from identification.starts import COARSE, SECONDS, WHOLE, freed, left, starts, walks, window_of
 
 FIRST = 1.0  # s, of the windows in which the search begins
+# Windows [s] with a stop or two in each, and the share of their residuals that counts in full:
+# where a stop comes late, no more than its own window is lost, so the minimum is wide.
+BRIEF = ((0.15, 0.5), (0.15, 0.0), (0.3, 0.0), (1.0, 0.0))
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
+REACHED = 60.0  # misfit up to which brief windows may lead to the minimum
+ROUNDS, GAIN = 4, 0.9  # of `onward` at most, each to leave this share of the misfit before
 STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 LONG = 8.0  # s, of those in which a motor is followed in the end
@@ -137,7 +142,7 @@ def even(plant: Plant) -> dict[str, float]:
     }
 
 
-Effort = Literal["quick", "near", "whole"]
+Effort = Literal["quick", "near", "far", "whole"]
 Judge = Callable[[Plant], Array]
 
 
@@ -213,8 +218,9 @@ def refit(
 
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
-    steps from the plant as it is, "near" goes on from there, "whole" looks for the band first,
-    and so many times (rescues) for another band where more than noise is left.
+    steps from the plant as it is, "near" goes on from there, "far" comes there through brief
+    windows, "whole" looks for the band first, and so many times (rescues) for another band where
+    more than noise is left.
     """
     quick = effort == "quick"
     if effort == "whole":
@@ -254,6 +260,8 @@ def refit(
     x = x0[open_] / unit[open_]
     if effort == "whole":
         x = refined(x, FIRST, True, MOST).x
+    for seconds, part in BRIEF if effort == "far" else ():
+        x = refined(x, seconds, False, part).x
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
@@ -301,6 +309,22 @@ def refit(
         return factor * at.covariance(cluster) * np.outer(unit[open_], unit[open_])
 
     return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
+
+
+def onward(done: Refit, logs: Sequence[Moving], drive: Drive) -> Refit:
+    """What was found, refined with every shape free (an asymmetry too) as long as that helps."""
+    best = done
+    for _ in range(ROUNDS):
+        if not COMPLETE < best.misfit < REACHED:
+            break
+        found = refit(best.plant, logs, drive, prior={}, effort="far")
+        if found.misfit >= best.misfit:
+            break
+        gained = found.misfit < GAIN * best.misfit
+        best = replace(found, prior=done.prior)
+        if not gained:
+            break
+    return best
 
 
 def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:

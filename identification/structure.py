@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.approach import SEARCHES, STICK, closest, loaded
+from identification.approach import NEARLY, SEARCHES, STICK, closest, loaded
 from identification.arrays import Array
 from identification.candidates import with_sizes
 from identification.choice import Step, rough
@@ -16,7 +16,7 @@ from identification.karnopp import Karnopp
 from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Actuator, Motor, Plant
-from identification.refit import COMPLETE, RESCUES, loose, refit
+from identification.refit import COMPLETE, RESCUES, even, loose, on_bristle, onward, refit
 from identification.rest import borne
 from identification.result import Drive
 from identification.stage import Stage
@@ -109,7 +109,10 @@ def model_of(
         other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
         done = other if other.misfit < done.misfit else done
     hopeless = missing and (bool(steps) or rough(outcomes))
-    if free and done.misfit > COMPLETE and not hopeless:
+    if not on_bristle(plant) and not hopeless and (free or even(done.plant)):
+        done = onward(done, logs, drive)
+    followed = NEARLY if steps else COMPLETE
+    if free and done.misfit > followed and not hopeless:
         begins = [plant, done.plant]
         if near is not None and any(by_load(a.effect) for a in acting):
             # What the plain run tells is what the load leaves of it.
@@ -118,8 +121,8 @@ def model_of(
             begins = begins[:1]
         told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
         known = {} if missing else left_open(acting, prior)
-        other = closest(begins, logs, drive, rng, 0 if missing else SEARCHES, told, known)
-        done = other if other.misfit < done.misfit else done
+        searches = 0 if missing else SEARCHES
+        done = closest(begins, logs, drive, rng, searches, told, known, done)
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 
