@@ -173,15 +173,16 @@ def closer(
     enough = NEARLY if on_bristle(plant) else COMPLETE
     best: Refit | None = None
     if not on_bristle(plant):
-        best = onward(refit(plant, logs, drive, prior=even(plant), effort="near"), logs, drive)
+        best = onward(plant, logs, drive)
         plant = best.plant
     for _ in range(searches):
         if best is not None and (best.misfit <= enough or best.misfit > hopeless):
             break
         near = approach(plant, part, drive, rng, ((0.0, around),))
-        found = refit(near, logs, drive, prior=even(near), effort="near")
-        if not on_bristle(near):
-            found = onward(found, logs, drive)
+        if on_bristle(near):
+            found = refit(near, logs, drive, prior=even(near), effort="near")
+        else:
+            found = onward(near, logs, drive)
         gained = best is None or found.misfit < GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
         if not gained:

@@ -53,12 +53,14 @@ class Minimum:
 
 
 def gauss_newton(
-    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP
-) -> Minimum:
-    """Minimum of the square sum of `fun` near x.
+    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP,
+    reach: Array | float = np.inf,
+) -> Minimum:  # fmt: skip
+    """Minimum of the square sum of `fun` near x, within this reach of it (k,).
 
     Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
     """
+    low, high = x - reach, x + reach
     r = fun(x)
     cost, damping = float(r @ r), 1e-3
     for _ in range(steps):
@@ -69,6 +71,7 @@ def gauss_newton(
         size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
         for _ in range(TRIES):
             step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
+            step = np.clip(x + step, low, high) - x
             after = fun(x + step)
             gained = cost - float(after @ after)
             if gained > 0:

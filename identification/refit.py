@@ -24,9 +24,11 @@ from identification.result import Drive
 from identification.starts import COARSE, SECONDS, WHOLE, freed, left, starts, walks, window_of
 
 FIRST = 1.0  # s, of the windows in which the search begins
-# Windows [s] with a stop or two in each, and the share of their residuals that counts in full:
+# Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
 # where a stop comes late, no more than its own window is lost, so the minimum is wide.
-BRIEF = ((0.15, 0.5), (0.15, 0.0), (0.3, 0.0), (1.0, 0.0))
+BRIEF = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
+SAMPLES = 20  # that a brief window has at least
+REACH, LEAST = 0.4, 0.5  # of a parameter, or of so much of its unit, that it changes in them
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
@@ -246,13 +248,14 @@ def refit(
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 
     def refined(
-        x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE
-    ) -> Minimum:
+        x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
+        reach: Array | float = np.inf,
+    ) -> Minimum:  # fmt: skip
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
-        return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations)
+        return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach)
 
     slow = on_bristle(plant)
     if slow:  # its sub-steps are ten times shorter
@@ -261,7 +264,8 @@ def refit(
     if effort == "whole":
         x = refined(x, FIRST, True, MOST).x
     for seconds, part in BRIEF if effort == "far" else ():
-        x = refined(x, seconds, False, part).x
+        brief = max(seconds, *(SAMPLES * one.log.h for one in logs))
+        x = refined(x, brief, False, part, reach=REACH * np.maximum(np.abs(x), LEAST)).x
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
@@ -311,19 +315,19 @@ def refit(
     return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
 
 
-def onward(done: Refit, logs: Sequence[Moving], drive: Drive) -> Refit:
-    """What was found, refined with every shape free (an asymmetry too) as long as that helps."""
-    best = done
+def onward(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
+    """The plant refined through brief windows, directions that may be unequal, while it helps."""
+    best: Refit | None = None
+    left_by = misfit(plant, logs, drive)
     for _ in range(ROUNDS):
-        if not COMPLETE < best.misfit < REACHED:
+        held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
+        found = refit(plant, logs, drive, prior=held, effort="far")
+        gained = found.misfit < GAIN * left_by
+        best = found if best is None or found.misfit < best.misfit else best
+        if not gained or not COMPLETE < best.misfit < REACHED:
             break
-        found = refit(best.plant, logs, drive, prior={}, effort="far")
-        if found.misfit >= best.misfit:
-            break
-        gained = found.misfit < GAIN * best.misfit
-        best = replace(found, prior=done.prior)
-        if not gained:
-            break
+        plant, left_by = best.plant, best.misfit
+    assert best is not None
     return best
 
 

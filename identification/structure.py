@@ -109,8 +109,10 @@ def model_of(
         other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
         done = other if other.misfit < done.misfit else done
     hopeless = missing and (bool(steps) or rough(outcomes))
-    if not on_bristle(plant) and not hopeless and (free or even(done.plant)):
-        done = onward(done, logs, drive)
+    smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
+    if smooth and done.misfit > COMPLETE and not hopeless:
+        again = replace(onward(done.plant, logs, drive), prior=prior)
+        done = again if again.misfit < done.misfit else done
     followed = NEARLY if steps else COMPLETE
     if free and done.misfit > followed and not hopeless:
         begins = [plant, done.plant]

@@ -9,7 +9,16 @@ from identification.arrays import Array
 from identification.karnopp import Karnopp
 from identification.minimum import gauss_newton
 from identification.plant import Plant
-from identification.refit import mean_loss, names_of, plant_with, refit, units_in, values_of
+from identification.refit import (
+    even,
+    mean_loss,
+    names_of,
+    onward,
+    plant_with,
+    refit,
+    units_in,
+    values_of,
+)
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
@@ -33,6 +42,29 @@ def test_effects_are_refined_with_the_nine() -> None:
     assert found.misfit < 1.1
     assert found.plant.effects[0].values["k"] == pytest.approx(60.0, rel=0.01)
     assert 0 < found.sd["spring.k"] < 1.0
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
+    warm = {"a": 0.3, "b": 0.2, "tau": 6.0, "asymmetry": 0.1}
+    one = seen(made(seed, {"warmup": warm}))
+    rough = plant({"warmup": {"a": 0.25, "b": 0.1, "tau": 7.0}})
+    off = NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.15, 0.85, 1.05, 0.96)
+    begun = replace(rough, friction=Karnopp.from_array(off))
+    astray = refit(begun, [one], "command", prior=even(begun), effort="near")
+    found = onward(begun, [one], "command")
+    assert found.misfit < 1.1 < 20.0 < astray.misfit
+    values = found.plant.effects[0].values
+    assert values["asymmetry"] == pytest.approx(0.1, abs=2e-3)  # begun as none
+    assert values["a"] == pytest.approx(0.3, rel=0.01)
+    assert np.allclose(found.plant.friction.array, NINE.array, rtol=0.02)
+
+
+def test_a_shape_other_than_the_asymmetry_stays_at_its_default() -> None:
+    one = seen(made(3, {"stribeck": {"F_s": 3.0, "v_s": 0.02}}))
+    found = onward(plant({"stribeck": {"F_s": 2.5, "v_s": 0.025}}), [one], "command")
+    assert found.misfit < 1.1
+    assert found.plant.effects[0].values["delta"] == 2.0
 
 
 def test_where_the_model_lacks_something_the_regression_holds() -> None:
@@ -94,3 +126,12 @@ def test_a_size_of_none_is_changed_by_parts_of_a_typical_one() -> None:
     assert units[f"{key}.mu_p"] == 3e-5
     assert units[f"{key}.mu_n"] == 2e-5
     assert units[f"{key}.asymmetry"] == 1.0
+
+
+def test_a_reach_holds_what_least_squares_would_throw_far() -> None:
+    def fun(x: Array) -> Array:
+        return np.asarray(np.array([x[0] - 5.0, 0.1 * (x[1] - 1.0)]))
+
+    assert gauss_newton(fun, np.zeros(2), 30).x == pytest.approx([5.0, 1.0], abs=1e-3)
+    held = gauss_newton(fun, np.zeros(2), 30, reach=np.array([0.4, 2.0]))
+    assert held.x == pytest.approx([0.4, 1.0], abs=1e-3)
