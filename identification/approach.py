@@ -165,7 +165,8 @@ def closer(
     plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, around: Range = CLOSE, hopeless: float = np.inf,
 ) -> Refit:  # fmt: skip
-    """The plant searched close by and refined, so many times at most, as long as that helps.
+    """The plant refined, then searched close by and refined again, so many times at most, as long
+    as that helps.
 
     hopeless: misfit beyond which no other search will do.
     """
