@@ -171,16 +171,15 @@ def closer(
     hopeless: misfit beyond which no other search will do.
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
-    enough = NEARLY if on_bristle(plant) else COMPLETE
-    best: Refit | None = None
-    if not on_bristle(plant):
-        best = onward(plant, logs, drive)
-        plant = best.plant
+    slow = on_bristle(plant)
+    enough = NEARLY if slow else COMPLETE
+    best = None if slow else onward(plant, logs, drive)
     for _ in range(searches):
         if best is not None and (best.misfit <= enough or best.misfit > hopeless):
             break
+        plant = plant if best is None else best.plant
         near = approach(plant, part, drive, rng, ((0.0, around),))
-        if on_bristle(near):
+        if slow:
             found = refit(near, logs, drive, prior=even(near), effort="near")
         else:
             found = onward(near, logs, drive)
@@ -188,7 +187,6 @@ def closer(
         best = found if best is None or found.misfit < best.misfit else best
         if not gained:
             break
-        plant = best.plant
     assert best is not None
     return best
 
