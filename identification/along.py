@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from identification.arrays import Array, IntArray
+from identification.arrays import Array, IntArray, read_only
 from identification.compiled import call_evolve, call_value, compiled
 from identification.effect_table import EVOLVE, INITIAL, VALUE
 from identification.effects._base import MAX_PARAMS, Effect
@@ -79,9 +79,9 @@ def contribution(
         if name in signals:
             s[:, j] = signals[name]
     out = np.empty(n)
-    y, v, F, u = (np.ascontiguousarray(signals[k]) for k in ("y", "v", "F", "u"))
+    t, y, v, F, u = (read_only(np.ascontiguousarray(signals[k])) for k in ("t", "y", "v", "F", "u"))
     addresses = np.array(effect.addresses, dtype=np.int64)
-    along_kernel(addresses, q, h, signals["t"], y, v, F, u, d, up, down, s, out)
+    along_kernel(addresses, q, h, t, y, v, F, u, d, up, down, s, out)
     return out
 
 
@@ -114,7 +114,7 @@ def elastic_share(
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
     c = np.where(signals["v"] >= 0, friction.F_cp, friction.F_cn)
     out = np.empty(len(c))
-    y, v, F, u = (np.ascontiguousarray(signals[k]) for k in ("y", "v", "F", "u"))
+    y, v, F, u = (read_only(np.ascontiguousarray(signals[k])) for k in ("y", "v", "F", "u"))
     addresses = np.array(effect.addresses, dtype=np.int64)
     t, s = signals["t"] - signals["t"][0], np.zeros((len(c), 1))
     bristle_kernel(addresses, q, h, t, y, v, F, u, c, s, PIECES, out)

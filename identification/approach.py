@@ -137,8 +137,8 @@ def closest(
             stages = ((1.0, replace(FAR, known=known)), (0.0, replace(CLOSE, known=known)))
             near = approach(plant, short, drive, rng, stages)
         begun = refit(near, short, drive, prior=even(near), effort="quick")
-        found = _on_whole(begun, logs, drive, rng, searches, replace(CLOSE, known=known))
-        twice = best is not None and best.misfit < AGREED * found.misfit < AGREED**2 * best.misfit
+        found = _on_whole(begun, logs, drive, rng, searches, replace(CLOSE, known=known), best)
+        twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
         if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice:
             break
@@ -146,29 +146,38 @@ def closest(
     return best
 
 
+def agree(one: Refit | None, other: Refit | None) -> bool:
+    """Whether two searches have ended in the same place."""
+    if one is None or other is None:
+        return False
+    return one.misfit < AGREED * other.misfit < AGREED**2 * one.misfit
+
+
 def _on_whole(
     begun: Refit, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, searches: int,
-    around: Range,
+    around: Range, done: Refit | None,
 ) -> Refit:  # fmt: skip
     """What was found on short logs, refined on the whole; searched closer where it falls short."""
     plant = begun.plant
     if searches > 0 and begun.misfit > (NEARLY if plant.effects else COMPLETE):
-        return closer(plant, logs, drive, rng, searches, around)
+        return closer(plant, logs, drive, rng, searches, around, done=done)
     found = refit(plant, logs, drive, prior=even(plant), effort="near")
     if searches == 0 or found.misfit <= (NEARLY if on_bristle(plant) else COMPLETE):
         return found
-    again = closer(plant, logs, drive, rng, searches, around)
+    again = closer(plant, logs, drive, rng, searches, around, done=done)
     return again if again.misfit < found.misfit else found
 
 
 def closer(
     plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, around: Range = CLOSE, hopeless: float = np.inf,
+    done: Refit | None = None,
 ) -> Refit:  # fmt: skip
     """The plant refined, then searched close by and refined again, so many times at most, as long
     as that helps.
 
-    hopeless: misfit beyond which no other search will do.
+    hopeless: misfit beyond which no other search will do; done: found from elsewhere, with which
+    one that agrees is the last.
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
     slow = on_bristle(plant)
@@ -176,6 +185,8 @@ def closer(
     best = None if slow else onward(plant, logs, drive)
     for _ in range(searches):
         if best is not None and (best.misfit <= enough or best.misfit > hopeless):
+            break
+        if agree(done, best):
             break
         plant = plant if best is None else best.plant
         near = approach(plant, part, drive, rng, ((0.0, around),))

@@ -15,3 +15,10 @@ def frozen(values: Any) -> Array:
     out = np.array(values, dtype=np.float64)
     out.flags.writeable = False
     return out
+
+
+def read_only(values: Array) -> Array:
+    """Read-only view, so that a kernel is compiled once for arrays that may be written or not."""
+    out = values.view()
+    out.flags.writeable = False
+    return out

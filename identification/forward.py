@@ -50,6 +50,7 @@ from identification.plant import Plant
 from identification.refit import (
     COMPLETE,
     Refit,
+    briefly,
     even,
     judge,
     loose,
@@ -282,7 +283,7 @@ def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
     try:
         found = _near(one.start, one.plant, setting)
         for other in one.others:
-            if not free and found.misfit > WORTH * enough:
+            if found.misfit <= COMPLETE or (not free and found.misfit > WORTH * enough):
                 break
             again = _near(other, _first(other, trial.effect, setting), setting)
             found = min(found, again, key=lambda x: x.misfit)
@@ -294,6 +295,9 @@ def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
+        if effect.acts != "stiction" and not on_bristle(plant):
+            return briefly(plant, setting.short, setting.drive).plant
+        # Growth shows in stops alone, of which brief windows see little.
         # Where the plain run is nearly followed, its band and limits are nearly right.
         around = MIDWAY if setting.plain.misfit <= NEAR else SLIDING
         around = BREAKS if effect.acts == "stiction" else around
@@ -307,7 +311,7 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
 
 def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
     """The plant after a first search, or its start, refined a little on the short logs."""
-    if loose(plant, setting.drive):
+    if loose(plant, setting.drive) and misfit(plant, setting.short, setting.drive) > COMPLETE:
         plant = nearer((plant, start), setting.short, setting.drive)
         plant = approach(plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE),))
     return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
@@ -319,10 +323,6 @@ def _whole(one: Contender, setting: Setting) -> Refit:
     if one.effect.acts == "stiction" and COMPLETE < found.misfit < UNEVEN:
         # Where each start hangs on the rest before it, minima are many and narrow.
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
-        found = again if again.misfit < found.misfit else found
-    elif loose(found.plant, setting.drive) and not on_bristle(found.plant):  # on to the minimum
-        prior = even(found.plant)
-        again = refit(found.plant, setting.logs, setting.drive, prior=prior, effort="near")
         found = again if again.misfit < found.misfit else found
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")

@@ -33,6 +33,7 @@ ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no
 NEAR = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
+HOPELESS = 2.0  # times what it stands against, that brief windows leave where no search will do
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
 
@@ -264,5 +265,5 @@ def refined(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
     """
     logs, drive = setting.logs, setting.drive
     if loose(plant, drive):
-        return closer(plant, logs, drive, setting.rng, hopeless=NEAR * max(rival, 1.0))
+        return closer(plant, logs, drive, setting.rng, hopeless=HOPELESS * max(rival, 1.0))
     return refit(plant, logs, drive, prior=even(plant), effort="near")

@@ -315,13 +315,18 @@ def refit(
     return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
 
 
+def briefly(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
+    """The plant refined through brief windows, with directions that may be unequal."""
+    held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
+    return refit(plant, logs, drive, prior=held, effort="far")
+
+
 def onward(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
-    """The plant refined through brief windows, directions that may be unequal, while it helps."""
+    """The plant refined through brief windows while that helps."""
     best: Refit | None = None
     left_by = misfit(plant, logs, drive)
     for _ in range(ROUNDS):
-        held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
-        found = refit(plant, logs, drive, prior=held, effort="far")
+        found = briefly(plant, logs, drive)
         gained = found.misfit < GAIN * left_by
         best = found if best is None or found.misfit < best.misfit else best
         if not gained or not COMPLETE < best.misfit < REACHED:

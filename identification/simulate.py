@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Array, IntArray
+from identification.arrays import Array, IntArray, read_only
 from identification.compiled import compiled
 from identification.effect_run import effect_run_kernel, effective_commands, shown_run
 from identification.effect_table import (
@@ -153,7 +153,8 @@ def free_run(
     at_f = np.concatenate([[start[2]], at_f[1:]])
     out = np.zeros((4, len(log)))
     modes = np.zeros(len(log), dtype=np.int64)
-    u = log["u"] if "u" in log else np.zeros(len(log))
+    u = read_only(log["u"] if "u" in log else np.zeros(len(log)))
+    force = read_only(force)
     slope = np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False)
     at_y, at_v = np.append(start[0], at_y[keep]), np.append(start[1], at_v[keep])
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
@@ -165,9 +166,9 @@ def free_run(
         own = (table.codes, table.addresses, table.p, signals)
         if outside(table.codes):  # the body moves as that of the plain plant, stepped exactly
             acting = effective_commands(*own, np.zeros(len(table.codes)), log["t"], u, log.h)
-            force = k_a * acting if k_a != 0.0 else force
+            force = read_only(k_a * acting) if k_a != 0.0 else force
             more = (slope, log["y"], at, at_y, at_v, at_f, out, modes)
-            run_kernel(p, log.h, held, acting, force, *more)
+            run_kernel(p, log.h, held, read_only(acting), force, *more)
             shown_run(p, log.h, *own, log["t"], u, at, out)
         else:
             count = pieces(table, log.h, bristle_step)
