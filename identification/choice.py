@@ -92,15 +92,18 @@ def first_stage(logs: Sequence[Moving], by_command: bool) -> tuple[Stage, dict[s
 
 def choose(
     start: Stage, first: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
-    report: Progress,
+    report: Progress, begun: Choice | None = None, most: int = MOST,
 ) -> Choice:  # fmt: skip
     """Effects that the logs call for, one after the other, each judged beside those before.
 
-    start, first: the plain model and what it leaves, as `first_stage` gives them.
+    start, first: the plain model and what it leaves, as `first_stage` gives them; begun: a choice
+    to go on from; most: effects at most.
     """
     stage, base, steps = start, first, list[Step]()
     tried: Sequence[Candidate] = ()
-    for turn in range(MOST):
+    if begun is not None:
+        stage, base, steps, tried = begun.end, begun.base, list(begun.steps), begun.tried
+    for turn in range(len(steps), most):
         done = partial(_report, report, turn)
         tried = candidates(stage, base, library, done)
         found = accepted(tried, stage, base, rng)

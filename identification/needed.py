@@ -87,12 +87,21 @@ def fitted(choice: Choice, setting: Setting) -> Model:
     )  # fmt: skip
 
 
-def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Model]:
+def first_alone(choice: Choice, setting: Setting) -> Model | None:
+    """The model of a choice of one effect where no other need be looked for, by the equations."""
+    free = loose(setting.plain.plant, setting.drive)
+    choice = without_growth(choice) if free else choice
+    return fitted(choice, setting) if choice.steps and explained(choice.base) else None
+
+
+def fewest(
+    choice: Choice, setting: Setting, unsure: bool, alone: Model | None = None
+) -> tuple[Choice, Model]:
     """The fewest of the leading effects with which the run is followed, and the model.
 
     Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
     brings the run back to the log and its band is unknown (unsure), the one without effects of slow
-    and micro-motion.
+    and micro-motion. alone: the model of the first effect as it is, where it was made before.
     """
     free = loose(setting.plain.plant, setting.drive)
     unsure = unsure and free
@@ -104,7 +113,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
         part, whole = leading(choice, n), n == len(choice.steps)
         if not whole and not explained(choice.steps[n].base):
             continue
-        model = fitted(part, setting)
+        model = alone if n == 1 and alone is not None else fitted(part, setting)
         if model.led or model.misfit <= followed(part, setting, whole):
             return part, model
         if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):

@@ -53,7 +53,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, Setting, doubted, fewest
+from identification.needed import DECISIVE, Setting, doubted, fewest, first_alone, followed
 from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
@@ -105,16 +105,22 @@ def trace(
         first = base_outcomes(start)
     if not before.led and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
         library = {}  # the plain plant's run leaves nothing but noise
-    choice = choose(start, first, library, rng, report)
+    setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
+    begun = choose(start, first, library, rng, report, most=1)
+    report("refitting", 0.25)
+    alone = first_alone(begun, setting)
+    enough = alone is not None and (alone.led or alone.misfit <= followed(begun, setting, False))
+    on = bool(begun.steps) and not enough
+    choice = choose(start, first, library, rng, report, begun) if on else begun
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
     # What was missing may have hidden the inertia.
     imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
     unsure = start.band == 0.0 and not imposed
-    setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
     after = before
     if choice.steps:
-        choice, after = fewest(choice, setting, unsure)
+        same = choice.steps[:1] == begun.steps
+        choice, after = fewest(choice, setting, unsure, alone if same else None)
     if unsure:
         choice, after = doubted(choice, after, setting)
         setting = replace(setting, doubted=choice.steps)
@@ -124,8 +130,9 @@ def trace(
         choice, after = Choice(start, first, (), start, first, choice.tried), before
     choice = told_apart(choice, after, setting)
     seen = [moving(log, held=held, by_command=by_command) for log in test]
-    enough = DECISIVE if choice.steps else COMPLETE  # a refinement may end short of its minimum
-    left = Dependence((), 0.0) if after.misfit <= enough else left_over(choice, after)
+    # A refinement may end short of its minimum.
+    most = DECISIVE if choice.steps else COMPLETE
+    left = Dependence((), 0.0) if after.misfit <= most else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
     verdict = verdict_of(choice, left, changed)
     if verdict != "unknown" and too_much(choice, after):
