@@ -54,11 +54,12 @@ class Minimum:
 
 def gauss_newton(
     fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP,
-    reach: Array | float = np.inf,
+    reach: Array | float = np.inf, little: float = 0.0,
 ) -> Minimum:  # fmt: skip
     """Minimum of the square sum of `fun` near x, within this reach of it (k,).
 
-    Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps.
+    Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps; little:
+    share of the cost below which a step is the last in any case.
     """
     low, high = x - reach, x + reach
     r = fun(x)
@@ -81,7 +82,8 @@ def gauss_newton(
             break
         x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
         # What is left of much more than noise need not be known to its last digits.
-        if gained < (ENOUGH if cost < FOLLOWED * len(r) else LITTLE) * cost:
+        ends = ENOUGH if cost < FOLLOWED * len(r) else LITTLE
+        if gained < max(ends, little) * cost:
             break
     return Minimum(fun, x, cost / len(r))
 

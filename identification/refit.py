@@ -29,6 +29,7 @@ FIRST = 1.0  # s, of the windows in which the search begins
 BRIEF = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
 SAMPLES = 20  # that a brief window has at least
 REACH, LEAST = 0.4, 0.5  # of a parameter, or of so much of its unit, that it changes in them
+PASSING = 0.03  # share of the cost, below which a step in them is the last: they only lead on
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
@@ -249,13 +250,15 @@ def refit(
 
     def refined(
         x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
-        reach: Array | float = np.inf,
+        reach: Array | float = np.inf, little: float = 0.0,
     ) -> Minimum:  # fmt: skip
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
         far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
-        return gauss_newton(lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach)
+        return gauss_newton(
+            lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach, little=little
+        )
 
     slow = on_bristle(plant)
     if slow:  # its sub-steps are ten times shorter
@@ -265,7 +268,8 @@ def refit(
         x = refined(x, FIRST, True, MOST).x
     for seconds, part in BRIEF if effort == "far" else ():
         brief = max(seconds, *(SAMPLES * one.log.h for one in logs))
-        x = refined(x, brief, False, part, reach=REACH * np.maximum(np.abs(x), LEAST)).x
+        reach = REACH * np.maximum(np.abs(x), LEAST)
+        x = refined(x, brief, False, part, reach=reach, little=PASSING).x
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
