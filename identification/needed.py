@@ -88,10 +88,15 @@ def fitted(choice: Choice, setting: Setting) -> Model:
 
 
 def first_alone(choice: Choice, setting: Setting) -> Model | None:
-    """The model of a choice of one effect where no other need be looked for, by the equations."""
+    """The model of a choice of one effect, where the equations call for no other."""
     free = loose(setting.plain.plant, setting.drive)
     choice = without_growth(choice) if free else choice
     return fitted(choice, setting) if choice.steps and explained(choice.base) else None
+
+
+def suffices(alone: Model | None, choice: Choice, setting: Setting) -> bool:
+    """Whether the run is followed with the effects of a choice, so that no other is looked for."""
+    return alone is not None and (alone.led or alone.misfit <= followed(choice, setting, False))
 
 
 def fewest(

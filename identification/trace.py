@@ -53,7 +53,7 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, Setting, doubted, fewest, first_alone, followed
+from identification.needed import DECISIVE, Setting, doubted, fewest, first_alone, suffices
 from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
@@ -106,12 +106,10 @@ def trace(
     if not before.led and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
         library = {}  # the plain plant's run leaves nothing but noise
     setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
-    begun = choose(start, first, library, rng, report, most=1)
-    report("refitting", 0.25)
+    choice = begun = choose(start, first, library, rng, report, most=1)
     alone = first_alone(begun, setting)
-    enough = alone is not None and (alone.led or alone.misfit <= followed(begun, setting, False))
-    on = bool(begun.steps) and not enough
-    choice = choose(start, first, library, rng, report, begun) if on else begun
+    if begun.steps and not suffices(alone, begun, setting):
+        choice = choose(start, first, library, rng, report, begun)
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
     # What was missing may have hidden the inertia.
@@ -119,7 +117,7 @@ def trace(
     unsure = start.band == 0.0 and not imposed
     after = before
     if choice.steps:
-        same = choice.steps[:1] == begun.steps
+        same = choice.steps[0] is begun.steps[0]
         choice, after = fewest(choice, setting, unsure, alone if same else None)
     if unsure:
         choice, after = doubted(choice, after, setting)

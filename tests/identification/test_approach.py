@@ -12,7 +12,9 @@ from identification.approach import (
     SIDES,
     TOLD,
     Range,
+    agree,
     approach,
+    closer,
     closest,
     judge_led,
     leading,
@@ -196,3 +198,22 @@ def test_a_size_that_sliding_does_not_call_for_stays_at_none() -> None:
     closed = {name for name, a, b in zip(names, low, high, strict=True) if a == b == 0.0}
     assert {f"{key}.{size}" for size in ("c2", "a", "b")} <= closed
     assert f"{key}.c1" not in closed
+
+
+def test_a_search_ends_where_another_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = seen(made(2, {"spring": {"k": 40.0}}))  # which no plain plant follows
+    searched = []
+
+    def count(*args: object) -> Plant:
+        searched.append(args)
+        return plant()
+
+    monkeypatch.setattr("identification.approach.approach", count)
+    rng = np.random.default_rng(0)
+    found = closer(plant(), [one], "command", rng, 1)
+    assert found.misfit > COMPLETE and len(searched) == 1
+    again = closer(plant(), [one], "command", rng, 1, done=found)
+    assert agree(found, again) and len(searched) == 1
+    closer(plant(), [one], "command", rng, 1, done=replace(found, misfit=0.5 * found.misfit))
+    assert len(searched) == 2
+    assert not agree(None, found)

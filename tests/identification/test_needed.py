@@ -15,12 +15,14 @@ from identification.needed import (
     enough,
     explained,
     fewest,
+    first_alone,
     followed,
     keeping,
     known,
     leading,
     levelled,
     pruned,
+    suffices,
     without,
     without_growth,
     without_slow,
@@ -44,6 +46,28 @@ def found() -> tuple[Setting, Choice]:
     library = {key: built_in()[key] for key in ("spring", "stribeck")}
     setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
+
+
+def test_a_choice_goes_on_from_its_first_effect(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    more = setting.start, setting.first, setting.library
+    rng = np.random.default_rng(0)
+    begun = choose(*more, rng, lambda _stage, _share: None, most=1)
+    on = choose(*more, rng, lambda _stage, _share: None, begun)
+    keys = [[s.candidate.effect.key for s in one.steps] for one in (begun, on, choice)]
+    assert keys[0] == keys[2][:1] and keys[1] == keys[2]
+
+
+def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    part = leading(choice, 1)
+    alone = first_alone(part, setting)
+    assert alone is not None and suffices(alone, part, setting)
+    assert fewest(part, setting, False, alone)[1] is alone
+    assert not suffices(replace(alone, misfit=1.01 * WALKED), part, setting)
+    missing = replace(part, base=setting.first)  # the spring is not explained
+    assert not explained(missing.base) and first_alone(missing, setting) is None
+    assert not suffices(None, part, setting)
 
 
 def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(

@@ -135,3 +135,12 @@ def test_a_reach_holds_what_least_squares_would_throw_far() -> None:
     assert gauss_newton(fun, np.zeros(2), 30).x == pytest.approx([5.0, 1.0], abs=1e-3)
     held = gauss_newton(fun, np.zeros(2), 30, reach=np.array([0.4, 2.0]))
     assert held.x == pytest.approx([0.4, 1.0], abs=1e-3)
+
+
+def test_a_search_that_only_leads_on_ends_early() -> None:
+    def valley(x: Array) -> Array:
+        return np.array([1.0 - x[0], 10.0 * (x[1] - x[0] ** 2)])
+
+    first = np.array([-1.2, 1.0])
+    whole, early = gauss_newton(valley, first, 60), gauss_newton(valley, first, 60, little=0.5)
+    assert whole.mean < 1e-3 * early.mean < 1e-3 * float(np.mean(valley(first) ** 2))

@@ -7,9 +7,10 @@ import pytest
 
 from identification.arrays import Array
 from identification.errors import BadModel
+from identification.library import built_in
 from identification.log import Log
 from identification.plant import Actuator, Motor, Plant
-from identification.simulate import FreeRun, force_slope, free_run
+from identification.simulate import FreeRun, force_slope, free_run, run_kernel
 from identification.stepping import STUCK
 from tests.identification.oracle import euler
 from tests.identification.plants import ACTUATOR, command, table
@@ -116,3 +117,15 @@ def test_arrays_of_the_log_are_not_changed() -> None:
     free_run(Plant(table(1), Actuator(2e4, 0.0)), log, REST, "command")
     free_run(Plant(table(1)), log, REST, "force")
     assert all(np.array_equal(log[name], values) for name, values in before.items())
+
+
+def test_a_kernel_is_compiled_once_however_a_run_is_driven() -> None:
+    log = with_response(log_of(), free_run(Plant(table(2), ACTUATOR), log_of(), REST, "command"))
+    free_run(Plant(table(2)), log, REST, "force")
+    count = len(run_kernel.signatures)  # type: ignore[attr-defined]
+    delay = built_in()["input_delay"].acting({"tau": 0.01})
+    for motor in (Plant(table(2), Motor(3.0)), Plant(table(2), Motor(3.0), (delay,))):
+        free_run(motor, log, REST, "command")
+    free_run(Plant(table(2), ACTUATOR), log, REST, "command")
+    free_run(Plant(table(2)), Log("made", {k: log[k] for k in ("t", "y", "F")}), REST, "force")
+    assert len(run_kernel.signatures) == count  # type: ignore[attr-defined]
