@@ -119,13 +119,15 @@ def closest(
     begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, told: bool = False,
     known: Mapping[str, float] = MappingProxyType({}), done: Refit | None = None,
+    vain: float = np.inf,
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
     begins: plants to begin from in turn, as long as more is left than should be; searches: on the
     whole at most, none where no search will do; told: the first has everything but its band from
     the equations, so it is searched close by before; known: by name, how far the equations leave
-    a parameter open; done: found already, and beside the searches one that may be agreed with.
+    a parameter open; done: found already, and beside the searches one that may be agreed with;
+    vain: misfit on the short logs beyond which what was found already stays.
     """
     short = [shortened(one, SHORT) for one in logs]
     best = done
@@ -137,6 +139,8 @@ def closest(
             stages = ((1.0, replace(FAR, known=known)), (0.0, replace(CLOSE, known=known)))
             near = approach(plant, short, drive, rng, stages)
         begun = refit(near, short, drive, prior=even(near), effort="quick")
+        if best is not None and begun.misfit > vain:
+            break
         found = _on_whole(begun, logs, drive, rng, searches, replace(CLOSE, known=known), best)
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best

@@ -34,6 +34,7 @@ NEAR = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
 HOPELESS = 2.0  # times what it stands against, that brief windows leave where no search will do
+VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 
 
@@ -83,8 +84,16 @@ def fitted(choice: Choice, setting: Setting) -> Model:
     near = None if setting.plain.led else setting.plain.plant.friction
     return model_of(
         choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
-        setting.rng, near=near,
+        setting.rng, near=near, vain=vain(setting),
     )  # fmt: skip
+
+
+def vain(setting: Setting) -> float:
+    """Misfit beyond which effects that the equations call for do not help the run.
+
+    Where sliding lacks hardly anything without them, they may be a trifle.
+    """
+    return VAIN * setting.plain.misfit if explained(setting.first) else np.inf
 
 
 def first_alone(choice: Choice, setting: Setting) -> Model | None:
@@ -106,7 +115,8 @@ def fewest(
 
     Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
     brings the run back to the log and its band is unknown (unsure), the one without effects of slow
-    and micro-motion. alone: the model of the first effect as it is, where it was made before.
+    and micro-motion, and none where they help nothing. alone: the model of the first effect as it
+    is, where it was made before.
     """
     free = loose(setting.plain.plant, setting.drive)
     unsure = unsure and free
@@ -123,6 +133,8 @@ def fewest(
             return part, model
         if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):
             best = part, model
+    if free and best is not None and best[1].misfit > vain(setting):
+        return only(choice, (), [step.candidate for step in choice.steps]), setting.plain
     if not unsure and best is not None:
         return best
     less = without_slow(choice) if unsure else choice

@@ -53,11 +53,13 @@ class Model:
 def model_of(
     stage: Stage, outcomes: Mapping[str, Outcome], steps: Sequence[Step], logs: Sequence[Moving],
     drive: Drive, rig: Rig, rng: np.random.Generator, *, near: Karnopp | None = None,
+    vain: float = np.inf,
 ) -> Model:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
-    limits to begin from too, where those of the regression lead nowhere.
+    limits to begin from too, where those of the regression lead nowhere; vain: misfit of short logs
+    from which no search is worth its while.
     """
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     prior: dict[str, float] = {}
@@ -124,7 +126,7 @@ def model_of(
         told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
         known = {} if missing else left_open(acting, prior)
         searches = 0 if missing else SEARCHES
-        done = closest(begins, logs, drive, rng, searches, told, known, done)
+        done = closest(begins, logs, drive, rng, searches, told, known, done, vain)
     return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 

@@ -23,6 +23,7 @@ from identification.needed import (
     levelled,
     pruned,
     suffices,
+    vain,
     without,
     without_growth,
     without_slow,
@@ -68,6 +69,22 @@ def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, C
     missing = replace(part, base=setting.first)  # the spring is not explained
     assert not explained(missing.base) and first_alone(missing, setting) is None
     assert not suffices(None, part, setting)
+
+
+def test_a_trifle_that_does_not_help_the_run_is_not_taken(found: tuple[Setting, Choice]) -> None:
+    setting, choice = found
+    part = leading(choice, 1)
+    assert vain(setting) == np.inf  # its equations call for the spring
+    slides = replace(setting, first=choice.base)  # as if they hardly did
+    alone = first_alone(part, setting)
+    assert alone is not None
+    poor = replace(alone, misfit=1.1 * vain(slides))
+    none, model = fewest(part, slides, False, poor)
+    assert not none.steps and model is setting.plain
+    assert [one.effect.key for one in none.tried][-1] == "spring"
+    assert fewest(part, setting, False, poor)[1] is poor
+    helps = replace(alone, misfit=0.9 * vain(slides))
+    assert fewest(part, slides, False, helps)[1] is helps
 
 
 def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(
