@@ -8,15 +8,16 @@ from identification.alike import alike
 from identification.candidates import Candidate
 from identification.choice import Choice, Step, share
 from identification.effects._base import Param
-from identification.evidence import ACTUATOR, MECHANICAL
+from identification.evidence import ACTUATOR, MECHANICAL, Moving
 from identification.held_out import left_out
 from identification.karnopp import NAMES
 from identification.left_over import signals_at
 from identification.log import Rig
 from identification.outcome import Outcome, rms
 from identification.plant import Actuator, units_of
-from identification.result import Estimate
+from identification.result import Drive, Estimate
 from identification.stage import Stage
+from identification.starts import position_errors
 from identification.structure import Model, untold
 from identification.trace_result import (
     Change,
@@ -38,6 +39,7 @@ RUNS = {
     "rest": "breakaways after rests of 0.1 s to 30 s",
     "reversal": "small slow reversals below and just above breakaway",
 }
+POSITION = "position"  # the residual of the free run
 SHOWN = 6  # rivals of each effect
 
 
@@ -164,3 +166,30 @@ def residuals_of(
             )
         )
     return tuple(out)
+
+
+def run_residual(
+    before: Model, after: Model, logs: Sequence[Moving], drive: Drive
+) -> Residual | None:
+    """Error of the shown position in the free run, sample by sample, for the pictures.
+
+    None where a model's inertia is of no account, or its run cannot be followed.
+    """
+    if before.led or after.led:
+        return None
+    pairs = [[position_errors(one.plant, log, drive) for log in logs] for one in (before, after)]
+    found = [[e for e in errors if e is not None] for errors in pairs]
+    if any(len(errors) < len(logs) for errors in found):
+        return None
+    ends = np.cumsum([0.0, *(log.log.duration for log in logs)])
+    sizes = [len(log.log) for log in logs]
+    t = [log.log["t"] - log.log["t"][0] + at for log, at in zip(logs, ends[:-1], strict=True)]
+    return Residual(
+        POSITION,
+        np.concatenate(t),
+        np.repeat(np.arange(float(len(logs))), sizes),
+        np.concatenate(found[0]),
+        np.concatenate(found[1]),
+        np.repeat([log.noise_y for log in logs], sizes),
+        {},
+    )

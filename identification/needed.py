@@ -21,7 +21,7 @@ from identification.library import Library
 from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, even, loose, refit
+from identification.refit import COMPLETE, Refit, even, loose, misfit, refit
 from identification.result import Drive
 from identification.stage import Stage
 from identification.starts import starts
@@ -36,6 +36,7 @@ EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
 HOPELESS = 2.0  # times what it stands against, that brief windows leave where no search will do
 VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
+NOTHING = 1.002  # the same, of the plant as it is, without one that does nothing in the run
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,14 +234,18 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
-        if free and not _slow(step) and explained(choice.base) and not explained(less.base):
+        bare = keeping(model.plant, stay)
+        if free and misfit(bare, setting.logs, setting.drive) <= NOTHING * model.misfit:
+            found = refit(bare, setting.logs, setting.drive, prior=even(bare), effort="near")
+        elif free and not _slow(step) and explained(choice.base) and not explained(less.base):
             continue  # sliding alone calls for it: a search would not find otherwise
-        base = without(model, stay, setting)
-        if free:  # the search without the effect may have ended elsewhere
-            base = replace(base, friction=more_load(model.plant).friction)
-        elif stay:
-            base = replace(base, friction=levelled(base.friction, less.end.theta))
-        found = refined(base, setting, model.misfit)
+        else:
+            base = without(model, stay, setting)
+            if free:  # the search without the effect may have ended elsewhere
+                base = replace(base, friction=more_load(model.plant).friction)
+            elif stay:
+                base = replace(base, friction=levelled(base.friction, less.end.theta))
+            found = refined(base, setting, model.misfit)
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
         choice = less

@@ -313,11 +313,12 @@ def left(plant: Plant, one: Moving, drive: Drive, found: Freed | None) -> Array 
 
 def position_rms(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float | None:
     """Root mean square of the shown position's error in windows [m], over all logs."""
-    squares: list[Array] = []
-    for one in logs:
-        free = freed(plant, one, drive, starts(one, drive), even=True)
-        r = left(plant, one, drive, free)
-        if r is None:
-            return None
-        squares.append((r[0] * one.noise_y) ** 2)
-    return float(np.sqrt(np.mean(np.concatenate(squares))))
+    off = [position_errors(plant, one, drive) for one in logs]
+    squares = [e**2 for e in off if e is not None]
+    return float(np.sqrt(np.mean(np.concatenate(squares)))) if len(squares) == len(off) else None
+
+
+def position_errors(plant: Plant, one: Moving, drive: Drive) -> Array | None:
+    """The shown position's error in windows [m], (n,); None where it cannot be followed."""
+    r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive), even=True))
+    return None if r is None else r[0] * one.noise_y

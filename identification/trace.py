@@ -40,6 +40,7 @@ from identification.findings import (
     parameters_of,
     residuals_of,
     rivals_of,
+    run_residual,
     verdict_of,
 )
 from identification.forward import judged_forward
@@ -157,6 +158,7 @@ def trace(
         parameters_after=parameters_of(after, rig),
         plant=after.plant,
         residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
+        run=run_residual(before, after, logs, drive),
         remarks=tuple(remarks),
     )
 

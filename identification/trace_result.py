@@ -72,7 +72,7 @@ class Change:
 @dataclass(frozen=True, eq=False)
 class Residual:
     """Rows of an equation for the pictures, all (r,): time [s] over all logs in a row, `log` index,
-    residual before and after [N or N/s], noise (one sigma), and signals by name at the rows."""
+    residual before and after [N, N/s or m], noise (one sigma), and signals by name at the rows."""
 
     equation: str
     t: Array
@@ -90,7 +90,9 @@ class Trace:
     before, after: errors by "train" and "test"; noise_y [m], noise_F [N]: of the sensors;
     noise_force [N], noise_actuator [N/s]: what the sensors alone leave in the two equations;
     parameters_before, parameters_after: the nine and k1, k2 by name; plant: the model after, with
-    its effects; next_experiment: one sentence, "" where none is needed; remarks: a line each.
+    its effects; residuals: of the equations; run: of the position in the free run [m], None where
+    it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
+    each.
     """
 
     verdict: Verdict
@@ -109,4 +111,5 @@ class Trace:
     parameters_after: Mapping[str, Estimate]
     plant: Plant
     residuals: tuple[Residual, ...]
+    run: Residual | None = None
     remarks: tuple[str, ...] = field(default=())

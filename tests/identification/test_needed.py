@@ -159,6 +159,25 @@ def test_what_sliding_calls_for_is_not_searched_without(
     assert len(searched) == len(kept.steps)
 
 
+def test_what_does_nothing_goes_though_sliding_calls_for_it(
+    found: tuple[Setting, Choice], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, choice = found
+    kept = without_slow(choice)
+    model = replace(setting.plain, plant=plant(SPRING), misfit=1.0)
+    near: list[Plant] = []
+
+    def refined(tried: Plant, *_: object, **__: object) -> Refit:
+        near.append(tried)
+        return Refit(tried, 1.0, (), {}, lambda: np.zeros((0, 0)))
+
+    monkeypatch.setattr("identification.needed.refit", refined)
+    for bare, count in ((1.01, 1), (1.0, 0)):  # what the run leaves without the spring
+        monkeypatch.setattr("identification.needed.misfit", lambda *_, bare=bare: bare)
+        assert len(pruned(kept, model, setting)[0].steps) == count
+    assert [one.effects for one in near] == [()]
+
+
 def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     beside = next(one for one in choice.tried if one.effect.key == "stribeck")

@@ -77,6 +77,10 @@ def test_nothing_is_missing_where_nothing_is() -> None:
         assert value == pytest.approx(getattr(PLAIN, name), rel=5e-3), name
     for key, values in copies.items():
         assert np.array_equal(before[key], values)
+    run = found.run
+    assert run is not None and len(run.t) == len(before)
+    for model, errors in ((found.before, run.before), (found.after, run.after)):
+        assert np.sqrt(np.mean(errors**2)) == pytest.approx(model["train"].position_rms)
 
 
 @pytest.mark.parametrize(

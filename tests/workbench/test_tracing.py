@@ -11,7 +11,7 @@ import pytest
 from identification.errors import BadLog
 from identification.karnopp import NAMES
 from identification.library import built_in
-from identification.trace_result import Dependence, Errors, Verdict
+from identification.trace_result import Dependence, Errors, Residual, Verdict
 from tests.workbench.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench import tracing
@@ -278,6 +278,16 @@ def test_an_effect_without_a_picture_is_named() -> None:
     html = checked(trace_report(traced(trace_of("effect", ("rising_stiction",)))), 1)
     assert "rising stiction shows in neither equation" in html
     assert pictures(replace(trace_of(), residuals=())) == []
+
+
+def test_the_free_run_is_drawn_before_and_after() -> None:
+    found = trace_of("effect", ("rising_stiction",))
+    t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
+    run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
+    html = checked(trace_report(traced(replace(found, run=run))), 2)
+    assert "rising stiction shows in neither" in html and "residual [m]" in html
+    assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
+    assert "residual [rad]" in trace_report(traced(replace(found, run=run), rotary=True))
 
 
 def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:

@@ -30,7 +30,7 @@ from workbench.views import Row
 
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
-    " transducer shows: the table below tells it, no picture of these residuals does."
+    " transducer shows: the free run tells it, no residual of an equation does."
 )
 
 
@@ -39,6 +39,8 @@ def trace_report(traced: Traced) -> str:
     found, model = traced.trace, traced.model
     drawn = pictures(found)
     sections = [*_drawn(drawn, model.rotary), *_hidden(traced, drawn)]
+    if found.run is not None:
+        sections.append(over_time(found.run, model.rotary))
     sections.append(
         _table(
             "Before and after",
@@ -81,14 +83,14 @@ def _drawn(drawn: list[Picture], rotary: bool) -> list[Section]:
 
 
 def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:
-    """A line for each effect that no picture shows."""
+    """A line for each effect that no residual of an equation shows."""
     seen = {picture.residual.equation for picture in drawn}
     lines = [
         HIDDEN.format(words(e.effect.key))
         for e in traced.trace.effects
         if in_equation(e.effect) not in seen
     ]
-    return [Section("Without a picture", render("lines", lines=lines))] if lines else []
+    return [Section("Where it shows", render("lines", lines=lines))] if lines else []
 
 
 def _table(title: str, head: Row, rows: list[Row], lines: list[str] | None = None) -> Section:

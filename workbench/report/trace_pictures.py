@@ -50,7 +50,13 @@ SIGNALS = {
 # Sign with which an effect enters the residual; 0: that of the motion.
 SIGNED = {"slip": 0.0, "friction": 0.0, "force": -1.0, "actuator": 1.0}
 GAP = 0.2  # of a signal's range, over which a running median is not drawn
-EQUATIONS = {"mechanical": "equation of motion", "actuator": "actuator equation"}
+EQUATIONS = {
+    "mechanical": "equation of motion",
+    "actuator": "actuator equation",
+    "position": "position of the free run",
+}
+ROWS = {"position": "sample by sample, run in windows of 2 s from measured states"}
+WINDOWS = "averaged over short windows"  # rows of the equations
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,8 +212,8 @@ def over_time(residual: Residual, rotary: bool) -> Section:
         f"{inside(values, residual.noise):.0f} % ({name})" for values, _, name in _both(residual)
     ]
     caption = (
-        f"{EQUATIONS[residual.equation].capitalize()}, averaged over short windows; a complete"
-        f" model has 95 % of its points in the band, here {', '.join(shares)}."
+        f"{EQUATIONS[residual.equation].capitalize()}, {ROWS.get(residual.equation, WINDOWS)}; a"
+        f" complete model has 95 % of its points in the band, here {', '.join(shares)}."
     )
     title = f"What the model leaves over time: {EQUATIONS[residual.equation]}"
     return Section(title, render("figure", svg=svg, caption=caption))
@@ -309,8 +315,9 @@ def axis_label(signal: str, rotary: bool) -> str:
 
 
 def _unit(residual: Residual, rotary: bool) -> str:
-    unit = shown(rotary).force
-    return f"{unit}/s" if residual.equation == "actuator" else unit
+    units = shown(rotary)
+    of = {"actuator": f"{units.force}/s", "position": units.position}
+    return of.get(residual.equation, units.force)
 
 
 def _limits(axes: "Axes", residual: Residual, values: Array | None = None) -> None:
