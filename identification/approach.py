@@ -76,6 +76,7 @@ BREAKS = Range(0.004, 0.03, 2.0, 2.0, False)  # where breakaways tell the stick 
 MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
 SIDES = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be unequal
+GROWTH = Range(0.0, 0.01, 1.02, 2.0, False)  # where sliding is known, growing stiction is not
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before

@@ -17,6 +17,7 @@ from identification.approach import (
     BREAKS,
     CLOSE,
     FAR,
+    GROWTH,
     MIDWAY,
     NEARLY,
     SHORT,
@@ -265,7 +266,7 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
         if free and (by_load(trial.effect) or trial.effect.acts == "stiction"):
             # What hardly shows by itself is small at its best start: another from the middle.
             others = (plants[len(plants) // 2],)
-        elif not free and trial.effect.acts == "sensor" and len(trial.effect.params) == 1:
+        elif trial.effect.acts == "sensor" and len(trial.effect.params) == 1:
             # The plain parameters are bent to do without it: a larger size may be the better start.
             others = tuple(plants[at + 1 : at + LARGER])
         return [Begun(trial, plants[at], first, loss(errors_of(first)), others)]
@@ -319,7 +320,13 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
 
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    found = refined(one.plant, setting)
+    plant = one.plant
+    if one.effect.acts == "stiction" and loose(plant, setting.drive):
+        # A breakaway is at one sample or the next, so a small change of its limit changes nothing.
+        stage = (0.0, GROWTH)
+        near = approach(plant, setting.logs, setting.drive, setting.rng, (stage,))
+        plant = nearer((plant, near), setting.logs, setting.drive)
+    found = refined(plant, setting)
     if one.effect.acts == "stiction" and COMPLETE < found.misfit < UNEVEN:
         # Where each start hangs on the rest before it, minima are many and narrow.
         again = closer(found.plant, setting.logs, setting.drive, setting.rng)
