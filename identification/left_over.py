@@ -20,6 +20,9 @@ from identification.trace_result import Dependence
 FEWEST_ROWS = 30
 SHARE_LEFT = 0.01  # of what was missing, that may be left with structure
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
+IMPOSED_LEFT = (
+    0.3  # the same where the motion is imposed, beyond which effects found say too little
+)
 STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
@@ -66,9 +69,9 @@ def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Depend
         part = ROUGH_LEFT if rough else SHARE_LEFT
         if not found.depends_on or left < STRUCTURED:
             continue
-        if not any_size and left < part * whole:
-            continue
         size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
+        if not any_size and size**2 < part * whole:
+            continue
         if size < LEFT_LEAST.get(equation, 0.0) * _level(choice):
             continue
         if found.explained > best.explained:
@@ -77,8 +80,8 @@ def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Depend
 
 
 def _excess(o: Outcome) -> float:
-    """Square in noise units beyond the noise itself."""
-    return max(spread(o) - 1.0, 0.0)
+    """Square beyond the noise itself [N**2], as the noise of rows changes with the structure."""
+    return max(spread(o) - 1.0, 0.0) * float(np.median(o.rows.sd[o.rows.speed >= o.slowest])) ** 2
 
 
 def judged(o: Outcome, after: Model) -> BoolArray:
@@ -109,10 +112,25 @@ def too_much(choice: Choice, after: Model) -> bool:
             keep = keep & judged(o, after)
         r = o.fit.residual[keep]
         left = float(np.mean(r**2)) if len(r) else 0.0
-        missing = ROUGH_LEFT * _excess(choice.first[equation]) if choice.steps else 0.0
-        if left > MUCH**2 and left - 1.0 > missing and not (after.led and choice.steps):
+        scale = float(np.median(o.rows.sd[keep])) if len(r) else 0.0
+        part = IMPOSED_LEFT if after.led else ROUGH_LEFT
+        missing = part * _excess(choice.first[equation]) if choice.steps else 0.0
+        if left > MUCH**2 and (left - 1.0) * scale**2 > missing:
             return True
-    return not choice.steps and not after.led and after.misfit > ASTRAY and _off(after) > OFF
+    if after.led or after.misfit <= ASTRAY:
+        return False
+    return unsized(choice, after) if choice.steps else _off(after) > OFF
+
+
+def unsized(choice: Choice, after: Model) -> bool:
+    """Whether the logs leave every size of an effect as unsure as it is large."""
+    for step in choice.steps:
+        effect = step.candidate.effect
+        values = next(a.values for a in after.plant.effects if a.key == effect.key)
+        sizes = [(values[name], after.sd.get(f"{effect.key}.{name}")) for name in effect.linear]
+        if sizes and all(sd is not None and sd >= abs(value) for value, sd in sizes):
+            return True
+    return False
 
 
 def _off(after: Model) -> float:

@@ -29,7 +29,8 @@ FIRST = 1.0  # s, of the windows in which the search begins
 BRIEF = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
 SAMPLES = 20  # that a brief window has at least
 REACH, LEAST = 0.4, 0.5  # of a parameter, or of so much of its unit, that it changes in them
-PASSING = 0.03  # share of the cost, below which a step in them is the last: they only lead on
+PASSING = 0.03  # share of the cost, below which a step that only leads on is the last
+BEYOND = 8.0  # mean square, from which a run that sliding does not explain is not followed
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 SAME = 0.8  # of the misfit, above which another search is of no use
 WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
@@ -145,7 +146,7 @@ def even(plant: Plant) -> dict[str, float]:
     }
 
 
-Effort = Literal["quick", "near", "far", "whole"]
+Effort = Literal["quick", "near", "far", "rough", "whole"]
 Judge = Callable[[Plant], Array]
 
 
@@ -222,11 +223,12 @@ def refit(
     band [m/s]: about the speed below which sliding friction does not hold; prior: standard
     deviations from the regression by name (others are free); effort: "quick" takes a few
     steps from the plant as it is, "near" goes on from there, "far" comes there through brief
-    windows, "whole" looks for the band first, and so many times (rescues) for another band where
-    more than noise is left.
+    windows, "rough" looks for the band first and goes on while much is gained, "whole" as long as
+    anything is, and so many times (rescues) for another band where more than noise is left.
     """
     quick = effort == "quick"
-    if effort == "whole":
+    searched = effort in ("rough", "whole")
+    if searched:
         plant = start_band(plant, logs, drive, band)
     evaluations = FEW if quick else STEPS
     names = names_of(plant, drive)
@@ -248,9 +250,11 @@ def refit(
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 
+    passing = PASSING if effort == "rough" else 0.0
+
     def refined(
         x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
-        reach: Array | float = np.inf, little: float = 0.0,
+        reach: Array | float = np.inf, little: float = passing,
     ) -> Minimum:  # fmt: skip
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds, bristle)
@@ -264,7 +268,7 @@ def refit(
     if slow:  # its sub-steps are ten times shorter
         evaluations = min(evaluations, 4)
     x = x0[open_] / unit[open_]
-    if effort == "whole":
+    if searched:
         x = refined(x, FIRST, True, MOST).x
     for seconds, part in BRIEF if effort == "far" else ():
         brief = max(seconds, *(SAMPLES * one.log.h for one in logs))
@@ -273,9 +277,10 @@ def refit(
     at = refined(x, SECONDS, True, HALF)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
-    rounds = [] if quick else [SECONDS]
+    hopeless = effort == "rough" and at.mean > BEYOND
+    rounds = [] if quick or hopeless else [SECONDS]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
-    if steady and not slow and not quick:
+    if steady and not slow and rounds:
         rounds.append(LONG if plant_is_motor(plant) else WHOLE)
     for seconds in rounds:
         again = refined(at.x, seconds, False)

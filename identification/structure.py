@@ -16,7 +16,16 @@ from identification.karnopp import Karnopp
 from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Actuator, Motor, Plant
-from identification.refit import COMPLETE, RESCUES, even, loose, on_bristle, onward, refit
+from identification.refit import (
+    COMPLETE,
+    RESCUES,
+    Effort,
+    even,
+    loose,
+    on_bristle,
+    onward,
+    refit,
+)
 from identification.rest import borne
 from identification.result import Drive
 from identification.stage import Stage
@@ -102,13 +111,15 @@ def model_of(
     # Where sliding itself is not explained, no other band of a plant with effects will do.
     missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
     free = loose(plant, drive)
-    rescues = 0 if free or (steps and missing) else RESCUES
-    done = refit(plant, logs, drive, band=max(slow, 1e-4), prior=prior, rescues=rescues)
+    effort: Effort = "rough" if steps and missing else "whole"
+    rescues = 0 if free else RESCUES
+    begin = max(slow, 1e-4)
+    done = refit(plant, logs, drive, band=begin, prior=prior, effort=effort, rescues=rescues)
     if near is not None and not free and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
         beside = replace(plant, friction=replace(nine, **same))
         wide = max(near.dv_p, -near.dv_n)
-        other = refit(beside, logs, drive, band=wide, prior=prior, rescues=rescues)
+        other = refit(beside, logs, drive, band=wide, prior=prior, effort=effort, rescues=rescues)
         done = other if other.misfit < done.misfit else done
     hopeless = missing and (bool(steps) or rough(outcomes))
     smooth = not on_bristle(plant) and (free or bool(even(done.plant)))

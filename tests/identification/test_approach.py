@@ -9,6 +9,7 @@ import pytest
 from identification.approach import (
     CLOSE,
     FAR,
+    GROWTH,
     SIDES,
     TOLD,
     Range,
@@ -26,7 +27,16 @@ from identification.approach import (
 from identification.evidence import Moving
 from identification.karnopp import Karnopp
 from identification.plant import Plant
-from identification.refit import COMPLETE, even, judge, loss, names_of, refit, values_of
+from identification.refit import (
+    COMPLETE,
+    even,
+    judge,
+    loss,
+    misfit,
+    names_of,
+    refit,
+    values_of,
+)
 from identification.result import Drive
 from identification.starts import FAST, starts
 from tests.identification.motor_logs import NINE, made, plant, seen
@@ -147,6 +157,16 @@ def test_an_asymmetry_is_searched_only_where_it_is_asked_for() -> None:
     for around, off in ((CLOSE, 0.0), (SIDES, 0.5)):
         low, high = limits(plant(effects), names, 0.0, around)
         assert (low[at], high[at]) == (-off, off)
+
+
+def test_growth_is_searched_with_sliding_held() -> None:
+    one = seen(made(2, {"rising_stiction": {"F_r": 3.0, "tau": 0.4}}))
+    off = plant({"rising_stiction": {"F_r": 2.2, "tau": 0.25}})
+    rng = np.random.default_rng(0)
+    found = approach(off, [one], "command", rng, ((0.0, GROWTH),))
+    assert found.friction.array[:5] == pytest.approx(NINE.array[:5], rel=1e-12)
+    near = refit(off, [one], "command", prior=even(off), effort="near")
+    assert misfit(found, [one], "command") < 1.1 < near.misfit  # steps of samples have no slope
 
 
 def test_a_search_that_ends_where_another_did_is_the_last(monkeypatch: pytest.MonkeyPatch) -> None:

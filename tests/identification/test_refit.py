@@ -1,13 +1,14 @@
 """Refinement on the free run: from a rough start to the parameters, without bending the good."""
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array
 from identification.karnopp import Karnopp
-from identification.minimum import gauss_newton
+from identification.minimum import STEP, Minimum, gauss_newton
 from identification.plant import Plant
 from identification.refit import (
     even,
@@ -32,6 +33,25 @@ def test_a_rough_start_comes_to_the_true_parameters() -> None:
         assert getattr(found.plant.friction, name) == pytest.approx(
             getattr(NINE, name), rel=0.02 if name.startswith("dv") else 2e-3
         )
+
+
+def test_a_rough_refinement_ends_where_it_cannot_follow(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = seen(made(3, {"spring": {"k": 60.0}}))
+    steps: list[float] = []
+
+    def counted(
+        fun: Any, x: Array, most: int, step: float = STEP, *, reach: Any = np.inf,
+        little: float = 0.0,
+    ) -> Minimum:  # fmt: skip
+        steps.append(little)
+        return gauss_newton(fun, x, most, step, reach, little)
+
+    monkeypatch.setattr("identification.refit.gauss_newton", counted)
+    whole = refit(plant(), [one], "command", prior={}, band=0.012, rescues=0)
+    count = len(steps)
+    rough = refit(plant(), [one], "command", prior={}, band=0.012, effort="rough")
+    assert whole.misfit > 5.0 and rough.misfit < 1.1 * whole.misfit
+    assert len(steps) - count < count and min(steps[count:]) > max(steps[:count])
 
 
 def test_effects_are_refined_with_the_nine() -> None:

@@ -1,0 +1,71 @@
+"""What is left beside effects: too much of it, or of an effect whose size no log tells."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.choice import Choice, choose, first_stage
+from identification.evidence import MECHANICAL
+from identification.left_over import left_over, too_much, unsized
+from identification.library import built_in
+from identification.log import Rig
+from identification.outcome import Outcome
+from identification.structure import Model, model_of
+from tests.identification.motor_logs import K_A, made, plant, seen
+
+MOTOR = Rig("motor", force_per_command=K_A)
+SPRING = {"spring": {"k": 40.0}}
+
+
+@pytest.fixture(scope="module")
+def found() -> tuple[Choice, Model]:
+    """A motor's spring as the equations tell it, and a run that is not followed with it."""
+    one = seen(made(4, SPRING))
+    start, first = first_stage([one], False)
+    library, rng = {"spring": built_in()["spring"]}, np.random.default_rng(0)
+    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    choice = choose(start, first, library, rng, lambda _stage, _share: None)
+    assert [step.candidate.effect.key for step in choice.steps] == ["spring"]
+    return choice, replace(plain, plant=plant(SPRING), misfit=40.0)
+
+
+def leaving(o: Outcome, share: float, noise: float = 1.0) -> Outcome:
+    """The outcome with this share of its residual [N], in rows of so much noise."""
+    rows = replace(o.rows, sd=noise * o.rows.sd)
+    return replace(o, rows=rows, fit=replace(o.fit, residual=share / noise * o.fit.residual))
+
+
+@pytest.mark.parametrize(("share", "much"), [(0.7, True), (0.4, False)])
+def test_beside_effects_an_imposed_motion_may_leave_less_than_a_third(
+    found: tuple[Choice, Model], share: float, much: bool
+) -> None:
+    choice, after = found
+    imposed = replace(after, led=True, misfit=np.inf)
+    for noise in (1.0, 3.0):  # what is left in newtons counts, whatever noise its rows have
+        base = {MECHANICAL: leaving(choice.first[MECHANICAL], share, noise)}
+        assert too_much(replace(choice, base=base), imposed) is much
+    base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.4)}
+    assert too_much(replace(choice, base=base), after)  # a free run has to leave less
+    assert not too_much(replace(choice, base=base), replace(after, misfit=1.0))
+
+
+def test_structure_counts_by_its_share_of_the_force_that_was_missing(
+    found: tuple[Choice, Model],
+) -> None:
+    choice, after = found
+    spring = choice.first[MECHANICAL]
+    for noise in (1.0, 3.0):
+        some = replace(choice, base={MECHANICAL: leaving(spring, 0.4, noise)})
+        assert left_over(some, after).depends_on
+        least = replace(choice, base={MECHANICAL: leaving(spring, 0.05, noise)})
+        assert not left_over(least, after).depends_on
+
+
+def test_an_effect_of_no_certain_size_explains_no_run(found: tuple[Choice, Model]) -> None:
+    choice, after = found
+    for sd, no_size in (({"spring.k": 50.0, "spring.k_3": 9e4}, True), ({"spring.k": 1.0}, False)):
+        told = replace(after, sd=sd)
+        assert unsized(choice, told) is no_size
+        assert too_much(choice, told) is no_size
+        assert not too_much(choice, replace(told, misfit=2.0))
