@@ -217,8 +217,9 @@ def parameters(lines: Sequence[Line]) -> None:
             for one in line["trace"].get("effects", ()):
                 true = line["truth"]["effects"].get(one["key"], {}) if one["key"] == key else {}
                 for name, value in true.items():
-                    if value:
-                        off.setdefault(name, []).append(abs(one["params"][name] / value - 1))
+                    found = one["params"][name]  # None: the logs say nothing of it
+                    if value and found is not None:
+                        off.setdefault(name, []).append(abs(found / value - 1))
         said = ", ".join(f"{k} {100 * np.median(v):.2g} %" for k, v in off.items())
         if said:
             rows.append([key, len(next(iter(off.values()))), said])
