@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.alike import alike
+from identification.arrays import Array
 from identification.candidates import Candidate
 from identification.choice import Choice, Step, share
 from identification.effects._base import Param
@@ -177,10 +178,12 @@ def run_residual(
     """
     if before.led or after.led:
         return None
-    pairs = [[position_errors(one.plant, log, drive) for log in logs] for one in (before, after)]
-    found = [[e for e in errors if e is not None] for errors in pairs]
-    if any(len(errors) < len(logs) for errors in found):
-        return None
+    found: list[list[Array]] = []
+    for model in (before,) if after is before else (before, after):
+        errors = [position_errors(model.plant, log, drive) for log in logs]
+        found.append([e for e in errors if e is not None])
+        if len(found[-1]) < len(logs):
+            return None
     ends = np.cumsum([0.0, *(log.log.duration for log in logs)])
     sizes = [len(log.log) for log in logs]
     t = [log.log["t"] - log.log["t"][0] + at for log, at in zip(logs, ends[:-1], strict=True)]
@@ -189,7 +192,7 @@ def run_residual(
         np.concatenate(t),
         np.repeat(np.arange(float(len(logs))), sizes),
         np.concatenate(found[0]),
-        np.concatenate(found[1]),
+        np.concatenate(found[-1]),
         np.repeat([log.noise_y for log in logs], sizes),
         {},
     )

@@ -20,9 +20,7 @@ from identification.trace_result import Dependence
 FEWEST_ROWS = 30
 SHARE_LEFT = 0.01  # of what was missing, that may be left with structure
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
-IMPOSED_LEFT = (
-    0.3  # the same where the motion is imposed, beyond which effects found say too little
-)
+IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
 STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
