@@ -24,7 +24,6 @@ from identification.plant import Motor, Plant
 from identification.refit import (
     COMPLETE,
     FIRST,
-    WIDE,
     Judge,
     Refit,
     even,
@@ -37,6 +36,7 @@ from identification.refit import (
     refit,
     start_band,
     values_of,
+    wide,
 )
 from identification.rest import stretches
 from identification.result import Drive
@@ -80,6 +80,10 @@ GROWTH = Range(0.0, 0.01, 1.02, 2.0, False)  # where sliding is known, growing s
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
+PROMISING, POOR = (
+    3.0,
+    2,
+)  # misfit on the short logs, of effects worth a search; so many more at most
 AGREED = 1.1  # relative misfit of two searches that have ended in the same place
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
 NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
@@ -131,7 +135,7 @@ def closest(
     vain: misfit on the short logs beyond which what was found already stays.
     """
     short = [shortened(one, SHORT) for one in logs]
-    best = done
+    best, poor = done, 0
     for i, plant in enumerate([*begins[: int(told)], *begins]):
         if told and i == 0:
             banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
@@ -142,10 +146,13 @@ def closest(
         begun = refit(near, short, drive, prior=even(near), effort="quick")
         if best is not None and begun.misfit > vain:
             break
-        found = _on_whole(begun, logs, drive, rng, searches, replace(CLOSE, known=known), best)
+        hopes = not plant.effects or begun.misfit <= PROMISING
+        worth = searches if hopes else 0
+        found = _on_whole(begun, logs, drive, rng, worth, replace(CLOSE, known=known), best)
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
-        if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice:
+        poor += not hopes
+        if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice or poor == POOR:
             break
     assert best is not None
     return best
@@ -346,7 +353,7 @@ def _of_effect(p: Param, value: float, around: Range) -> list[float]:
         return [max(value - off, p.low), min(value + off, p.high)]
     if p.held(value):
         return [value, value]
-    factor = factor if p.linear else min(factor, WIDE)
+    factor = factor if p.linear else min(factor, wide(p))
     if p.low < 0.0:
         off = (factor - 1.0) * (abs(value) if value else p.typical)
         ends = [value - off, value + off]

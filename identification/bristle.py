@@ -54,7 +54,7 @@ def bristle_step(
     slope, bend, free = bristle_slopes(address, q, s, z, c, t, ym, vm, Fm, u, d)
     stiffness, v_next, moved = slope, v, 0.0
     for i in range(ITERATIONS):
-        damping = 2.0 * MICRO_DAMPING * math.sqrt(free * m) * max(slope, 0.0) / free
+        damping = 2.0 * MICRO_DAMPING * math.sqrt(free * m) * max(stiffness, 0.0) / free
         resisting = viscous + damping
         drive = F + extra - z - resisting * v
         # v1 = v + half (drive + drive1)/m with F1 - z1 = F - z + dt g - half (k2 + k_e + K)(v + v1)

@@ -17,7 +17,6 @@ from identification.evidence import (
     OUT_OF_LOGS,
     REST,
     Moving,
-    moving,
 )
 from identification.held_out import left_out_error
 from identification.library import Library
@@ -349,6 +348,6 @@ def absorb(stage: Stage, candidate: Candidate) -> Stage:
             whole = reached(effect, values, one, stage.friction)
             more = {"F": driven(one, whole)} if one.held else {}
             log = one.log.with_signals(u=command(one, whole), **more)
-        logs.append(moving(log, held=one.held, by_command=one.whole is not None))
+        logs.append(one.again(log))
     play = stage.play or (effect.acts == "sensor" and effect.evolve is not None)
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

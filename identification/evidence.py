@@ -51,7 +51,7 @@ class Moving:
 
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
-    plant that walks more must not be forgiven for it.
+    plant that walks more must not be forgiven for it. rotary: y is an angle [rad].
     """
 
     log: Log
@@ -65,7 +65,13 @@ class Moving:
     held: bool
     v_noise: float
     kinks: Array
+    rotary: bool = False
     reference: Karnopp | None = None
+
+    def again(self, log: Log) -> "Moving":
+        """The same of another log of this machine."""
+        by_command = self.whole is not None
+        return moving(log, held=self.held, by_command=by_command, rotary=self.rotary)
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
@@ -126,7 +132,7 @@ def quiet_part(third: Array) -> float:
     return float(np.sqrt(np.mean(power[: max(1, int(QUIET * count))]) / 0.45))
 
 
-def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
+def moving(log: Log, *, held: bool, by_command: bool, rotary: bool = False) -> Moving:
     """A log with its motion and windows. held: the force is a command held over each period."""
     h = log.h
     motion = differentiate(log["y"], h)
@@ -149,8 +155,9 @@ def moving(log: Log, *, held: bool, by_command: bool) -> Moving:
     noise_F = _beside_control(log) if held else local_noise(log["F"])
     beyond = kinks(np.asarray(log["F"]), noise_F)
     one = Moving(
-        log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond
-    )
+        log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
+        rotary,
+    )  # fmt: skip
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 
@@ -158,8 +165,7 @@ def shortened(one: Moving, seconds: float, begin: int = 0) -> Moving:
     """So many seconds of a log from a sample on, with its motion."""
     n = min(len(one.log) - begin, max(2, round(seconds / one.log.h)))
     cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
-    short = moving(cut, held=one.held, by_command=one.whole is not None)
-    return replace(short, reference=one.reference)
+    return replace(one.again(cut), reference=one.reference)
 
 
 def _beside_control(log: Log) -> float:

@@ -16,6 +16,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.effect_table import LONGEST_BRISTLE
+from identification.effects._base import Param
 from identification.evidence import Moving
 from identification.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.minimum import FINE_STEP, FOLLOWED, Minimum, gauss_newton
@@ -48,7 +49,7 @@ ROBUST = 3.0  # residual in noise units from which it counts less
 FAR = 300.0  # the same, at most, while much is far off
 MOST, HALF = 0.9, 0.5  # share of the residuals that then count in full
 NARROW = 0.03  # of its value, that the mass keeps at least in a search
-WIDE = 2.0  # factor within which a search keeps what an effect is not linear in
+WIDE, OF_PERIOD = 2.0, 1.2  # how far a search moves what an effect is not linear in
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
 BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
@@ -111,6 +112,14 @@ def units_in(plant: Plant, names: Sequence[str], x: Array) -> Array:
     return np.asarray(unit)
 
 
+def wide(p: Param) -> float:
+    """Factor within which a search keeps what an effect is not linear in.
+
+    The equations tell a period closely, and one far beyond the travel is another effect.
+    """
+    return OF_PERIOD if p.name == "period" else WIDE
+
+
 def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
     """The plant with these values, put at their bounds where they lie outside."""
     every = dict(zip(names, x.tolist(), strict=True))
@@ -129,8 +138,8 @@ def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
         for p in acting.effect.params:
             here = acting.values[p.name]
             low, high = p.low, p.high
-            if not p.linear and here > 0:  # a period far beyond the travel is another effect
-                low, high = max(low, here / WIDE), min(high, here * WIDE)
+            if not p.linear and here > 0:
+                low, high = max(low, here / wide(p)), min(high, here * wide(p))
             own[p.name] = float(np.clip(every.get(f"{acting.key}.{p.name}", here), low, high))
         effects.append(acting.effect.acting(own))
     return Plant(Karnopp(*nine), actuator, tuple(effects))

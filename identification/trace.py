@@ -7,6 +7,7 @@ plant with the effects found is then refined on its free run (`refit`).
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -89,7 +90,8 @@ def trace(
     remarks: list[str] = []
     by_command = _by_command(train, rig, library, remarks)
     held = rig.kind == "motor"
-    logs = [moving(log, held=held, by_command=by_command) for log in train]
+    recorded = partial(moving, held=held, by_command=by_command, rotary=rig.motion == "rotary")
+    logs = [recorded(log) for log in train]
     _enough(logs)
     report("tracing", 0.0)
     drive: Drive = "command" if by_command or held else "force"
@@ -118,8 +120,8 @@ def trace(
     unsure = start.band == 0.0 and not imposed
     after = before
     if choice.steps:
-        same = choice.steps[0] is begun.steps[0]
-        choice, after = fewest(choice, setting, unsure, alone if same else None)
+        one, other = (each.steps[0].candidate.effect for each in (choice, begun))
+        choice, after = fewest(choice, setting, unsure, alone if one is other else None)
     if unsure:
         choice, after = doubted(choice, after, setting)
         setting = replace(setting, doubted=choice.steps)
@@ -128,7 +130,7 @@ def trace(
     if useless(choice, before, after):
         choice, after = Choice(start, first, (), start, first, choice.tried), before
     choice = told_apart(choice, after, setting)
-    seen = [moving(log, held=held, by_command=by_command) for log in test]
+    seen = [recorded(log) for log in test]
     # A refinement may end short of its minimum.
     most = DECISIVE if choice.steps else COMPLETE
     left = Dependence((), 0.0) if after.misfit <= most else left_over(choice, after)
