@@ -21,7 +21,7 @@ CODES = dict(
 OUTSIDE = (COMMAND, DELAY, SENSOR)
 LONGEST = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
-LONGEST_BRISTLE = 1e-4  # s
+LONGEST_BRISTLE = 2e-4  # s
 VALUE, EVOLVE, INITIAL = range(3)
 
 

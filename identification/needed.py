@@ -29,6 +29,7 @@ from identification.structure import MUCH, Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 WALKED = 3.0  # the same, where the noise of a measured force may leave as much
+BENT = 2.0  # the same, of a bristle where nothing holds the run to the log
 ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
 NEAR = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
@@ -136,7 +137,7 @@ def fewest(
             best = part, model
     if free and best is not None and best[1].misfit > vain(setting):
         return only(choice, (), [step.candidate for step in choice.steps]), setting.plain
-    if not unsure and best is not None:
+    if best is not None and (not unsure or best[1].misfit <= WALKED):
         return best
     less = without_slow(choice) if unsure else choice
     if best is not None and len(less.steps) == len(best[0].steps):
@@ -148,8 +149,9 @@ def followed(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
         return min(enough(setting, choice.steps), NEAR)
-    # A bristle's sub-steps err.
     bristle = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
+    if bristle and loose(setting.plain.plant, setting.drive):  # minima are many and narrow
+        return BENT
     return DECISIVE if bristle or setting.drive == "force" else COMPLETE
 
 

@@ -39,7 +39,7 @@ LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 REACHED = 60.0  # misfit up to which brief windows may lead to the minimum
 ROUNDS, GAIN = 4, 0.9  # of `onward` at most, each to leave this share of the misfit before
-STEPS, FEW = 12, 4  # at most, of a refinement and of a quick one
+STEPS, SLOW, FEW = 12, 10, 4  # at most, of a refinement, of one on a bristle and of a quick one
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 LONG = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
@@ -273,9 +273,9 @@ def refit(
             lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach, little=little
         )
 
-    slow = on_bristle(plant)
-    if slow:  # its sub-steps are ten times shorter
-        evaluations = min(evaluations, 4)
+    slow = on_bristle(plant)  # its sub-steps are ten times shorter
+    if slow:
+        evaluations = min(evaluations, SLOW)
     x = x0[open_] / unit[open_]
     if searched:
         x = refined(x, FIRST, True, MOST).x
