@@ -74,6 +74,7 @@ UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
+AHEAD = 4  # first of those begun, tried where two effects are there already: each takes long
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
 HARDLY = 2.5  # misfit of one that hardly falls short of being followed
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
@@ -157,6 +158,8 @@ def contest(
         begun += _begun(attempt, setting)
         report("judging", 0.5 * (i + 1) / len(tried))
     begun.sort(key=lambda one: one.loss)
+    many = len(choice.steps) > 1
+    begun = begun[:AHEAD] if many else begun
     # The short logs may be those stretches of which most is left.
     short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
     promising = max(NEAR, PROMISING * short)
@@ -164,7 +167,7 @@ def contest(
     if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
-    for finalist in screened[:FINALISTS]:
+    for finalist in screened[: 1 if many else FINALISTS]:
         if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
             break
         found = whole.get(finalist) or _whole(finalist, setting)

@@ -19,7 +19,7 @@ SHARES = (0.03, 0.08, 0.2, 0.5, 1.5)  # of the log's duration
 RESTS = (0.1, 0.2, 0.4, 0.8, 1.5, 3.0, 8.0)  # of the median rest
 TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
-PENDULUM = 0.4  # of a turn, that gravity is seen on at least
+REPEATS, PENDULUM = 1.5, 0.4  # periods on the travel at least, and of gravity where it turns
 SHARPEST = 0.02  # s, shortest passage of one period that the windows still show
 LONG = 1.0  # s, typical value from which a time is compared with the log and not its period
 
@@ -76,12 +76,12 @@ def _short_times(h: float) -> Array:
 
 
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:
-    """Periods [m] that the travel holds once at least; of a turning machine (a pendulum swings no
-    full turn) and of what friction does along the stroke, a good part of one."""
+    """Periods [m], of a force such that it is seen to repeat; of a turning machine (a pendulum
+    swings no full turn) and of what friction does along the stroke, a good part of one."""
     slow = float(np.quantile(np.abs(one.signals["v"]), 0.5))
     shortest = max(SHARPEST * slow, 1e-3 * travel)
     force = effect.acts == "force"
-    fewest = (PENDULUM if one.rotary else 1.0) if force else 0.5
+    fewest = (PENDULUM if one.rotary else REPEATS) if force else 0.5
     most = max(travel / shortest, 2.0 * fewest)
     most = min(most, 200.0 if force else 12.0)
     return travel / np.arange(fewest, most + 0.25, 0.4)

@@ -8,13 +8,14 @@ from identification.arrays import Array, BoolArray
 from identification.choice import FAR, MATERIAL, Choice
 from identification.dependence import dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
+from identification.needed import explained
 from identification.outcome import Outcome, rms, spread
 from identification.refit import COMPLETE
 from identification.result import Drive
 from identification.stage import Stage, one_way
 from identification.starts import freed, position_rms, starts
 from identification.starts import left as left_in_run
-from identification.structure import Model, band
+from identification.structure import MUCH, Model, band
 from identification.trace_result import Dependence
 
 FEWEST_ROWS = 30
@@ -23,7 +24,6 @@ ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sen
 IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
 STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
-MUCH = 2.0  # times the sensors' noise, at which something is missing whatever it is
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
 ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
@@ -97,7 +97,8 @@ def _level(choice: Choice) -> float:
 def too_much(choice: Choice, after: Model) -> bool:
     """Whether far more than the sensors' noise is left, of whatever structure.
 
-    Beside effects that were found it is too much only where it is a good part of what was missing.
+    Beside effects that were found it is too much only where it is a good part of what was missing,
+    or where the equations are explained to the sensors' noise and the run is not.
     """
     if after.misfit <= COMPLETE:
         return False
@@ -117,7 +118,9 @@ def too_much(choice: Choice, after: Model) -> bool:
             return True
     if after.led or after.misfit <= ASTRAY:
         return False
-    return unsized(choice, after) if choice.steps else _off(after) > OFF
+    if not choice.steps:
+        return _off(after) > OFF
+    return explained(choice.base) or unsized(choice, after)
 
 
 def unsized(choice: Choice, after: Model) -> bool:

@@ -48,7 +48,6 @@ from identification.forward import judged_forward
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
-    MUCH,
     in_run,
     left_over,
     too_much,
@@ -61,7 +60,7 @@ from identification.output_error import searched_plant
 from identification.plant import units_of
 from identification.refit import COMPLETE, loose, misfit, refit
 from identification.result import Drive
-from identification.structure import Model, band, led, model_of
+from identification.structure import MUCH, Model, band, led, model_of
 from identification.trace_result import (
     Dependence,
     Trace,
