@@ -1,19 +1,20 @@
 """The structure that is left when nothing more is found: on which signals it depends."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
+from identification.arrays import Array, BoolArray, IntArray
 from identification.choice import FAR, MATERIAL, Choice
-from identification.dependence import dependence
+from identification.dependence import MOST, dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
 from identification.needed import explained
 from identification.outcome import Outcome, rms, spread
 from identification.refit import COMPLETE
 from identification.result import Drive
 from identification.stage import Stage, one_way
-from identification.starts import freed, position_rms, starts
+from identification.starts import freed, position_rms, starts, window_of
 from identification.starts import left as left_in_run
 from identification.structure import MUCH, Model, band
 from identification.trace_result import Dependence
@@ -27,6 +28,7 @@ NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
 ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
+BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
@@ -145,12 +147,17 @@ def _off(after: Model) -> float:
 
 
 def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
-    """Signals on which the free run's position error depends."""
+    """Signals on which the free run's position error depends, or its rate, or its curvature (the
+    force that is missing)."""
     parts: list[Array] = []
+    rates: list[Array] = []
+    bends: list[Array] = []
+    windows: list[IntArray] = []
     found: dict[str, list[Array]] = {}
+    count = 0
     for one in logs:
-        free = freed(after.plant, one, drive, starts(one, drive))
-        r = left_in_run(after.plant, one, drive, free)
+        begun = starts(one, drive)
+        r = left_in_run(after.plant, one, drive, freed(after.plant, one, drive, begun))
         if r is None:
             return Dependence((), 0.0)
         at = np.arange(0, len(one.log), THINNED)
@@ -158,15 +165,36 @@ def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
         own = {k: v[at] for k, v in s.items() if k not in NOT_SIGNALS}
         own["t"] = s["t"][at] - s["t"][0]
         own["reversal"] = since_reversal(s["d"], one.log.h)[at]
+        window = window_of(begun, len(one.log))[at]
+        if "u" in s:
+            own["du"] = np.gradient(s["u"], one.log.h)[at]
         parts.append(np.clip(r[0][at], -FAR, FAR))
+        half = max(1, round(BEND / one.log.h))
+        rates.append(_change(r[0], at, half, window_of(begun, len(one.log)), 1))
+        bends.append(_change(r[0], at, half, window_of(begun, len(one.log)), 2))
+        windows.append(window + count)
+        count += len(begun.at)
         for k, v in own.items():
             found.setdefault(k, []).append(v)
-    r = np.concatenate(parts)
     signals = {k: np.concatenate(v) for k, v in found.items() if len(v) == len(logs)}
     signals = {k: v for k, v in signals.items() if np.ptp(v) > 0}
-    n = len(r)
-    block = np.arange(n) * STRETCHES // n % BLOCKS
-    return dependence(r, signals, np.asarray(signals["v"] >= 0), block)
+    # An error lasts to the end of its window, so windows are left out whole.
+    block = np.concatenate(windows) % BLOCKS
+    way = np.asarray(signals["v"] >= 0)
+    each = [dependence(np.concatenate(x), signals, way, block) for x in (parts, rates, bends)]
+    each = sorted((one for one in each if one.depends_on), key=lambda one: -one.explained)
+    if not each:
+        return Dependence((), 0.0)
+    named = dict.fromkeys(name for one in each for name in one.depends_on)
+    return replace(each[0], depends_on=tuple(named)[:MOST])
+
+
+def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:
+    """First or second difference of r (n,) about samples `at` over so many on either side, (k,); 0
+    where they lie in other windows."""
+    low, high = np.maximum(at - half, 0), np.minimum(at + half, len(r) - 1)
+    found = r[high] - r[low] if order == 1 else r[high] - 2.0 * r[at] + r[low]
+    return np.asarray(np.where(window[low] == window[high], np.clip(found, -FAR, FAR), 0.0))
 
 
 def signals_at(stage: Stage, equation: str) -> dict[str, Array]:

@@ -140,6 +140,9 @@ def trace(
         left = left_over(choice, after, any_size=True)
         if not left.depends_on and not after.led:
             left = in_run(after, logs, drive)
+        if choice.steps and not left.depends_on:  # of all that is missing
+            plain = Choice(start, first, (), start, first, choice.tried)
+            left = left_over(plain, before, any_size=True)
     slowest = choice.base[MECHANICAL].slowest
     remarks += _remarks(choice, after, left, logs, seen, rig)
     return Trace(

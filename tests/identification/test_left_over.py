@@ -7,7 +7,7 @@ import pytest
 
 from identification.choice import Choice, choose, first_stage
 from identification.evidence import MECHANICAL
-from identification.left_over import left_over, too_much, unsized
+from identification.left_over import in_run, left_over, too_much, unsized
 from identification.library import built_in
 from identification.log import Rig
 from identification.outcome import Outcome
@@ -64,8 +64,37 @@ def test_structure_counts_by_its_share_of_the_force_that_was_missing(
 
 def test_an_effect_of_no_certain_size_explains_no_run(found: tuple[Choice, Model]) -> None:
     choice, after = found
+    base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.2)}
+    rough = replace(choice, base=base)  # more than noise, but little of what was missing
     for sd, no_size in (({"spring.k": 50.0, "spring.k_3": 9e4}, True), ({"spring.k": 1.0}, False)):
         told = replace(after, sd=sd)
         assert unsized(choice, told) is no_size
-        assert too_much(choice, told) is no_size
-        assert not too_much(choice, replace(told, misfit=2.0))
+        assert too_much(rough, told) is no_size
+        assert not too_much(rough, replace(told, misfit=2.0))
+
+
+def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
+    found: tuple[Choice, Model],
+) -> None:
+    choice, after = found
+    assert too_much(choice, replace(after, sd={"spring.k": 1.0}))
+    assert not too_much(choice, replace(after, sd={"spring.k": 1.0}, misfit=2.0))
+
+
+@pytest.mark.parametrize(
+    ("missing", "signals"),
+    [
+        ({"input_delay": {"tau": 0.004}}, {"du"}),
+        ({"sensor_nonlinearity": {"a": 0.2}}, {"y"}),
+        ({"backlash": {"width": 3e-4}}, {"reversal", "F", "v"}),
+        ({}, set[str]()),
+    ],
+)
+def test_the_run_tells_on_what_its_error_depends(
+    found: tuple[Choice, Model], missing: dict[str, dict[str, float]], signals: set[str]
+) -> None:
+    _, after = found
+    one = seen(made(4, missing))
+    named = set(in_run(replace(after, plant=plant({})), [one], "command").depends_on)
+    assert bool(named & signals) is bool(signals)
+    assert "t" not in named  # an error lasts, and a function of time would copy it
