@@ -147,7 +147,7 @@ def closest(
         if best is not None and begun.misfit > vain:
             break
         hopes = not plant.effects or begun.misfit <= PROMISING
-        worth = searches if hopes else 0
+        worth = searches if hopes else min(searches, 1)
         found = _on_whole(begun, logs, drive, rng, worth, replace(CLOSE, known=known), best)
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
