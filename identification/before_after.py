@@ -16,6 +16,9 @@ from identification.starts import position_rms
 from identification.structure import Model
 from identification.trace_result import Errors
 
+CARRIED = 2.0  # times the training logs' force error, up to which a structure carries over
+OF_MISSING = 0.05  # of the square that was missing, that may be left beyond that
+
 
 def errors_of(
     model: Model, slowest: float, steps: Sequence[Step], logs: Sequence[Moving],
@@ -45,6 +48,18 @@ def errors_of(
             actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
         )
     return out
+
+
+def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
+    """Whether the test logs are left no more than the training logs, or little of what was missing.
+
+    Several effects may stand in together for one that the library lacks, on the training logs.
+    """
+    own, other, missing = (x.force_rms for x in (after["train"], after["test"], before["test"]))
+    if own is None or other is None or missing is None:
+        return True
+    little = OF_MISSING * (missing**2 - own**2)
+    return other <= CARRIED * own or other**2 - own**2 <= little
 
 
 def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stage:

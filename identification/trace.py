@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from identification.alike import told_apart
-from identification.before_after import errors_of, noise_of
+from identification.before_after import carries, errors_of, noise_of
 from identification.candidates import best_of
 from identification.choice import (
     Choice,
@@ -54,7 +54,15 @@ from identification.left_over import (
 )
 from identification.library import Library
 from identification.log import Log, Rig
-from identification.needed import DECISIVE, Setting, doubted, fewest, first_alone, suffices
+from identification.needed import (
+    DECISIVE,
+    Setting,
+    doubted,
+    explained,
+    fewest,
+    first_alone,
+    suffices,
+)
 from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
@@ -135,7 +143,14 @@ def trace(
     left = Dependence((), 0.0) if after.misfit <= most else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
     verdict = verdict_of(choice, left, changed)
-    if verdict != "unknown" and too_much(choice, after):
+    slowest = choice.base[MECHANICAL].slowest
+    errors_before = errors_of(before, slowest, (), logs, seen, drive)
+    errors_after = errors_of(after, slowest, choice.steps, logs, seen, drive)
+    stands_in = (
+        choice.steps and explained(choice.base) and not changed
+        and not carries(errors_before, errors_after)
+    )  # fmt: skip
+    if verdict != "unknown" and (stands_in or too_much(choice, after)):
         verdict = "unknown"
         left = left_over(choice, after, any_size=True)
         if not left.depends_on and not after.led:
@@ -143,12 +158,16 @@ def trace(
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
             left = left_over(plain, before, any_size=True)
-    slowest = choice.base[MECHANICAL].slowest
     remarks += _remarks(choice, after, left, logs, seen, rig)
+    if stands_in:
+        remarks.append(
+            "what explains the training logs does not explain the test logs: it stands in for"
+            " something else, or the machine differs in them"
+        )
     return Trace(
         verdict=verdict,
-        before=errors_of(before, slowest, (), logs, seen, drive),
-        after=errors_of(after, slowest, choice.steps, logs, seen, drive),
+        before=errors_before,
+        after=errors_after,
         noise_y=float(np.mean([one.noise_y for one in logs])),
         noise_F=float(np.mean([one.noise_F for one in logs])),
         noise_force=noise_of(choice.base, MECHANICAL) or 0.0,

@@ -1,0 +1,30 @@
+"""Whether what explains the training logs carries over to the test logs."""
+
+import pytest
+
+from identification.before_after import carries
+from identification.trace_result import Errors
+
+
+def of(train: float | None, test: float | None) -> dict[str, Errors]:
+    """Errors of the force [N]; the others are not judged."""
+    return {name: Errors(x, None, None, None) for name, x in (("train", train), ("test", test))}
+
+
+@pytest.mark.parametrize(
+    ("before", "train", "test", "expected"),
+    [
+        (1.2, 0.1, 0.1, True),
+        (1.2, 0.1, 0.19, True),  # another reference leaves a little more
+        (1.2, 0.1, 0.42, False),
+        (5.0, 0.1, 0.42, True),  # next to all that was missing is explained
+    ],
+)
+def test_a_structure_carries_over_or_stands_in_for_another(
+    before: float, train: float, test: float, expected: bool
+) -> None:
+    assert carries(of(before, before), of(train, test)) is expected
+
+
+def test_without_a_force_error_nothing_is_held_against_it() -> None:
+    assert carries(of(None, None), of(None, None))
