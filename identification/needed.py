@@ -5,7 +5,7 @@ effect of slow motion; a second effect may have made the first one needless.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import takewhile
 
 import numpy as np
@@ -44,7 +44,8 @@ NOTHING = 1.002  # the same, of the plant as it is, without one that does nothin
 class Setting:
     """What every trial needs: logs whole and cut short, how they are driven, and the library.
 
-    doubted: steps of a choice of which those of slow motion have been tried without already.
+    doubted: steps of a choice of which those of slow motion have been tried without already; made:
+    models by the keys of their effects.
     """
 
     logs: Sequence[Moving]
@@ -57,6 +58,7 @@ class Setting:
     plain: Model
     rng: np.random.Generator
     doubted: tuple[Step, ...] = ()
+    made: dict[frozenset[str], Model] = field(default_factory=dict)
 
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
@@ -82,7 +84,14 @@ def known(setting: Setting) -> bool:
 
 
 def fitted(choice: Choice, setting: Setting) -> Model:
-    """The model of a choice made on the equations."""
+    """The model of a choice made on the equations; the plant of the same effects is made once."""
+    keys = frozenset(step.candidate.effect.key for step in choice.steps)
+    if keys not in setting.made:
+        setting.made[keys] = _model(choice, setting)
+    return replace(setting.made[keys], stage=choice.end, outcomes=choice.base)
+
+
+def _model(choice: Choice, setting: Setting) -> Model:
     near = None if setting.plain.led else setting.plain.plant.friction
     return model_of(
         choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
@@ -110,15 +119,12 @@ def suffices(alone: Model | None, choice: Choice, setting: Setting) -> bool:
     return alone is not None and (alone.led or alone.misfit <= followed(choice, setting, False))
 
 
-def fewest(
-    choice: Choice, setting: Setting, unsure: bool, alone: Model | None = None
-) -> tuple[Choice, Model]:
+def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Model]:
     """The fewest of the leading effects with which the run is followed, and the model.
 
     Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
     brings the run back to the log and its band is unknown (unsure), the one without effects of slow
-    and micro-motion, and none where they help nothing. alone: the model of the first effect as it
-    is, where it was made before.
+    and micro-motion, and none where they help nothing.
     """
     free = loose(setting.plain.plant, setting.drive)
     unsure = unsure and free
@@ -130,7 +136,7 @@ def fewest(
         part, whole = leading(choice, n), n == len(choice.steps)
         if not whole and not explained(choice.steps[n].base):
             continue
-        model = alone if n == 1 and alone is not None else fitted(part, setting)
+        model = fitted(part, setting)
         if model.led or model.misfit <= followed(part, setting, whole):
             return part, model
         if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):

@@ -127,8 +127,7 @@ def trace(
     unsure = start.band == 0.0 and not imposed
     after = before
     if choice.steps:
-        one, other = (each.steps[0].candidate.effect for each in (choice, begun))
-        choice, after = fewest(choice, setting, unsure, alone if one is other else None)
+        choice, after = fewest(choice, setting, unsure)
     if unsure:
         choice, after = doubted(choice, after, setting)
         setting = replace(setting, doubted=choice.steps)

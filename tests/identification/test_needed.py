@@ -35,6 +35,7 @@ from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
 SPRING = {"spring": {"k": 40.0}}
+SPRING_ALONE = frozenset({"spring"})
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,7 @@ def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, C
     part = leading(choice, 1)
     alone = first_alone(part, setting)
     assert alone is not None and suffices(alone, part, setting)
-    assert fewest(part, setting, False, alone)[1] is alone
+    assert fewest(part, setting, False)[1].plant is alone.plant  # made once
     assert not suffices(replace(alone, misfit=1.01 * WALKED), part, setting)
     missing = replace(part, base=setting.first)  # the spring is not explained
     assert not explained(missing.base) and first_alone(missing, setting) is None
@@ -79,12 +80,13 @@ def test_a_trifle_that_does_not_help_the_run_is_not_taken(found: tuple[Setting, 
     alone = first_alone(part, setting)
     assert alone is not None
     poor = replace(alone, misfit=1.1 * vain(slides))
-    none, model = fewest(part, slides, False, poor)
+    none, model = fewest(part, replace(slides, made={SPRING_ALONE: poor}), False)
     assert not none.steps and model is setting.plain
     assert [one.effect.key for one in none.tried][-1] == "spring"
-    assert fewest(part, setting, False, poor)[1] is poor
+    assert fewest(part, replace(setting, made={SPRING_ALONE: poor}), False)[0].steps
     helps = replace(alone, misfit=0.9 * vain(slides))
-    assert fewest(part, slides, False, helps)[1] is helps
+    kept, model = fewest(part, replace(slides, made={SPRING_ALONE: helps}), False)
+    assert kept.steps and model.misfit == helps.misfit
 
 
 def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(
