@@ -62,6 +62,12 @@ def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
     return other <= CARRIED * own or other**2 - own**2 <= little
 
 
+def share_left(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> float:
+    """Share of the square of the test logs' force error that is left; 0 without one."""
+    left, missing = after["test"].force_rms, before["test"].force_rms
+    return 0.0 if left is None or not missing else (left / missing) ** 2
+
+
 def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stage:
     """The stage of other logs with the same structure and effects taken out of their signals."""
     own = replace(stage, logs=tuple(logs), chosen=(), taken=(), scales={})

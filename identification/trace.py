@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from identification.alike import told_apart
-from identification.before_after import carries, errors_of, noise_of
+from identification.before_after import carries, errors_of, noise_of, share_left
 from identification.candidates import best_of
 from identification.choice import (
     Choice,
@@ -48,6 +48,7 @@ from identification.forward import judged_forward
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
+    IMPOSED_LEFT,
     in_run,
     left_over,
     too_much,
@@ -145,10 +146,11 @@ def trace(
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(before, slowest, (), logs, seen, drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, drive)
-    stands_in = (
-        choice.steps and explained(choice.base) and not changed
-        and not carries(errors_before, errors_after)
-    )  # fmt: skip
+    if after.led:
+        carried = share_left(errors_before, errors_after) <= IMPOSED_LEFT
+    else:
+        carried = not explained(choice.base) or carries(errors_before, errors_after)
+    stands_in = bool(choice.steps) and not changed and not carried
     if verdict != "unknown" and (stands_in or too_much(choice, after)):
         verdict = "unknown"
         left = left_over(choice, after, any_size=True)
@@ -206,9 +208,12 @@ def _remarks(
             " outside, or another loop"
         )
     if not after.led and driven_only(logs):
+        motor = (
+            " nor a dead zone of the command be told from friction" if rig.kind == "motor" else ""
+        )
         yield (
             "the force hardly ever opposes the motion, so friction in proportion to it would not"
-            " show (a run that brakes hard would show it)"
+            f" show{motor} (a run that brakes hard would show it)"
         )
     if not seen:
         yield "no test log: the test errors are those of stretches left out in turn"

@@ -2,7 +2,7 @@
 
 import pytest
 
-from identification.before_after import carries
+from identification.before_after import carries, share_left
 from identification.trace_result import Errors
 
 
@@ -28,3 +28,8 @@ def test_a_structure_carries_over_or_stands_in_for_another(
 
 def test_without_a_force_error_nothing_is_held_against_it() -> None:
     assert carries(of(None, None), of(None, None))
+    assert share_left(of(None, None), of(None, None)) == 0.0
+
+
+def test_the_share_left_is_that_of_the_test_logs() -> None:
+    assert share_left(of(1.0, 2.0), of(0.1, 1.0)) == pytest.approx(0.25)
