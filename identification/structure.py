@@ -100,6 +100,9 @@ def model_of(
             if p.name in AT_REST:  # nor do the equations tell a stick limit
                 silent[f"{effect.key}.{p.name}"] = np.inf
                 spreads.pop(p.name)
+            elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
+                silent[f"{effect.key}.{p.name}"] = np.inf
+                values[p.name] = float(np.clip(0.0, p.low, p.high))
             elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
                 values[p.name] = float(np.clip(0.0, p.low, p.high))
         acting.append(effect.acting(values))
@@ -199,7 +202,10 @@ def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def deviations(o: Outcome) -> Array:
-    """Standard deviations of theta, (k,), widened by what the rows leave and their overlap."""
+    """Standard deviations of theta, (k,), widened by what the rows leave and their overlap.
+
+    0 where a column is nothing.
+    """
     keep = o.rows.speed >= o.slowest
     A = (o.rows.X / o.rows.sd[:, np.newaxis])[keep]
     size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
