@@ -28,6 +28,7 @@ NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
 ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
+PLACES = 3  # effects of place in one machine, which rather are pieces of one that no library has
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 OWN = 0.02  # of the applied force, from which a residual is judged without it
@@ -123,6 +124,11 @@ def too_much(choice: Choice, after: Model) -> bool:
     if not choice.steps:
         return _off(after) > OFF
     return explained(choice.base) or unsized(choice, after)
+
+
+def pieces_of_place(choice: Choice) -> bool:
+    """Whether so many effects of place stand together that they are no machine's own."""
+    return sum(s.candidate.effect.depends_on == ("y",) for s in choice.steps) >= PLACES
 
 
 def unsized(choice: Choice, after: Model) -> bool:

@@ -51,6 +51,7 @@ from identification.left_over import (
     IMPOSED_LEFT,
     in_run,
     left_over,
+    pieces_of_place,
     too_much,
 )
 from identification.library import Library
@@ -151,15 +152,21 @@ def trace(
     else:
         carried = not explained(choice.base) or carries(errors_before, errors_after)
     stands_in = bool(choice.steps) and not changed and not carried
-    if verdict != "unknown" and (stands_in or too_much(choice, after)):
+    pieced = pieces_of_place(choice)
+    if verdict != "unknown" and (stands_in or pieced or too_much(choice, after)):
         verdict = "unknown"
-        left = left_over(choice, after, any_size=True)
-        if not left.depends_on and not after.led:
+        left = Dependence((), 0.0) if pieced else left_over(choice, after, any_size=True)
+        if not (left.depends_on or pieced or after.led):
             left = in_run(after, logs, drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
             left = left_over(plain, before, any_size=True)
     remarks += _remarks(choice, after, left, logs, seen, rig)
+    if pieced:
+        remarks.append(
+            "several effects of place together follow what is missing: rather pieces of one law of"
+            " place that the library does not have"
+        )
     if stands_in:
         remarks.append(
             "what explains the training logs does not explain the test logs: it stands in for"

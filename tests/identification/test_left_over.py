@@ -7,7 +7,7 @@ import pytest
 
 from identification.choice import Choice, choose, first_stage
 from identification.evidence import MECHANICAL
-from identification.left_over import in_run, left_over, too_much, unsized
+from identification.left_over import in_run, left_over, pieces_of_place, too_much, unsized
 from identification.library import built_in
 from identification.log import Rig
 from identification.outcome import Outcome
@@ -71,6 +71,23 @@ def test_an_effect_of_no_certain_size_explains_no_run(found: tuple[Choice, Model
         assert unsized(choice, told) is no_size
         assert too_much(rough, told) is no_size
         assert not too_much(rough, replace(told, misfit=2.0))
+
+
+def test_three_effects_of_place_are_pieces_of_another(found: tuple[Choice, Model]) -> None:
+    choice, _ = found
+    (spring,) = choice.steps
+
+    def of(*keys: str) -> Choice:
+        return replace(
+            choice,
+            steps=tuple(
+                replace(spring, candidate=replace(spring.candidate, effect=built_in()[key]))
+                for key in keys
+            ),
+        )
+
+    assert not pieces_of_place(of("spring", "stribeck", "cogging", "warmup"))
+    assert pieces_of_place(of("spring", "stribeck", "cogging", "tight_spot"))
 
 
 def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
