@@ -37,6 +37,7 @@ from identification.errors import UserError
 from identification.evidence import ACTUATOR, MECHANICAL, Moving, shortened
 from identification.needed import (
     DECISIVE,
+    EARNS,
     NEAR,
     Setting,
     enough,
@@ -163,7 +164,9 @@ def contest(
     # The short logs may be those stretches of which most is left.
     short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
     promising = max(NEAR, PROMISING * short)
-    screened, whole = _screening(begun, setting, promising, report)
+    promising = min(promising, earning(choice, model, setting))
+    needed = 1.0 + EARNS * (model.misfit - 1.0) if choice.steps else np.inf
+    screened, whole = _screening(begun, setting, promising, needed, report)
     if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
@@ -188,13 +191,26 @@ def contest(
     return taken if taken[0].steps[-1].p_value <= LEVEL else None
 
 
+def earning(choice: Choice, model: Model, setting: Setting) -> float:
+    """Misfit on the short logs that one effect more has to get below, beside others.
+
+    What a refinement on the short logs alone does without it is no merit of the effect.
+    """
+    if not choice.steps:
+        return np.inf
+    without = _near(model.plant, model.plant, setting).misfit
+    return np.inf if without <= COMPLETE else 1.0 + EARNS * (without - 1.0)
+
+
 def _screening(
-    begun: Sequence[Begun], setting: Setting, promising: float, report: Report
+    begun: Sequence[Begun], setting: Setting, promising: float, needed: float, report: Report
 ) -> tuple[list[Contender], dict[Contender, Refit]]:
     """The contenders refined a little on the short logs, the best first, and those of them that
     were refined on the whole logs too.
 
-    begun: from the least loss up. Once one is followed, those far behind it are not tried.
+    begun: from the least loss up. Once one is followed, those far behind it are not tried; where
+    one that follows the short logs does not get below `needed` on the whole ones, nor would others
+    that follow the short logs no better.
     """
     screened, whole = list[Contender](), dict[Contender, Refit]()
     settled_at = np.inf
@@ -205,9 +221,11 @@ def _screening(
         if found is not None:
             screened.append(found)
             followed = found.misfit <= NEARLY
-            if NEARLY < found.misfit <= HARDLY:
+            if NEARLY < found.misfit <= min(HARDLY, promising):
                 whole[found] = _whole(found, setting)
                 followed = whole[found].misfit <= COMPLETE
+                if whole[found].misfit > needed:
+                    promising = min(promising, 1.0 + EARNS * (found.misfit - 1.0))
             if followed or found in whole:
                 settled_at = min(settled_at, (BEHIND if followed else FAR_BEHIND) * one.loss)
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
