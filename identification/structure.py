@@ -114,7 +114,7 @@ def model_of(
     # Where sliding itself is not explained, no other band of a plant with effects will do.
     missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
     free = loose(plant, drive)
-    effort: Effort = "rough" if steps and missing else "whole"
+    effort: Effort = "rough" if missing and (steps or rough(outcomes)) else "whole"
     rescues = 0 if free else RESCUES
     begin = max(slow, 1e-4)
     done = refit(plant, logs, drive, band=begin, prior=prior, effort=effort, rescues=rescues)
