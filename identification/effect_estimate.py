@@ -14,7 +14,7 @@ from identification.karnopp import NAMES
 from identification.log import Log
 from identification.log_estimate import DRAWN, LIKE, MISFIT, LogEstimate
 from identification.plant import Motor
-from identification.refit import refit, values_of
+from identification.refit import RESCUES, refit, values_of
 from identification.result import Drive
 from identification.starts import starts, window_run
 
@@ -43,7 +43,8 @@ def estimate_with_effects(model: InForce, log: Log, rng: np.random.Generator) ->
     searched = found.misfit > allowed
     if searched:
         p = model.plant.friction
-        again = refit(model.plant, [one], drive, prior={}, band=max(p.dv_p, -p.dv_n))
+        band = max(p.dv_p, -p.dv_n)
+        again = refit(model.plant, [one], drive, prior={}, band=band, rescues=RESCUES)
         found = again if again.misfit < found.misfit else found
     values = values_of(found.plant, found.names)
     samples = rng.multivariate_normal(values, found.covariance, DRAWN, check_valid="ignore")

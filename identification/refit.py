@@ -225,7 +225,7 @@ def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
 
 def refit(
     plant: Plant, logs: Sequence[Moving], drive: Drive, *, prior: dict[str, float],
-    band: float = 0.0, effort: Effort = "whole", rescues: int = RESCUES,
+    band: float = 0.0, effort: Effort = "whole", rescues: int = 0,
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
 
@@ -233,7 +233,8 @@ def refit(
     deviations from the regression by name (others are free); effort: "quick" takes a few
     steps from the plant as it is, "near" goes on from there, "far" comes there through brief
     windows, "rough" looks for the band first and goes on while much is gained, "whole" as long as
-    anything is, and so many times (rescues) for another band where more than noise is left.
+    anything is; rescues: how often at most another band is looked for, where more than noise
+    is left.
     """
     quick = effort == "quick"
     searched = effort in ("rough", "whole")
@@ -294,8 +295,18 @@ def refit(
     for seconds in rounds:
         again = refined(at.x, seconds, False)
         at = again if again.followed else at
-    found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
-    for _ in range(rescues if effort == "whole" and not slow else 0):
+
+    def ended(at: Minimum) -> tuple[Minimum, float]:
+        """The minimum itself and its misfit."""
+        found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
+        if quick or not at.followed:
+            return at, found
+        finer = gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
+        left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
+        return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
+
+    at, found = ended(at)
+    for _ in range(0 if quick or slow else rescues):
         if found <= COMPLETE:
             break
         # Band and stick limits have narrow minima, and many: another one of either direction.
@@ -304,17 +315,12 @@ def refit(
         if steady:
             longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
             trial = longer if longer.followed else trial
-        better = misfit(plant_with(plant, names, full(trial.x)), logs, drive)
+        trial, better = ended(trial)
         before = found
         if better < found:
             at, found = trial, better
         if better > SAME * before:
             break
-    if at.followed and not quick:
-        finer = gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
-        left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
-        if left_by < max(found, COMPLETE):
-            at, found = finer, left_by
     if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
         # Without a spring the errors of the sub-steps add up.
         trial = refined(at.x, SECONDS, False, bristle=LONGEST_BRISTLE)

@@ -115,15 +115,18 @@ def model_of(
     missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
     free = loose(plant, drive)
     effort: Effort = "rough" if missing and (steps or rough(outcomes)) else "whole"
-    rescues = 0 if free else RESCUES
     begin = max(slow, 1e-4)
-    done = refit(plant, logs, drive, band=begin, prior=prior, effort=effort, rescues=rescues)
+    done = refit(plant, logs, drive, band=begin, prior=prior, effort=effort)
     if near is not None and not free and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
         beside = replace(plant, friction=replace(nine, **same))
-        wide = max(near.dv_p, -near.dv_n)
-        other = refit(beside, logs, drive, band=wide, prior=prior, effort=effort, rescues=rescues)
+        other = refit(
+            beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior, effort=effort
+        )
         done = other if other.misfit < done.misfit else done
+    if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
+        close = refit(done.plant, logs, drive, prior=prior, effort="near", rescues=RESCUES)
+        done = close if close.misfit < done.misfit else done
     hopeless = missing and (bool(steps) or rough(outcomes))
     smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
     if smooth and done.misfit > COMPLETE and not hopeless:
