@@ -20,6 +20,7 @@ RESTS = (0.1, 0.2, 0.4, 0.8, 1.5, 3.0, 8.0)  # of the median rest
 TYPICAL = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 POWERS = (1.3, 1.6, 2.0, 2.5, 3.0, 4.0)  # at 1 it is viscous friction itself
 REPEATS, PENDULUM = 1.5, 0.4  # periods on the travel at least, and of gravity where it turns
+ALONG = 0.5  # the same, of friction along the stroke
 SHARPEST = 0.02  # s, shortest passage of one period that the windows still show
 LONG = 1.0  # s, typical value from which a time is compared with the log and not its period
 
@@ -75,13 +76,18 @@ def _short_times(h: float) -> Array:
     return h * 2.0 ** np.arange(np.log2(SHORTEST), np.ceil(np.log2(most)) + 0.5)
 
 
+def fewest_periods(effect: Effect, one: Moving) -> float:
+    """Periods that the travel has to hold: of a force, such that it is seen to repeat; of a turning
+    machine (a pendulum swings no full turn) and of what friction does along the stroke, a good part
+    of one."""
+    return (PENDULUM if one.rotary else REPEATS) if effect.acts == "force" else ALONG
+
+
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:
-    """Periods [m], of a force such that it is seen to repeat; of a turning machine (a pendulum
-    swings no full turn) and of what friction does along the stroke, a good part of one."""
+    """Periods [m] to try."""
     slow = float(np.quantile(np.abs(one.signals["v"]), 0.5))
     shortest = max(SHARPEST * slow, 1e-3 * travel)
-    force = effect.acts == "force"
-    fewest = (PENDULUM if one.rotary else REPEATS) if force else 0.5
+    force, fewest = effect.acts == "force", fewest_periods(effect, one)
     most = max(travel / shortest, 2.0 * fewest)
     most = min(most, 200.0 if force else 12.0)
     return travel / np.arange(fewest, most + 0.25, 0.4)

@@ -6,12 +6,13 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.choice import FAR, MATERIAL, Choice
+from identification.choice import FAR, MATERIAL, Choice, Step
 from identification.dependence import MOST, dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
-from identification.needed import explained
+from identification.grids import fewest_periods
+from identification.needed import explained, leading
 from identification.outcome import Outcome, rms, spread
-from identification.refit import COMPLETE
+from identification.refit import COMPLETE, OF_PERIOD
 from identification.result import Drive
 from identification.stage import Stage, one_way
 from identification.starts import freed, position_rms, starts, window_of
@@ -126,9 +127,30 @@ def too_much(choice: Choice, after: Model) -> bool:
     return explained(choice.base) or unsized(choice, after)
 
 
-def pieces_of_place(choice: Choice) -> bool:
-    """Whether so many effects of place stand together that they are no machine's own."""
-    return sum(s.candidate.effect.depends_on == ("y",) for s in choice.steps) >= PLACES
+def places(choice: Choice) -> int:
+    """Number of effects of place; many together are rather pieces of one than a machine's own."""
+    return sum(_of_place(step) for step in choice.steps)
+
+
+def before_pieces(choice: Choice) -> Choice:
+    """The choice up to the effect of place that is one too many."""
+    many = [i for i, step in enumerate(choice.steps) if _of_place(step)][PLACES - 1 :]
+    return leading(choice, many[0]) if many else choice
+
+
+def _of_place(step: Step) -> bool:
+    return step.candidate.effect.depends_on == ("y",)
+
+
+def unrepeated(after: Model) -> bool:
+    """Whether a force repeats over more than the travel shows: it stands in for another."""
+    one = max(after.stage.logs, key=lambda each: float(np.ptp(each.log["y"])))
+    travel = float(np.ptp(one.log["y"]))
+    return any(
+        acting.values["period"] * fewest_periods(acting.effect, one) > OF_PERIOD * travel
+        for acting in after.plant.effects
+        if acting.effect.acts == "force" and "period" in acting.values
+    )
 
 
 def unsized(choice: Choice, after: Model) -> bool:

@@ -49,10 +49,13 @@ from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
     IMPOSED_LEFT,
+    PLACES,
+    before_pieces,
     in_run,
     left_over,
-    pieces_of_place,
+    places,
     too_much,
+    unrepeated,
 )
 from identification.library import Library
 from identification.log import Log, Rig
@@ -122,6 +125,8 @@ def trace(
     alone = first_alone(begun, setting)
     if begun.steps and not suffices(alone, begun, setting):
         choice = choose(start, first, library, rng, report, begun)
+    many = not before.led and places(choice) >= PLACES
+    choice = before_pieces(choice) if many else choice
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
     # What was missing may have hidden the inertia.
@@ -152,11 +157,14 @@ def trace(
     else:
         carried = not explained(choice.base) or carries(errors_before, errors_after)
     stands_in = bool(choice.steps) and not changed and not carried
-    pieced = pieces_of_place(choice)
-    if verdict != "unknown" and (stands_in or pieced or too_much(choice, after)):
+    pieced = places(choice) >= PLACES
+    pieced = pieced or (many and places(choice) > 1 and after.misfit > COMPLETE)
+    longer = not after.led and unrepeated(after)
+    if verdict != "unknown" and (stands_in or pieced or longer or too_much(choice, after)):
         verdict = "unknown"
-        left = Dependence((), 0.0) if pieced else left_over(choice, after, any_size=True)
-        if not (left.depends_on or pieced or after.led):
+        another = pieced or longer  # a law of place, which is told from what the plain model leaves
+        left = Dependence((), 0.0) if another else left_over(choice, after, any_size=True)
+        if not (left.depends_on or another or after.led):
             left = in_run(after, logs, drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
@@ -166,6 +174,10 @@ def trace(
         remarks.append(
             "several effects of place together follow what is missing: rather pieces of one law of"
             " place that the library does not have"
+        )
+    if longer:
+        remarks.append(
+            "a force is said to repeat over more than the travel shows: it stands in for another"
         )
     if stands_in:
         remarks.append(

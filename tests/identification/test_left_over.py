@@ -5,9 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.choice import Choice, choose, first_stage
+from identification.choice import Choice, Step, choose, first_stage
 from identification.evidence import MECHANICAL
-from identification.left_over import in_run, left_over, pieces_of_place, too_much, unsized
+from identification.left_over import (
+    before_pieces,
+    in_run,
+    left_over,
+    places,
+    too_much,
+    unrepeated,
+    unsized,
+)
 from identification.library import built_in
 from identification.log import Rig
 from identification.outcome import Outcome
@@ -77,17 +85,33 @@ def test_three_effects_of_place_are_pieces_of_another(found: tuple[Choice, Model
     choice, _ = found
     (spring,) = choice.steps
 
-    def of(*keys: str) -> Choice:
-        return replace(
-            choice,
-            steps=tuple(
-                replace(spring, candidate=replace(spring.candidate, effect=built_in()[key]))
-                for key in keys
-            ),
-        )
+    def step_of(key: str) -> Step:
+        effect = built_in()[key]
+        values = {p.name: p.typical for p in effect.params}
+        return replace(spring, candidate=replace(spring.candidate, effect=effect, values=values))
 
-    assert not pieces_of_place(of("spring", "stribeck", "cogging", "warmup"))
-    assert pieces_of_place(of("spring", "stribeck", "cogging", "tight_spot"))
+    def of(*keys: str) -> Choice:
+        return replace(choice, steps=tuple(step_of(key) for key in keys))
+
+    two = of("spring", "stribeck", "cogging", "warmup")
+    assert places(two) == 2
+    assert before_pieces(two) is two
+    three = of("spring", "cogging", "warmup", "tight_spot", "stribeck")
+    assert places(three) == 3
+    assert before_pieces(three).steps == three.steps[:3]
+
+
+def test_a_force_repeats_only_over_what_the_travel_shows(found: tuple[Choice, Model]) -> None:
+    _, after = found
+    travel = float(np.ptp(after.stage.logs[0].log["y"]))
+
+    def along(key: str, periods: float) -> Model:
+        values = {"a": 1.0, "period": travel / periods}
+        return replace(after, plant=plant({key: values}))
+
+    assert not unrepeated(along("cogging", 1.5))
+    assert unrepeated(along("cogging", 1.2))
+    assert not unrepeated(along("position_dependent_friction", 1.2))  # of which a part may show
 
 
 def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
