@@ -9,7 +9,7 @@ from scipy.fft import rfft
 from identification.arrays import Array, BoolArray, IntArray
 from identification.trace_result import Dependence
 
-BINS = (10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
+BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
 FEW = 8  # values of a signal (a switch, a gear) that are told apart each by itself
 LEAST = 0.08  # share of the residual, on blocks left out, from which it depends on a signal
 MOST = 3  # signals named

@@ -1,6 +1,6 @@
 """The structure that is left when nothing more is found: on which signals it depends."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray, IntArray
 from identification.choice import FAR, MATERIAL, Choice, Step
 from identification.dependence import MOST, dependence
-from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, Moving
+from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, REST, Moving
 from identification.grids import fewest_periods
 from identification.needed import explained, leading
 from identification.outcome import Outcome, rms, spread
@@ -32,7 +32,6 @@ OFF = 1e-3  # if its error is this share of the position's spread
 PLACES = 3  # effects of place in one machine, which rather are pieces of one that no library has
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
-OWN = 0.02  # of the applied force, from which a residual is judged without it
 STRETCHES = 64  # of a log, every eighth of which is left out together
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
 
@@ -40,45 +39,89 @@ LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, str
 def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Dependence:
     """The strongest structure that is left in any equation, if there is any.
 
-    any_size: however little of what was missing it is.
+    any_size: however little of what was missing it is, as something surely is missing.
     """
-    best = Dependence((), 0.0)
+    best, most = Dependence((), 0.0), 0.0
     # A body that creeps in short stops is no rest, and a run that is followed does it too.
     calm = not after.led and after.misfit <= ASTRAY
     for equation, o in choice.base.items():
+        if o.robust and ((calm and not any_size) or spread(o) < RESTLESS):
+            continue
         keep = judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:
             keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
-        if np.count_nonzero(keep) < FEWEST_ROWS or (o.robust and (calm or spread(o) < RESTLESS)):
+        found = _in_equation(choice, equation, keep)
+        if found is None:
             continue
-        signals = {k: v[keep] for k, v in signals_at(choice.end, equation).items()}
-        if equation == BREAKAWAY:  # force and command at breakaway are what is judged
-            signals = {k: v for k, v in signals.items() if k not in ("F", "u", "v", "reversal")}
-        if equation == MECHANICAL and rms(o.fit.residual * o.rows.sd) > OWN * rms(o.rows.b):
-            signals.pop("F", None)  # a large residual is itself a good part of F
-        if any(effect.acts == "bristle" for effect, _ in choice.end.chosen):
-            signals.pop("reversal", None)  # its rise is judged in the free run
-        r = o.fit.residual[keep]
-        if o.robust:
-            limit = 3.0 * np.sqrt(max(spread(o), 1.0))
-            r = np.clip(r, -limit, limit)
-        way = np.asarray(signals.get("v", r) >= 0)
-        n = len(r)  # fine stretches in turn, or no function of time could be judged
-        found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
-        left = found.explained * float(np.mean(r**2))
-        whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
-        rough = bool(choice.steps) and spread(o) > FAR
-        part = ROUGH_LEFT if rough else SHARE_LEFT
-        if not found.depends_on or left < STRUCTURED:
+        named, left = found
+        if not named.depends_on:
             continue
-        size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
-        if not any_size and size**2 < part * whole:
-            continue
-        if size < LEFT_LEAST.get(equation, 0.0) * _level(choice):
-            continue
-        if found.explained > best.explained:
-            best = found
+        if not any_size:
+            size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
+            whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
+            rough = bool(choice.steps) and spread(o) > FAR
+            part = ROUGH_LEFT if rough else SHARE_LEFT
+            least = LEFT_LEAST.get(equation, 0.0) * _level(choice)
+            if left < STRUCTURED or size**2 < part * whole or size < least:
+                continue
+        if (much := left * np.count_nonzero(keep)) > most:
+            best, most = named, much
     return best
+
+
+def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Dependence, float] | None:
+    """On what an equation's residual depends at these rows, and the square [noise units] that the
+    signals named explain; None where there are too few rows."""
+    o = choice.base[equation]
+    if np.count_nonzero(keep) < FEWEST_ROWS:
+        return None
+    every = signals_at(choice.end, equation)
+    way = _upward(choice.end, equation, every)[keep]
+    held = all(one.held for one in choice.end.logs)
+    if equation == BREAKAWAY:  # force and command at breakaway are what is judged
+        every = {k: v for k, v in every.items() if k not in ("F", "u", "v", "reversal")}
+    if equation == MECHANICAL:
+        # Of the measured force the residual is itself a part: the model's is judged.
+        every["F"] = o.rows.b - o.fit.residual * o.rows.sd
+        if held:
+            every.pop("u", None)
+    if equation == REST:  # as it is told there, it is the position's own noise
+        every.pop("v")
+    if any(effect.acts == "bristle" for effect, _ in choice.end.chosen):
+        every.pop("reversal", None)  # its rise is judged in the free run
+    signals = {k: v[keep] for k, v in every.items()}
+    r = o.fit.residual[keep]
+    if o.robust:
+        limit = 3.0 * np.sqrt(max(spread(o), 1.0))
+        r = np.clip(r, -limit, limit)
+        # Those far off draw on the mean, on which no signal has a part.
+        r = r - np.where(way, _mean(r[way]), _mean(r[~way]))
+    n = len(r)  # fine stretches in turn, or no function of time could be judged
+    found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
+    names = found.depends_on
+    if equation == REST and names:  # it is left since the body stands still, and not before
+        names = (*names, "reversal")
+    named = replace(found, depends_on=_with_command(names, held))
+    return named, found.explained * float(np.mean(r**2))
+
+
+def _upward(stage: Stage, equation: str, signals: Mapping[str, Array]) -> BoolArray:
+    """Whether each row of an equation moves, starts or is pushed in positive direction, (r,)."""
+    if equation == BREAKAWAY:
+        return np.concatenate([events.direction > 0 for events in stage.events])
+    return np.asarray(signals["F" if equation == REST else "v"] >= 0)
+
+
+def _mean(r: Array) -> float:
+    """Mean, 0 of nothing."""
+    return float(np.mean(r)) if len(r) else 0.0
+
+
+def _with_command(names: tuple[str, ...], held: bool) -> tuple[str, ...]:
+    """Signals named (k,), the command beside its rate and, where it makes the force, the force."""
+    also = {"du": ("u",), "F": ("u",) if held else (), "u": ("F",) if held else ()}
+    every = [each for name in names for each in (name, *also.get(name, ()))]
+    return tuple(dict.fromkeys(every))[:MOST]
 
 
 def _excess(o: Outcome) -> float:
@@ -213,8 +256,9 @@ def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
     each = sorted((one for one in each if one.depends_on), key=lambda one: -one.explained)
     if not each:
         return Dependence((), 0.0)
-    named = dict.fromkeys(name for one in each for name in one.depends_on)
-    return replace(each[0], depends_on=tuple(named)[:MOST])
+    named = tuple(dict.fromkeys(name for one in each for name in one.depends_on))
+    held = all(one.held for one in logs)
+    return replace(each[0], depends_on=_with_command(named, held))
 
 
 def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> Array:
@@ -229,20 +273,20 @@ def signals_at(stage: Stage, equation: str) -> dict[str, Array]:
     """Signals that vary, at the middle of an equation's rows over all logs."""
     out: dict[str, list[Array]] = {}
     for i, one in enumerate(stage.logs):
-        if equation == MECHANICAL:
-            middle = one.sliding.middle
-        elif equation == ACTUATOR and one.whole is not None:
-            middle = one.whole.middle
-        elif equation == BREAKAWAY:
+        rows = one.sliding if equation == MECHANICAL else one.whole
+        if equation == BREAKAWAY:
             middle = stage.events[i].at
-        else:
+        elif equation == REST:
             middle = stage.at_rest[i].start
+        else:
+            assert rows is not None
+            middle = rows.middle
         s = one.signals
         own = {k: v[middle] for k, v in s.items() if k not in NOT_SIGNALS}
         own["t"] = s["t"][middle] - s["t"][0]
         own["reversal"] = since_reversal(s["d"], one.log.h)[middle]
-        if equation == ACTUATOR:
-            own["du"] = np.gradient(s["u"], one.log.h)[middle]
+        if rows is not None and (equation == ACTUATOR or (equation == MECHANICAL and one.held)):
+            own["du"] = rows.first @ s["u"]
         if equation == BREAKAWAY:
             own["rest"] = stage.events[i].rested
         for k, v in own.items():

@@ -40,10 +40,10 @@ def strokes(n: int, seed: int) -> Array:
 
 def made(
     seed: int, effects: Mapping[str, Mapping[str, float]] | None = None, n: int = 10_000,
-    friction: Karnopp = NINE,
+    friction: Karnopp = NINE, command: Array | None = None,
 ) -> Log:  # fmt: skip
-    """20 s at 500 Hz with the paper's position noise."""
-    rng, u = np.random.default_rng(seed + 1), strokes(n, seed)
+    """20 s at 500 Hz with the paper's position noise; command: [V], (n,), otherwise strokes."""
+    rng, u = np.random.default_rng(seed + 1), strokes(n, seed) if command is None else command
     blank = Log(f"motor{seed}", {"t": H * np.arange(n, dtype=np.float64), "u": u, "y": np.zeros(n)})
     run = free_run(plant(effects, friction), blank, (0.0, 0.0, 0.0), "command")
     return blank.with_signals(y=run.shown + NOISE * rng.standard_normal(n), F=K_A * u)

@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import butter, lfilter
 
+from identification.arrays import Array
 from identification.choice import Choice, Step, choose, first_stage
-from identification.evidence import MECHANICAL
+from identification.evidence import BREAKAWAY, MECHANICAL
 from identification.left_over import (
     before_pieces,
     in_run,
@@ -20,7 +22,7 @@ from identification.library import built_in
 from identification.log import Rig
 from identification.outcome import Outcome
 from identification.structure import Model, model_of
-from tests.identification.motor_logs import K_A, made, plant, seen
+from tests.identification.motor_logs import K_A, H, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
 SPRING = {"spring": {"k": 40.0}}
@@ -139,3 +141,52 @@ def test_the_run_tells_on_what_its_error_depends(
     named = set(in_run(replace(after, plant=plant({})), [one], "command").depends_on)
     assert bool(named & signals) is bool(signals)
     assert "t" not in named  # an error lasts, and a function of time would copy it
+
+
+def shaken(n: int = 10_000) -> Array:
+    """A random command [V] that changes as fast as the motor follows."""
+    rough = np.random.default_rng(3).standard_normal(n)
+    b, a = butter(2, 6.0, fs=1.0 / H)
+    smooth = np.asarray(lfilter(b, a, rough))
+    return 1.2 * smooth / float(np.std(smooth))
+
+
+def lacking(effects: dict[str, dict[str, float]], *, fast: bool = False) -> tuple[Choice, Model]:
+    """A motor with effects that no library has: the plain model's choice, and its run."""
+    one = seen(made(5, effects, command=shaken() if fast else None))
+    start, first = first_stage([one], False)
+    rng = np.random.default_rng(0)
+    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    return Choice(start, first, (), start, first), plain
+
+
+@pytest.mark.parametrize(
+    ("missing", "signals"),
+    [
+        ({"input_delay": {"tau": 0.004}}, ("du", "u")),  # a motor's command makes the force
+        ({"nonlinear_viscous": {"k": 60.0, "n": 2.5}}, ("v",)),  # and not the force, which follows
+        ({"presliding": {"sigma_0": 6e4}}, ("reversal",)),  # a body at rest that moves
+        ({"stribeck": {"F_s": 1.0, "v_s": 0.05}}, ("v",)),
+    ],
+)
+def test_equations_tell_on_what_is_left_depends(
+    missing: dict[str, dict[str, float]], signals: tuple[str, ...]
+) -> None:
+    choice, after = lacking(missing, fast="input_delay" in missing)
+    named = left_over(choice, after, any_size=True).depends_on
+    assert set(signals) <= set(named), named
+    assert named[0] == signals[0] or signals == ("reversal",)
+
+
+def test_the_plain_machine_leaves_nothing_of_any_size() -> None:
+    choice, after = lacking({})
+    assert left_over(choice, after, any_size=True).depends_on == ()
+
+
+def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() -> None:
+    choice, after = lacking({"rising_stiction": {"F_r": 6.0, "tau": 0.3}})
+    o = choice.base[BREAKAWAY]
+    noise = np.random.default_rng(1).standard_normal(len(o.fit.residual))
+    wild = replace(o, fit=replace(o.fit, residual=3.0 * noise))
+    found = left_over(replace(choice, base={BREAKAWAY: wild}), after, any_size=True)
+    assert found.depends_on == ()
