@@ -35,10 +35,17 @@ RUNS = {
     "t": "the same motion cold and, after running warm, once more",
     "F": "the same motion with and without an added load, and hard braking",
     "u": "a slow triangle of the command through zero",
+    "du": "sharp steps of the command, logged at a high rate",
     "p_p": "the same motion at several chamber pressures",
     "p_n": "the same motion at several chamber pressures",
     "rest": "breakaways after rests of 0.1 s to 30 s",
     "reversal": "small slow reversals below and just above breakaway",
+}
+# Signals that are in no log by that name.
+SAID = {
+    "du": "the command's rate (du)",
+    "reversal": "the time since it last reversed or stopped (reversal)",
+    "rest": "the time at rest (rest)",
 }
 POSITION = "position"  # the residual of the free run
 SHOWN = 6  # rivals of each effect
@@ -124,8 +131,13 @@ def next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
         return "to find what swings: a log at standstill, without and with the machines around"
     if verdict == "unknown":
         how = RUNS.get(left.depends_on[0], f"runs in which {left.depends_on[0]} varies by itself")
-        return f"to find what depends on {', '.join(left.depends_on)}: {how}"
+        return f"to find what depends on {listed(left.depends_on)}: {how}"
     return ""
+
+
+def listed(signals: Sequence[str]) -> str:
+    """Signals in words, those that no log has with what they are."""
+    return ", ".join(SAID.get(name, name) for name in signals)
 
 
 def parameters_of(model: Model, rig: Rig) -> dict[str, Estimate]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from identification.chance import DRAWS
 from identification.effects._base import GIVES
+from identification.findings import listed
 from identification.result import Estimate
 from identification.trace_result import Change, Errors, FoundEffect, Rival, Trace
 from workbench.parameter_units import shown
@@ -73,7 +74,7 @@ def sentence(traced: Traced) -> str:
             rival = f" They do not tell it from {others}." if others else ""
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _:
-            signals = ", ".join(found.unknown.depends_on)
+            signals = listed(found.unknown.depends_on)
             if not signals:
                 return f"Unknown: {unexplained(traced)}"
             share = f"{100 * found.unknown.explained:.0f} %"

@@ -171,6 +171,12 @@ def test_the_verdict_is_a_plain_sentence(
     assert (errors in text) == bool(keys)
 
 
+def test_signals_that_no_log_has_are_said_in_words() -> None:
+    found = replace(trace_of("unknown", ()), unknown=Dependence(("du", "u"), 0.4))
+    text = sentence(traced(found))
+    assert "depends on the command's rate (du), u (which" in text
+
+
 def test_what_is_left_without_structure_is_not_called_noise() -> None:
     text = sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
     assert text.startswith("No effect is missing that these logs show: what is left (0.07 N")
