@@ -286,7 +286,7 @@ def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None =
     """
     A, c = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
     mask = np.ones(len(c), dtype=bool) if keep is None else keep
-    scale = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    scale = of_column(A)
 
     def least_squares(at: IntArray) -> Array:
         theta = np.linalg.lstsq(A[np.ix_(mask, at)] / scale[at], c[mask], rcond=1e-10)[0]
@@ -296,6 +296,12 @@ def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None =
     theta = non_negative(least_squares, A.shape[1], none if positive is None else positive)
     residual = c - A @ theta
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
+
+
+def of_column(A: Array) -> Array:
+    """Root mean square of each column (k,); 1 of nothing, whose parameter then comes out 0."""
+    size = np.sqrt(np.mean(A**2, axis=0))
+    return np.asarray(np.where(size > 0.0, size, 1.0))
 
 
 def non_negative(fit: Callable[[IntArray], Array], k: int, positive: IntArray) -> Array:

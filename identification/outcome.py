@@ -14,6 +14,7 @@ from identification.evidence import (
     Fitted,
     Rows,
     non_negative,
+    of_column,
     solve,
     stacked,
 )
@@ -59,7 +60,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
         return Outcome(rows, fit, fit.cost / scale + rows.lost, 0.0)
     edges = np.quantile(rows.speed, TRIMS)
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
-    size = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    size = of_column(A)
     whitened = A / size
     bins = np.digitize(rows.speed, edges[1:])
     ordered = whitened[np.argsort(bins, kind="stable")]

@@ -111,8 +111,11 @@ def model_of(
     plant = Plant(nine, drives, tuple(acting))
     if drive == "force" and led(outcomes[MECHANICAL]):
         return Model(stage, outcomes, plant, prior | silent, True)
-    # Where sliding itself is not explained, no other band of a plant with effects will do.
-    missing = any(spread(outcomes[e]) > MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in outcomes)
+    # Where sliding itself is not explained, no other band of a plant with effects will do. A state
+    # follows the velocity as the log tells it, so even of the right effect more than noise is left.
+    remembers = any(s.candidate.effect.evolve and s.candidate.effect.acts == "slip" for s in steps)
+    left = [spread(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
+    missing = max(left) > MUCH**2 and not remembers
     free = loose(plant, drive)
     effort: Effort = "rough" if missing and (steps or rough(outcomes)) else "whole"
     begin = max(slow, 1e-4)

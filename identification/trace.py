@@ -307,6 +307,13 @@ def _enough(logs: Sequence[Moving]) -> None:
             f"{logs[0].log.name}: {rows} stretches of sliding in one direction long enough to"
             f" judge ({FEWEST_ROWS} needed); log longer or faster motion"
         )
+    up = np.concatenate([one.up for one in logs])
+    if np.all(up) or not np.any(up):
+        way = "negative" if up[0] else "positive"
+        raise NotIdentifiable(
+            f"{logs[0].log.name}: no stretch of sliding in {way} direction is long enough to judge;"
+            " log motion in both directions (identify takes one direction alone)"
+        )
     share = float(np.mean(np.concatenate([one.signals["d"] != 0 for one in logs])))
     if share < SLIDES and rows < MANY_ROWS:
         raise NotIdentifiable(

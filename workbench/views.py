@@ -57,7 +57,7 @@ def in_digits(values: Iterable[float], size: float, sd: float | None) -> list[st
     import math
 
     digits = 4
-    if sd and size:
+    if sd and size and math.isfinite(sd):
         digits = max(2, math.ceil(math.log10(abs(size) / sd)) + 2)
     return [f"{value:#.{min(digits, 8)}g}".rstrip(".") for value in values]
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.errors import NotIdentifiable
 from identification.karnopp import Karnopp
 from identification.library import Library, built_in
 from identification.log import Log, Rig
@@ -63,6 +64,17 @@ def made(
 
 def traced(train: Log, *test: Log, library: Library | None = None) -> Trace:
     return trace([train], list(test), RIG, library or built_in(), np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(("way", "missing"), [(1.0, "negative"), (-1.0, "positive")])
+def test_motion_in_one_direction_alone_is_refused(way: float, missing: str) -> None:
+    t = H * np.arange(15_000, dtype=np.float64)
+    speed = 0.1 * np.maximum(np.sin(2.0 * np.pi * 0.5 * t), 0.0)
+    noise = 1e-5 * np.random.default_rng(0).standard_normal(len(t))
+    y, force = way * H * np.cumsum(speed) + noise, way * (5.0 + 20.0 * speed)
+    one = Log("oneway.csv", {"t": t, "y": y, "F": force})
+    with pytest.raises(NotIdentifiable, match=f"oneway.csv: no stretch .* in {missing} direction"):
+        trace([one], [], RIG, built_in(), np.random.default_rng(0))
 
 
 def test_nothing_is_missing_where_nothing_is() -> None:
