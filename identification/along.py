@@ -65,13 +65,15 @@ def contribution(
     """`value` of an effect along a motion, (n,), in the unit of what it gives.
 
     signals: t, y, v, F, u, d (direction, 0 at rest) and those that the effect uses, (n,) each;
-    those that it may miss read as 0. friction: for the levels c and f.
+    those that it may miss read as 0. friction: for the levels c and f. What acts on the command
+    has the command's direction, as in a run (`acting_command`).
     """
     n = len(signals["t"])
     q = np.zeros(MAX_PARAMS)
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
-    d = signals["d"].astype(np.int64, copy=False)
+    way = np.where(signals["u"] >= 0.0, 1, -1) if effect.acts == "command" else signals["d"]
+    d = way.astype(np.int64, copy=False)
     up = friction.F_cp, friction.F_vp, friction.F_sp
     down = friction.F_cn, friction.F_vn, -friction.F_sn
     s = np.zeros((n, max(1, len(effect.signals))))

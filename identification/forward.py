@@ -77,9 +77,9 @@ WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
 AHEAD = 4  # first of those begun, tried where two effects are there already: each takes long
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
-HARDLY = 2.5  # misfit of one that hardly falls short of being followed
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
+LOST = 3.0  # misfit after a first search, of one no longer tried where another is followed by then
 Report = Callable[[str, float], None]
 
 
@@ -95,13 +95,14 @@ class Contender:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A trial after a first search: the plant before and after it, what that leaves, and other
-    plants to begin from."""
+    """A trial after a first search: the plant before and after it, what that leaves (a run led
+    along the log where nothing else holds it, and one let go), and other plants to begin from."""
 
     trial: Trial
     start: Plant
     plant: Plant
     loss: float
+    misfit: float
     others: tuple[Plant, ...]
 
 
@@ -123,6 +124,19 @@ def judged_forward(
     if called_for and not choice.steps:  # the equations were wrong: what the run lacks is open
         return judged_forward(choice, model, setting, report)
     return choice, model
+
+
+def at_once(
+    choice: Choice, model: Model, setting: Setting, report: Report
+) -> tuple[Choice, Model] | None:
+    """The choice and its model with one effect more, where a first search in the run finds one
+    with which nothing is missing."""
+    free = loose(model.plant, setting.drive)
+    if model.led or (on_bristle(model.plant) and free):
+        return None
+    short = cut_short(choice, model, setting)
+    found = contest(choice, model, replace(setting, short=short), report, at_once=True)
+    return found if found is not None and found[1].misfit <= COMPLETE else None
 
 
 def cut_short(choice: Choice, model: Model, setting: Setting) -> list[Moving]:
@@ -150,15 +164,21 @@ def hidden(choice: Choice, free: bool) -> bool:
 
 
 def contest(
-    choice: Choice, model: Model, setting: Setting, report: Report
+    choice: Choice, model: Model, setting: Setting, report: Report, *, at_once: bool = False
 ) -> tuple[Choice, Model] | None:
-    """The best structure of one effect more, or of another in an effect's place, if decisive."""
+    """The best structure of one effect more, or of another in an effect's place, if decisive.
+
+    at_once: only where a first search already follows the short logs with one.
+    """
+    begun = list[Begun]()
     tried = list(structures(choice, model, setting))
-    begun: list[Begun] = []
     for i, attempt in enumerate(tried):
         begun += _begun(attempt, setting)
         report("judging", 0.5 * (i + 1) / len(tried))
-    begun.sort(key=lambda one: one.loss)
+    # What a sensor shows leads the run astray, so its loss tells nothing.
+    begun.sort(key=lambda one: (one.misfit > NEARLY, one.loss))
+    if at_once and not (begun and begun[0].misfit <= NEARLY):
+        return None
     many = len(choice.steps) > 1
     begun = begun[:AHEAD] if many else begun
     # The short logs may be those stretches of which most is left.
@@ -166,17 +186,18 @@ def contest(
     promising = max(NEAR, PROMISING * short)
     promising = min(promising, earning(choice, model, setting))
     needed = 1.0 + EARNS * (model.misfit - 1.0) if choice.steps else np.inf
-    screened, whole = _screening(begun, setting, promising, needed, report)
+    screened = _screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
     for finalist in screened[: 1 if many else FINALISTS]:
         if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
             break
-        found = whole.get(finalist) or _whole(finalist, setting)
+        found = _whole(finalist, setting)
         if best is None or found.misfit < best[0].misfit:
             best = found, finalist
-        if found.misfit <= COMPLETE:
+        # Those that follow the short logs no better would not do either.
+        if found.misfit <= COMPLETE or found.misfit > needed:
             break
     if best is None:
         return None
@@ -203,33 +224,26 @@ def earning(choice: Choice, model: Model, setting: Setting) -> float:
 
 
 def _screening(
-    begun: Sequence[Begun], setting: Setting, promising: float, needed: float, report: Report
-) -> tuple[list[Contender], dict[Contender, Refit]]:
-    """The contenders refined a little on the short logs, the best first, and those of them that
-    were refined on the whole logs too.
+    begun: Sequence[Begun], setting: Setting, promising: float, report: Report
+) -> list[Contender]:
+    """The contenders refined a little on the short logs, the best first.
 
-    begun: from the least loss up. Once one is followed, those far behind it are not tried; where
-    one that follows the short logs does not get below `needed` on the whole ones, nor would others
-    that follow the short logs no better.
+    begun: those followed first, then from the least loss up. Once one is followed, those far behind
+    it are not tried.
     """
-    screened, whole = list[Contender](), dict[Contender, Refit]()
-    settled_at = np.inf
+    screened = list[Contender]()
+    settled_at, lost = np.inf, np.inf
     for i, one in enumerate(begun):
-        if one.loss > settled_at:
-            break
+        if one.loss > settled_at or one.misfit > lost:
+            continue
         found = _screened(one, setting, promising)
         if found is not None:
             screened.append(found)
-            followed = found.misfit <= NEARLY
-            if NEARLY < found.misfit <= min(HARDLY, promising):
-                whole[found] = _whole(found, setting)
-                followed = whole[found].misfit <= COMPLETE
-                if whole[found].misfit > needed:
-                    promising = min(promising, 1.0 + EARNS * (found.misfit - 1.0))
-            if followed or found in whole:
-                settled_at = min(settled_at, (BEHIND if followed else FAR_BEHIND) * one.loss)
+            if found.misfit <= NEARLY:
+                settled_at = min(settled_at, BEHIND * one.loss)
+                lost = LOST if one.misfit <= NEARLY else lost
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
-    return sorted(screened, key=lambda one: one.misfit), whole
+    return sorted(screened, key=lambda one: one.misfit)
 
 
 def scales_alone(effect: Effect, plant: Plant, logs: Sequence[Moving]) -> bool:
@@ -290,7 +304,8 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
         elif trial.effect.acts == "sensor" and len(trial.effect.params) == 1:
             # The plain parameters are bent to do without it: a larger size may be the better start.
             others = tuple(plants[at + 1 : at + LARGER])
-        return [Begun(trial, plants[at], first, loss(errors_of(first)), others)]
+        left_by = misfit(first, setting.short, setting.drive)
+        return [Begun(trial, plants[at], first, loss(errors_of(first)), left_by, others)]
     except UserError:  # two effects of a kind that a plant takes one of
         return []
 

@@ -44,7 +44,7 @@ from identification.findings import (
     run_residual,
     verdict_of,
 )
-from identification.forward import judged_forward
+from identification.forward import at_once, judged_forward
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
@@ -133,7 +133,12 @@ def trace(
     imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
     unsure = start.band == 0.0 and not imposed
     after = before
-    if choice.steps:
+    # Where the first effect leaves next to nothing of the equations, the run may tell the next.
+    more = alone is not None and 0 < len(alone.plant.effects) < len(choice.steps)
+    found = at_once(begun, alone, setting, report) if alone is not None and more else None
+    if found is not None:
+        choice, after = found
+    elif choice.steps:
         choice, after = fewest(choice, setting, unsure)
     if unsure:
         choice, after = doubted(choice, after, setting)

@@ -5,9 +5,10 @@ A kernel is a plain function of floats
     value(t, y, v, F, u, d, z, c, f, s, p) -> float
 
 t [s] since the log's start, y [m], v [m/s] of the body, F applied force [N], u command [V];
-d direction: +1 or -1 (0 at rest, in `evolve`); z the effect's own state; c Coulomb level and f
-whole friction of the nine parameters in direction d [N], positive (at rest both are the stick
-limit); s the signals of `signals` in their order, p the parameters in the order of `params`.
+d direction: +1 or -1 (0 at rest, in `evolve`), of u where the effect acts on the command; z the
+effect's own state; c Coulomb level and f whole friction of the nine parameters in direction d [N],
+positive (at rest both are the stick limit); s the signals of `signals` in their order, p the
+parameters in the order of `params`.
 Rotary rigs use rad, N m and kg m^2 in the same places.
 """
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.along import contribution
 from identification.arrays import Array
 from identification.library import built_in
 from identification.log import Log
@@ -56,6 +57,14 @@ def test_dead_zone_is_a_smaller_command(motor: bool) -> None:
     width = np.where(U >= 0, 0.045, 0.015)
     expected = plain(np.sign(U) * np.maximum(np.abs(U) - width, 0.0), motor=motor)
     assert np.max(np.abs(found.y - expected.y)) < 1e-14
+
+
+def test_dead_zone_along_a_motion_is_of_the_direction_of_the_command() -> None:
+    acting = built_in()["valve_dead_zone"].acting({"u_d": 0.03, "asymmetry": 0.5})
+    signals = {"t": T, "y": T, "v": T, "F": T, "u": U, "d": -np.sign(U)}
+    given = contribution(acting.effect, acting.values, signals, H, table(1))
+    width = np.where(U >= 0, 0.045, 0.015)
+    assert np.allclose(given, np.sign(U) * np.maximum(np.abs(U) - width, 0.0), atol=1e-15)
 
 
 @pytest.mark.parametrize("motor", [False, True])
