@@ -72,11 +72,12 @@ class Range:
 FAR = Range(0.03, 0.0, 2.5, 4.0, True)
 SLIDING = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
 TOLD = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
-BREAKS = Range(0.004, 0.03, 2.0, 2.0, False)  # where breakaways tell the stick limits
+BREAKS = Range(0.004, 0.12, 8.0, 3.0, False)  # growth may have bent stick limits and bands
 MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
 CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
 SIDES = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be unequal
-GROWTH = Range(0.0, 0.01, 1.02, 2.0, False)  # where sliding is known, growing stiction is not
+GROWTH = Range(0.0, 0.01, 1.02, 3.0, False, 0.5)  # where sliding is known, growing stiction is not
+FINER = Range(0.0, 0.003, 1.01, 1.3, False, 0.1)  # the same, nearly found
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
 SHORT = 15.0  # s of each log on which a search from afar is made
 SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before

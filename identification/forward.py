@@ -17,6 +17,7 @@ from identification.approach import (
     BREAKS,
     CLOSE,
     FAR,
+    FINER,
     GROWTH,
     MIDWAY,
     NEARLY,
@@ -59,6 +60,7 @@ from identification.refit import (
     loss,
     misfit,
     on_bristle,
+    onward,
     refit,
     start_band,
 )
@@ -356,17 +358,8 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
 
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    plant = one.plant
-    if one.effect.acts == "stiction" and loose(plant, setting.drive):
-        # A breakaway is at one sample or the next, so a small change of its limit changes nothing.
-        stage = (0.0, GROWTH)
-        near = approach(plant, setting.logs, setting.drive, setting.rng, (stage,))
-        plant = nearer((plant, near), setting.logs, setting.drive)
-    found = refined(plant, setting)
-    if one.effect.acts == "stiction" and COMPLETE < found.misfit < UNEVEN:
-        # Where each start hangs on the rest before it, minima are many and narrow.
-        again = closer(found.plant, setting.logs, setting.drive, setting.rng)
-        found = again if again.misfit < found.misfit else found
+    growth = one.effect.acts == "stiction" and loose(one.plant, setting.drive)
+    found = _grown(one, setting) if growth else refined(one.plant, setting)
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
@@ -374,6 +367,28 @@ def _whole(one: Contender, setting: Setting) -> Refit:
             again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES)
             found = again if again.misfit < found.misfit else found
     return found
+
+
+def _grown(one: Contender, setting: Setting) -> Refit:
+    """A contender of growing stiction, searched and refined on the whole logs in turn.
+
+    A breakaway is at one sample or the next, so a small change of its limit changes nothing, and
+    where each start hangs on the rest before it, minima are many and narrow.
+    """
+    logs, drive = setting.logs, setting.drive
+    begins = [one.plant]
+    if not one.steps and setting.plain.misfit <= NEAR:  # all but the rare late breakaways
+        begins.append(replace(one.plant, friction=setting.plain.plant.friction))
+    best: Refit | None = None
+    for around in (GROWTH, GROWTH, FINER, FINER):
+        near = [approach(x, logs, drive, setting.rng, ((0.0, around),)) for x in begins]
+        found = onward(nearer((*begins, *near), logs, drive), logs, drive)
+        best = found if best is None or found.misfit < best.misfit else best
+        if not COMPLETE < best.misfit < UNEVEN:
+            break
+        begins = [best.plant]
+    assert best is not None
+    return best
 
 
 def _taken(
