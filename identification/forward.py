@@ -137,7 +137,7 @@ def at_once(
     if model.led or (on_bristle(model.plant) and free):
         return None
     short = cut_short(choice, model, setting)
-    found = contest(choice, model, replace(setting, short=short), report, at_once=True)
+    found = contest(choice, model, replace(setting, short=short), report, quickly=True)
     return found if found is not None and found[1].misfit <= COMPLETE else None
 
 
@@ -166,11 +166,11 @@ def hidden(choice: Choice, free: bool) -> bool:
 
 
 def contest(
-    choice: Choice, model: Model, setting: Setting, report: Report, *, at_once: bool = False
+    choice: Choice, model: Model, setting: Setting, report: Report, *, quickly: bool = False
 ) -> tuple[Choice, Model] | None:
     """The best structure of one effect more, or of another in an effect's place, if decisive.
 
-    at_once: only where a first search already follows the short logs with one.
+    quickly: only where a first search already follows the short logs with one.
     """
     begun = list[Begun]()
     tried = list(structures(choice, model, setting))
@@ -179,7 +179,7 @@ def contest(
         report("judging", 0.5 * (i + 1) / len(tried))
     # What a sensor shows leads the run astray, so its loss tells nothing.
     begun.sort(key=lambda one: (one.misfit > NEARLY, one.loss))
-    if at_once and not (begun and begun[0].misfit <= NEARLY):
+    if quickly and not (begun and begun[0].misfit <= NEARLY):
         return None
     many = len(choice.steps) > 1
     begun = begun[:AHEAD] if many else begun
