@@ -188,7 +188,7 @@ def contest(
     promising = max(NEAR, PROMISING * short)
     promising = min(promising, earning(choice, model, setting))
     needed = 1.0 + EARNS * (model.misfit - 1.0) if choice.steps else np.inf
-    screened = _screening(begun, setting, promising, report)
+    screened = screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
     best: tuple[Refit, Contender] | None = None
@@ -225,7 +225,7 @@ def earning(choice: Choice, model: Model, setting: Setting) -> float:
     return np.inf if without <= COMPLETE else 1.0 + EARNS * (without - 1.0)
 
 
-def _screening(
+def screening(
     begun: Sequence[Begun], setting: Setting, promising: float, report: Report
 ) -> list[Contender]:
     """The contenders refined a little on the short logs, the best first.

@@ -10,6 +10,7 @@ from identification.candidates import Candidate, best_of
 from identification.choice import FAR, Choice, Step, choose, first_stage
 from identification.evidence import Moving, shortened
 from identification.forward import (
+    Begun,
     Contender,
     cut_short,
     decisive,
@@ -18,6 +19,7 @@ from identification.forward import (
     luck,
     most_left,
     scales_alone,
+    screening,
 )
 from identification.library import built_in
 from identification.log import Rig
@@ -26,6 +28,7 @@ from identification.outcome import spread
 from identification.refit import COMPLETE, even
 from identification.structure import Model, model_of
 from identification.trace import trace
+from identification.trials import Trial
 from tests.identification.motor_logs import K_A, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -116,6 +119,40 @@ def test_what_is_decisive() -> None:
     assert decisive(100.0, others(90.0)) == pytest.approx(8.0)  # far less than any other
     assert decisive(20.0, others(3.0)) == pytest.approx(1.5)  # another does nearly as well
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
+
+
+@pytest.mark.parametrize(
+    ("first", "tried"),
+    [
+        ((1.0, 100.0), ["backlash", "compliance"]),  # followed at once: what is lost then is not
+        ((2.0, 100.0), ["backlash", "spring", "compliance"]),
+        ((2.0, 10.0), ["backlash", "spring"]),  # nor is what is far behind one that is followed
+    ],
+)
+def test_contenders_are_tried_until_one_is_followed(
+    first: tuple[float, float], tried: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    setting, plain = setting_of(4, 4e-4)
+    asked: list[str] = []
+
+    def screened(one: Begun, _setting: Setting, _enough: float) -> Contender:
+        asked.append(one.trial.effect.key)
+        misfit = 1.0 if asked == ["backlash"] else 5.0 - len(asked)
+        return Contender((), one.trial.effect, one.plant, misfit)
+
+    monkeypatch.setattr("identification.forward._screened", screened)
+    begun = [
+        Begun(
+            Trial((), plain.plant, built_in()[key], []), plain.plant, plain.plant, loss, misfit, ()
+        )
+        for key, misfit, loss in (
+            ("backlash", *first), ("spring", 10.0, 1.0), ("compliance", 2.0, 50.0),
+        )
+    ]  # fmt: skip
+    found = screening(begun, setting, 8.0, lambda _stage, _share: None)
+    assert asked == tried
+    assert [one.misfit for one in found] == sorted(one.misfit for one in found)
+    assert found[0].effect.key == "backlash"
 
 
 def test_luck_grows_with_what_was_tried() -> None:
