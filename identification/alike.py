@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from identification.candidates import Candidate
 from identification.choice import SHARE, Choice, Step, merit, share
-from identification.needed import Setting, fitted, only
+from identification.needed import Setting, fitted, only, seconds
 from identification.refit import COMPLETE
 from identification.structure import Model
 
@@ -31,13 +31,12 @@ def told_apart(choice: Choice, after: Model, setting: Setting) -> Choice:
     """
     if after.led or after.misfit > COMPLETE:
         return choice
-    seconds = sum(one.log.duration for one in setting.logs)
 
     def short(step: Step) -> Iterator[str]:
         for rival in alike(step):
             stay = tuple(replace(x, candidate=rival) if x is step else x for x in choice.steps)
             run = fitted(only(choice, stay), setting)
-            lost = seconds * (run.misfit - after.misfit)  # each counted as one sample
+            lost = seconds(setting) * (run.misfit - after.misfit)
             if not run.led and run.misfit > COMPLETE and lost > ALIKE:
                 yield rival.effect.key
 

@@ -45,7 +45,7 @@ from identification.needed import (
     known,
     pruned,
     refined,
-    windows,
+    seconds,
     with_steps,
 )
 from identification.outcome import Outcome, spread
@@ -397,7 +397,7 @@ def _taken(
     """The choice with the winner as its last step, and the model."""
     stage, base = with_steps(winner.steps, setting.start, setting.first)
     values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
-    count = windows(setting)
+    count = seconds(setting)
     scaled = [_as_candidate(one, stage, base, count * (before - one.misfit)) for one in rivals]
     mine = _as_candidate(
         replace(winner, plant=done.plant), stage, base, count * (before - done.misfit)
@@ -414,7 +414,7 @@ def _taken(
 
 
 def luck(candidate: Candidate, tried: int) -> float:
-    """Chance that any of so many effects gains as much, every window counted as one sample."""
+    """Chance that any of so many effects gains as much, every second counted as one sample."""
     free = len(candidate.effect.params)
     return float(min(1.0, tried * chi2.sf(max(candidate.gain, 0.0), free)))
 

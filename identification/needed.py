@@ -24,7 +24,6 @@ from identification.plant import Plant
 from identification.refit import COMPLETE, Refit, even, loose, misfit, refit
 from identification.result import Drive
 from identification.stage import Stage
-from identification.starts import starts
 from identification.structure import MUCH, Model, band, model_of
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
@@ -70,9 +69,9 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
     return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
 
 
-def windows(setting: Setting) -> int:
-    """Number of the windows of the free run over all logs."""
-    return sum(len(starts(one, setting.drive).at) for one in setting.logs)
+def seconds(setting: Setting) -> float:
+    """Duration of all logs [s]; what a run leaves counts as one independent sample a second."""
+    return sum(one.log.duration for one in setting.logs)
 
 
 def known(setting: Setting) -> bool:
