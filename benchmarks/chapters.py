@@ -13,15 +13,18 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from identification.errors import UserError
 from identification.library import built_in
+from identification.log import Log
 from identification.trace_result import Errors, FoundEffect, Trace
 from workbench.card import load_card
 from workbench.fetch import VARIABLE, card_path
-from workbench.sources import read_sources
+from workbench.sources import Sources, read_sources
 from workbench.tracing import Traced, effect_estimates, trace_sources
 from workbench.units import Motion
 
@@ -32,11 +35,16 @@ HEAD = (
 )  # fmt: skip
 
 
+SEALS = ("O-ring257", "O-ring", "X-ring257")
+SHORTEST = 100  # samples of a run
+
+
 @dataclass(frozen=True)
 class Chapter:
     """Training and held-out logs of one machine of a card.
 
-    relative: the card knows no force for the command, so force is in parts of that at full command.
+    relative: the card knows no force for the command, so force is in parts of that at full command;
+    halved: of each file the first half is for training, and the second of every test file held out.
     """
 
     name: str
@@ -44,6 +52,7 @@ class Chapter:
     train: tuple[str, ...]
     test: tuple[str, ...]
     relative: bool = False
+    halved: bool = False
 
 
 def chapters() -> list[Chapter]:
@@ -54,10 +63,14 @@ def chapters() -> list[Chapter]:
         Chapter(f"seals O-ring257, {name.removesuffix('.csv')}", "pneumatic_seals", train, (name,))
         for name in test[1:]
     ]
-    for seal in ("O-ring", "X-ring257"):
+    for seal in SEALS[1:]:
         logs = tuple(f"{seal}_{bar}bar.csv" for bar in (1, 5, 7))
         held_out = (f"{seal}_3bar.csv",)
         out.append(Chapter(f"seals {seal}, 3 bar", "pneumatic_seals", logs, held_out))
+    for seal in SEALS:
+        logs = tuple(f"{seal}_{bar}bar.csv" for bar in (1, 3, 5, 7))
+        name = f"seals {seal}, later strokes"
+        out.append(Chapter(name, "pneumatic_seals", logs, logs, halved=True))
     for card in ("emps", "friction_backlash"):
         out.append(Chapter(card, card, *_split(card)))
     out.append(Chapter("xl330_servo", "xl330_servo", *_split("xl330_servo"), relative=True))
@@ -85,7 +98,26 @@ def traced(chapter: Chapter) -> Traced:
                 text.replace("[rig]\n", "[rig]\nforce_per_command = 1.0\n"), encoding="utf-8"
             )
         train, test = (read_sources(n, card) for n in (chapter.train, chapter.test))
+        if chapter.halved:
+            train, test = half(train, first=True), half(test, first=False)
         return trace_sources(train, test, built_in())
+
+
+def half(sources: Sources, *, first: bool) -> Sources:
+    """The first or the second half of each file, by its time."""
+    ends: dict[str, tuple[float, float]] = {}
+    for run in sources.runs:
+        t = run.log["t"]
+        low, high = ends.get(run.file, (np.inf, -np.inf))
+        ends[run.file] = (min(low, float(t[0])), max(high, float(t[-1])))
+    runs = []
+    for run in sources.runs:
+        keep = (run.log["t"] < sum(ends[run.file]) / 2.0) == first
+        if np.count_nonzero(keep) >= SHORTEST:
+            signals = {key: x[keep] for key, x in run.log.signals.items()}
+            part = f"{run.sha256}, {'first' if first else 'second'} half"  # other bytes
+            runs.append(replace(run, log=Log(run.log.name, signals), sha256=part))
+    return replace(sources, runs=tuple(runs))
 
 
 def row(chapter: Chapter) -> tuple[Sequence[str], list[str]]:

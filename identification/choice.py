@@ -151,11 +151,17 @@ def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Ou
     stage, base = start, base_outcomes(start)
     slowest = base[MECHANICAL].slowest
     error = left_out_error(stage, slowest)
+    missing = spread(base[MECHANICAL]) - 1.0
     for step in steps:
         after, found = settled(replace(absorb(stage, step.candidate), scales={}))
         without = left_out_error(after, slowest)
-        carries = without < CARRIES * error if error > 0 else False
-        if not carries and share(step.candidate, step.base) < MOSTLY:
+        if error > 0:
+            less = spread(base[MECHANICAL]) - spread(found[MECHANICAL])
+            carries = without < CARRIES * error
+            explains = less / max(missing, 1e-300)
+        else:
+            carries, explains = False, share(step.candidate, step.base)
+        if not carries and explains < MOSTLY:
             break
         kept.append(step)
         stage, base, error = after, found, without

@@ -15,7 +15,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.between import kinks
-from identification.differentiate import differentiate, resolution
+from identification.differentiate import Motion, differentiate, resolution
 from identification.karnopp import Karnopp
 from identification.log import Log
 from identification.weak_form import (
@@ -30,6 +30,8 @@ SECONDS = 0.06  # of a window
 EXACT = 1e-12  # of its range, to which any position is unsure
 FEWEST = 16  # samples in a window
 SURE = 5.0  # times the velocity's noise from which its sign is sure
+LED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)  # Hz; a slow motion needs smoothing to stand out of its noise
+MOSTLY_SURE = 0.9  # of a led body's samples, whose direction is to be sure
 BLOCKS = 8  # stretches of a log that are left out in turn
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
@@ -51,7 +53,8 @@ class Moving:
 
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
-    plant that walks more must not be forgiven for it. rotary: y is an angle [rad].
+    plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. led: a rig
+    imposes the motion.
     """
 
     log: Log
@@ -66,12 +69,13 @@ class Moving:
     v_noise: float
     kinks: Array
     rotary: bool = False
+    led: bool = False
     reference: Karnopp | None = None
 
     def again(self, log: Log) -> "Moving":
         """The same of another log of this machine."""
         by_command = self.whole is not None
-        return moving(log, held=self.held, by_command=by_command, rotary=self.rotary)
+        return moving(log, held=self.held, by_command=by_command, rotary=self.rotary, led=self.led)
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
@@ -132,12 +136,19 @@ def quiet_part(third: Array) -> float:
     return float(np.sqrt(np.mean(power[: max(1, int(QUIET * count))]) / 0.45))
 
 
-def moving(log: Log, *, held: bool, by_command: bool, rotary: bool = False) -> Moving:
-    """A log with its motion and windows. held: the force is a command held over each period."""
+def moving(
+    log: Log, *, held: bool, by_command: bool, rotary: bool = False, led: bool = False
+) -> Moving:
+    """A log with its motion and windows. held: the force is a command held over each period;
+    led: a rig imposes the motion, which is smoothed until most of it is sure of its direction."""
     h = log.h
     motion = differentiate(log["y"], h)
-    threshold = SURE * motion.v_noise
-    d = np.where(motion.v > threshold, 1.0, np.where(motion.v < -threshold, -1.0, 0.0))
+    d = _direction(motion)
+    for cutoff in LED_CUTOFFS if led else ():
+        if np.mean(d != 0) < MOSTLY_SURE:
+            motion = differentiate(log["y"], h, min(cutoff, motion.cutoff))
+            # Much smoothing rings where a body stops: the log itself must have gone that way.
+            d = np.where(_gone(log["y"], motion, h) == _direction(motion), _direction(motion), 0.0)
     length = max(FEWEST, 2 * round(SECONDS / h / 2))
     sliding = sliding_windows(d, length, h)
     view = np.lib.stride_tricks.sliding_window_view(np.abs(motion.v), length + 1)
@@ -156,9 +167,23 @@ def moving(log: Log, *, held: bool, by_command: bool, rotary: bool = False) -> M
     beyond = kinks(np.asarray(log["F"]), noise_F)
     one = Moving(
         log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
-        rotary,
+        rotary, led,
     )  # fmt: skip
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
+
+
+def _direction(motion: Motion) -> Array:
+    """Direction of the motion (n,), 0 where its velocity's noise leaves it open."""
+    sure = np.abs(motion.v) > SURE * motion.v_noise
+    return np.where(sure, np.sign(motion.v), 0.0)
+
+
+def _gone(y: Array, motion: Motion, h: float) -> Array:
+    """Direction (n,) in which the measured position goes over a period of the cut-off."""
+    half = max(1, round(0.5 / (motion.cutoff * h)))
+    padded = np.pad(y, half, mode="edge")
+    step = padded[2 * half :] - padded[: -2 * half]
+    return np.where(np.abs(step) > SURE * np.sqrt(2.0) * motion.noise, np.sign(step), 0.0)
 
 
 def shortened(one: Moving, seconds: float, begin: int = 0) -> Moving:

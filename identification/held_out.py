@@ -28,16 +28,19 @@ def left_out(rows: Rows, slowest: float) -> tuple[Array, Array]:
 def left_out_error(stage: Stage, slowest: float) -> float:
     """Root mean square of the mechanical equation [N] on each log, fitted on all others.
 
-    0 where there is one log only.
+    Runs of one file, cut at its gaps, are left out together where there are more files. 0 where
+    there is one log only.
     """
     parts = stage.parts[MECHANICAL]
     if len(parts) < 2:
         return 0.0
     rows = stacked(parts)
-    of_log = np.repeat(np.arange(len(parts)), [len(p.b) for p in parts])
+    names, of_part = np.unique([one.log.name for one in stage.logs], return_inverse=True)
+    of_part = of_part if len(names) > 1 else np.arange(len(parts))
+    of_log = np.repeat(of_part, [len(p.b) for p in parts])
     keep = rows.speed >= slowest
     r = np.zeros(len(rows.b))
-    for i in range(len(parts)):
+    for i in range(int(of_part.max()) + 1):
         out = of_log == i
         theta = solve(rows, keep & ~out).theta
         r[out] = rows.b[out] - rows.X[out] @ theta

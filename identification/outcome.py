@@ -44,7 +44,8 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     """Fit and criterion of an equation's rows.
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
-    TRIM each instead of their squared residual; the best threshold is taken.
+    TRIM each instead of their squared residual; the best threshold is taken. A body that is led
+    along slides at any speed.
     """
     scale = stage.scale(equation)
     if equation == REST:
@@ -58,7 +59,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     if not np.any(np.isfinite(rows.speed)):
         fit = solve(rows)
         return Outcome(rows, fit, fit.cost / scale + rows.lost, 0.0)
-    edges = np.quantile(rows.speed, TRIMS)
+    edges = np.quantile(rows.speed, TRIMS[:1] if stage.led else TRIMS)
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
     size = of_column(A)
     whitened = A / size

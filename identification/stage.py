@@ -115,6 +115,11 @@ class Stage:
         """Whether the force is a motor's, that of its command."""
         return self.logs[0].held
 
+    @property
+    def led(self) -> bool:
+        """Whether the motion is imposed: a body that a rig moves is not stuck at any speed."""
+        return self.logs[0].led
+
     def scale(self, equation: str) -> float:
         """What squares of rows are divided by, 1 where nothing but noise is left."""
         return self.scales.get(equation, 1.0)

@@ -84,6 +84,8 @@ Progress = Callable[[str, float], None]
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
+RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
+SPEED = frozenset({"v", "reversal"})
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 
 
@@ -103,12 +105,19 @@ def trace(
     by_command = _by_command(train, rig, library, remarks)
     held = rig.kind == "motor"
     recorded = partial(moving, held=held, by_command=by_command, rotary=rig.motion == "rotary")
-    logs = [recorded(log) for log in train]
-    _enough(logs)
-    report("tracing", 0.0)
     drive: Drive = "command" if by_command or held else "force"
+    logs, refused = _logs(train, recorded, drive)
+    report("tracing", 0.0)
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
+    if refused is not None and not before.led:
+        raise refused
+    if before.led:
+        recorded = partial(recorded, led=True)
+        logs = [recorded(log) for log in train]
+        start, first = first_stage(logs, by_command)
+        before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
+        library = _told_by_speed(library, logs, remarks)
     free = not before.led and loose(before.plant, drive)
     if not (before.led or free or rough(first)) and before.misfit > COMPLETE:
         before = searched(before, train, logs, drive, rig, rng)
@@ -303,6 +312,47 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         )
         return False
     return True
+
+
+def _logs(
+    train: Sequence[Log], recorded: Callable[..., Moving], drive: Drive
+) -> tuple[list[Moving], NotIdentifiable | None]:
+    """The logs with their motion; as led where only a rig's slow motion may hold enough, and then
+    the error that they are otherwise."""
+    logs = [recorded(log) for log in train]
+    try:
+        _enough(logs)
+    except NotIdentifiable as error:
+        if drive != "force":
+            raise
+        logs = [recorded(log, led=True) for log in train]
+        try:
+            _enough(logs)
+        except NotIdentifiable:
+            raise error from None
+        return logs, error
+    return logs, None
+
+
+def _told_by_speed(library: Library, logs: Sequence[Moving], remarks: list[str]) -> Library:
+    """The library without effects of speed alone, where a rig led the body at much the same speed.
+
+    There they would stand in for whatever makes one stroke differ from another.
+    """
+    ratios = []
+    for way in (True, False):
+        speed = np.concatenate([one.speed[one.up == way] for one in logs])
+        low, high = np.quantile(speed, RANGE)
+        ratios.append(float(high / low))
+    of_speed = [k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= SPEED]
+    if max(ratios) >= VARIED or not of_speed:
+        return library
+    remarks.append(
+        f"the speeds of each direction are too alike (a factor of {max(ratios):.2g} at most,"
+        f" {VARIED:g} needed) to tell friction that depends on speed alone:"
+        f" {', '.join(of_speed)} not tried; add runs at other speeds"
+    )
+    return {key: effect for key, effect in library.items() if key not in of_speed}
 
 
 def _enough(logs: Sequence[Moving]) -> None:

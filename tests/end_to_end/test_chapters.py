@@ -48,12 +48,19 @@ def test_seals_friction_grows_with_pressure(
     assert first["params"]["mu_p"]["value"] is None  # the other chamber is open
     for error in ("force_rms", "force_relative"):  # an effect by F may shrink the first alone
         before, after = (found[when]["test"][error] for when in ("before", "after"))
-        assert after <= 0.5 * before
+        assert after <= 0.4 * before
 
 
-@pytest.mark.parametrize(("seal", "share"), [("O-ring", 0.95), ("X-ring257", 0.5)])
+@pytest.mark.parametrize(
+    ("seal", "share", "signal"), [("O-ring", 0.92, "reversal"), ("X-ring257", 0.4, "p_n")]
+)
 def test_what_another_seal_leaves_after_pressure_is_told(
-    seal: str, share: float, data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    seal: str,
+    share: float,
+    signal: str,
+    data: Path,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     logs = [f"{seal}_{bar}bar.csv" for bar in (1, 5, 7, 3)]
     for name in logs:
@@ -61,7 +68,7 @@ def test_what_another_seal_leaves_after_pressure_is_told(
             pytest.skip(f"no measured data: {name} is not in {data / 'pneumatic_seals'}")
     arguments = [*logs[:3], "--test", logs[3], "--card", "pneumatic_seals"]
     found = traced(arguments, tmp_path / "trace", capsys)
-    assert (found["verdict"], found["unknown"]["depends_on"][0]) == ("unknown", "p_n")
+    assert (found["verdict"], found["unknown"]["depends_on"][0]) == ("unknown", signal)
     first = found["effects"][0]
     assert first["key"] == "pressure_dependent_friction"
     assert first["params"]["mu_p"]["value"] is None  # the other chamber is open

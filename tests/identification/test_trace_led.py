@@ -1,0 +1,123 @@
+"""Trace of a body that a rig leads along a path: every stroke counts, however slow it is."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identification.arrays import Array
+from identification.errors import NotIdentifiable
+from identification.evidence import MECHANICAL, Moving, moving
+from identification.held_out import left_out_error
+from identification.library import built_in
+from identification.log import Log, Rig
+from identification.outcome import base_outcomes
+from identification.stage import Stage
+from identification.trace import trace
+from identification.trace_result import Trace
+
+H = 0.01
+RIG = Rig("force")
+NOISE_Y, NOISE_F = 1e-5, 0.05
+COULOMB, PER_BAR = 4.0, 0.6
+SPEEDS = (1e-3, 2e-3, 3e-3, 5e-3, 8e-3, 12e-3, 20e-3, 30e-3)
+
+
+def colored(n: int, rng: np.random.Generator) -> Array:
+    """Noise of a laser [m]: neighbours are alike, so a quick derivative takes it for motion."""
+    white = NOISE_Y * rng.standard_normal(n)
+    return np.asarray(lfilter([0.6], [1.0, -0.8], white))
+
+
+def nothing(v: Array) -> Array:
+    return 0.0 * v
+
+
+def strokes(
+    bar: float, speeds: Sequence[float], seed: int, *, stroke: float = 0.02, name: str = "",
+    added: Callable[[Array], Array] = nothing,
+) -> Log:  # fmt: skip
+    """Strokes to and fro at these speeds [m/s], with friction that grows with the pressure and
+    what is added to it [N] at a speed."""
+    rng = np.random.default_rng(seed)
+    ways = [np.full(round(2 * stroke / s / H), way * s) for s in speeds for way in (1, -1)]
+    v = np.concatenate(ways)
+    n = len(v)
+    friction = COULOMB + PER_BAR * bar + added(np.abs(v))
+    signals = {
+        "t": H * np.arange(n, dtype=np.float64),
+        "y": H * np.cumsum(v) + colored(n, rng),
+        "F": np.sign(v) * friction + NOISE_F * rng.standard_normal(n),
+        "p_n": 1e5 * bar + 2e3 * rng.standard_normal(n),
+    }
+    return Log(name or f"{bar:g}bar.csv", signals)
+
+
+def traced(train: Sequence[Log], test: Sequence[Log]) -> Trace:
+    return trace(train, test, RIG, built_in(), np.random.default_rng(0))
+
+
+def test_slow_strokes_count_as_fast_ones_do() -> None:
+    # At 7 bar the rig is so slow that a quick derivative hardly tells its direction.
+    at = ((1, 13e-3), (5, 9e-3), (7, 6e-3))
+    logs = [strokes(bar, [speed] * 5, bar) for bar, speed in at]
+    found = traced(logs, [strokes(3, [11e-3] * 5, 3)])
+    keys = [e.effect.key for e in found.effects]
+    assert (found.verdict, keys) == ("effect", ["pressure_dependent_friction"])
+    size = found.effects[0].params["mu_n"].value
+    assert size == pytest.approx(PER_BAR * 1e-5, rel=0.02)
+    level = np.concatenate([np.full(len(log), PER_BAR * np.mean(log["p_n"]) / 1e5) for log in logs])
+    before, after = (error["train"].force_rms for error in (found.before, found.after))
+    assert before is not None and after is not None
+    assert before == pytest.approx(float(np.std(level)), rel=0.2)
+    assert after < 0.1 * before
+    assert any("too alike" in remark and "stribeck" in remark for remark in found.remarks)
+
+
+def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
+    def falls(v: Array) -> Array:
+        return np.asarray(2.0 * np.exp(-((v / 6e-3) ** 2)))
+
+    one, other = (strokes(1, SPEEDS, seed, stroke=0.01, added=falls) for seed in (1, 2))
+    found = traced([one], [other])
+    assert [e.effect.key for e in found.effects] == ["stribeck"]
+    assert found.effects[0].params["v_s"].value == pytest.approx(6e-3, rel=0.1)
+    assert not any("too alike" in remark for remark in found.remarks)
+
+
+def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
+    one, other = (strokes(bar, [1.5e-3] * 4, bar, stroke=0.005) for bar in (1, 2))
+    found = traced([one], [other])
+    assert found.parameters_after["F_cp"].value == pytest.approx(COULOMB + PER_BAR, rel=0.05)
+    # Where a command drives the body it may stop and go, and nothing is sure.
+    with pytest.raises(NotIdentifiable, match="1bar"):
+        trace(
+            [one.with_signals(u=one["F"])], [], Rig("motor", force_per_command=1.0), built_in(),
+            np.random.default_rng(0),
+        )  # fmt: skip
+
+
+def test_runs_of_one_file_are_left_out_together() -> None:
+    def error(*names: str) -> float:
+        logs = [strokes(bar, [9e-3] * 3, bar) for bar in (1, 5, 5)]
+        parts: list[Moving] = [
+            moving(Log(name, log.signals), held=False, by_command=False, led=True)
+            for name, log in zip(names, logs, strict=True)
+        ]
+        zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
+        return left_out_error(Stage(tuple(parts), *zeros, by_command=False), 0.0)
+
+    # Two runs at 5 bar tell of each other, unless they are one file's.
+    assert error("a", "b", "b") > 1.3 * error("a", "b", "c")
+    assert error("a", "a", "a") == pytest.approx(error("a", "b", "c"))
+
+
+@pytest.mark.parametrize("led", [True, False])
+def test_no_stroke_of_a_led_body_is_taken_for_rest(led: bool) -> None:
+    # The slower half of the strokes has another friction than the faster, as a band would have.
+    logs = [strokes(bar, [speed] * 4, bar) for bar, speed in ((1, 13e-3), (5, 9e-3))]
+    parts = [moving(log, held=False, by_command=False, led=led) for log in logs]
+    zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
+    o = base_outcomes(Stage(tuple(parts), *zeros, by_command=False))[MECHANICAL]
+    assert bool(np.all(o.rows.speed >= o.slowest)) is led
