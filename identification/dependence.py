@@ -13,6 +13,7 @@ BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in b
 FEW = 8  # values of a signal (a switch, a gear) that are told apart each by itself
 LEAST = 0.08  # share of the residual, on blocks left out, from which it depends on a signal
 MOST = 3  # signals named
+OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
 ADDED = 0.15  # share of what is left that a second signal must explain
 APART = 0.1  # of the residual, that a swing in time must explain beyond any signal: a periodic
 # motion makes all that depends on place or speed swing as well
@@ -50,14 +51,15 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 
 def dependence(
-    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray
+    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray, each: int = OVERLAPPING
 ) -> Dependence:
     """Signals on which a whitened residual (n,) depends, most of all first.
 
     signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time,
-    left out in turn. Each signal may act otherwise in the two directions.
+    left out in turn; each: rows that a level of a signal needs. Each signal may act otherwise in
+    the two directions.
     """
-    best = {name: smooth_share(r, x, up, block) for name, x in signals.items()}
+    best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals else 0.0
     if rate > 0.0:
         swing = swinging_share(r, signals["t"], rate, block)
@@ -71,7 +73,8 @@ def dependence(
     left = r - best[order[0]][1]
     named = [order[0]]
     for name in order[1:]:
-        if best[name][0] > LEAST / 2 and smooth_share(left, signals[name], up, block)[0] > ADDED:
+        again = smooth_share(left, signals[name], up, block, each)
+        if best[name][0] > LEAST / 2 and again[0] > ADDED:
             named.append(name)
     return Dependence(tuple(named[:MOST]), best[order[0]][0], rate if named[0] == "t" else 0.0)
 
@@ -106,11 +109,13 @@ def swinging_share(r: Array, t: Array, rate: float, block: IntArray) -> tuple[fl
     return explained_by(r, np.column_stack(own), block)
 
 
-def smooth_share(r: Array, x: Array, up: BoolArray, block: IntArray) -> tuple[float, Array]:
+def smooth_share(
+    r: Array, x: Array, up: BoolArray, block: IntArray, each: int = OVERLAPPING
+) -> tuple[float, Array]:
     """The better of a coarse and a fine function of one signal and the direction."""
     found = []
     for levels in BINS:
-        if len(r) < 20 * levels:
+        if len(r) < each * levels:
             continue
         columns = hats(x, levels)
         both = np.column_stack([columns * up[:, np.newaxis], columns * ~up[:, np.newaxis]])

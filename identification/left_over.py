@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.choice import FAR, MATERIAL, Choice, Step
-from identification.dependence import MOST, dependence
+from identification.dependence import MOST, OVERLAPPING, SEPARATE, dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, REST, Moving
 from identification.grids import fewest_periods
 from identification.needed import explained, leading
@@ -69,7 +69,18 @@ def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Depend
     return best
 
 
-def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Dependence, float] | None:
+def at_breakaway(choice: Choice) -> Dependence:
+    """On what the forces at which the body lets go depend, however little; they are few."""
+    if BREAKAWAY not in choice.base:
+        return Dependence((), 0.0)
+    keep = np.isfinite(choice.base[BREAKAWAY].rows.sd)
+    found = _in_equation(choice, BREAKAWAY, keep, SEPARATE)
+    return Dependence((), 0.0) if found is None else found[0]
+
+
+def _in_equation(
+    choice: Choice, equation: str, keep: BoolArray, each: int = OVERLAPPING
+) -> tuple[Dependence, float] | None:
     """On what an equation's residual depends at these rows, and the square [noise units] that the
     signals named explain; None where there are too few rows."""
     o = choice.base[equation]
@@ -97,7 +108,7 @@ def _in_equation(choice: Choice, equation: str, keep: BoolArray) -> tuple[Depend
         # Those far off draw on the mean, on which no signal has a part.
         r = r - np.where(way, _mean(r[way]), _mean(r[~way]))
     n = len(r)  # fine stretches in turn, or no function of time could be judged
-    found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS)
+    found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS, each)
     names = found.depends_on
     if equation == REST and names:  # it is left since the body stands still, and not before
         names = (*names, "reversal")

@@ -50,6 +50,7 @@ from identification.left_over import (
     FEWEST_ROWS,
     IMPOSED_LEFT,
     PLACES,
+    at_breakaway,
     before_pieces,
     in_run,
     left_over,
@@ -180,6 +181,8 @@ def trace(
         left = Dependence((), 0.0) if another else left_over(choice, after, any_size=True)
         if not (left.depends_on or another or after.led):
             left = in_run(after, logs, drive)
+        if not (left.depends_on or another or after.led):
+            left = at_breakaway(choice)
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
             left = left_over(plain, before, any_size=True)

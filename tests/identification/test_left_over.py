@@ -10,6 +10,7 @@ from identification.arrays import Array
 from identification.choice import Choice, Step, choose, first_stage
 from identification.evidence import BREAKAWAY, MECHANICAL
 from identification.left_over import (
+    at_breakaway,
     before_pieces,
     in_run,
     left_over,
@@ -151,12 +152,14 @@ def shaken(n: int = 10_000) -> Array:
     return 1.2 * smooth / float(np.std(smooth))
 
 
-def lacking(effects: dict[str, dict[str, float]], *, fast: bool = False) -> tuple[Choice, Model]:
+def lacking(
+    effects: dict[str, dict[str, float]], *, fast: bool = False, seeds: tuple[int, ...] = (5,)
+) -> tuple[Choice, Model]:
     """A motor with effects that no library has: the plain model's choice, and its run."""
-    one = seen(made(5, effects, command=shaken() if fast else None))
-    start, first = first_stage([one], False)
+    logs = [seen(made(seed, effects, command=shaken() if fast else None)) for seed in seeds]
+    start, first = first_stage(logs, False)
     rng = np.random.default_rng(0)
-    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    plain = model_of(start, first, (), logs, "command", MOTOR, rng)
     return Choice(start, first, (), start, first), plain
 
 
@@ -190,3 +193,12 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
     wild = replace(o, fit=replace(o.fit, residual=3.0 * noise))
     found = left_over(replace(choice, base={BREAKAWAY: wild}), after, any_size=True)
     assert found.depends_on == ()
+
+
+def test_breakaways_tell_that_they_depend_on_the_time_at_rest() -> None:
+    seeds = (5, 6, 7)  # few breakaways tell nothing
+    choice, _ = lacking({"rising_stiction": {"F_r": 6.0, "tau": 0.3}}, seeds=seeds)
+    assert at_breakaway(choice).depends_on == ("rest",)
+    plain, _ = lacking({}, seeds=seeds)
+    assert at_breakaway(plain).depends_on == ()
+    assert at_breakaway(replace(choice, base={})).depends_on == ()
