@@ -10,7 +10,7 @@ from itertools import takewhile
 
 import numpy as np
 
-from identification.approach import closer, more_load
+from identification.approach import closer, more_load, nearer
 from identification.arrays import Array
 from identification.candidates import Candidate
 from identification.choice import Choice, Step, absorb, material, settled
@@ -21,7 +21,7 @@ from identification.library import Library
 from identification.log import Rig
 from identification.outcome import Outcome, spread
 from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, even, loose, misfit, refit
+from identification.refit import COMPLETE, Refit, even, loose, misfit, on_bristle, refit
 from identification.result import Drive
 from identification.stage import Stage
 from identification.structure import MUCH, Model, band, model_of
@@ -35,6 +35,7 @@ LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
 HOPELESS = 2.0  # times what it stands against, that brief windows leave where no search will do
 VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
+ONCE_MORE = 2  # searches of a run that is all but followed
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
 NOTHING = 1.002  # the same, of the plant as it is, without one that does nothing in the run
 
@@ -92,10 +93,14 @@ def fitted(choice: Choice, setting: Setting) -> Model:
 
 def _model(choice: Choice, setting: Setting) -> Model:
     near = None if setting.plain.led else setting.plain.plant.friction
-    return model_of(
+    model = model_of(
         choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
         setting.rng, near=near, vain=vain(setting),
     )  # fmt: skip
+    found = None if model.led else insisted(model.plant, model.misfit, setting)
+    if found is None:
+        return model
+    return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
 
 
 def vain(setting: Setting) -> float:
@@ -250,9 +255,12 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
             base = without(model, stay, setting)
             if free:  # the search without the effect may have ended elsewhere
                 base = replace(base, friction=more_load(model.plant).friction)
+                level = replace(base, friction=levelled(base.friction, less.end.theta))
+                base = nearer((base, level), setting.logs, setting.drive)
             elif stay:
                 base = replace(base, friction=levelled(base.friction, less.end.theta))
             found = refined(base, setting, model.misfit)
+            found = insisted(found.plant, found.misfit, setting) or found
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
         choice = less
@@ -294,6 +302,25 @@ def with_steps(
     for step in steps:
         stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
     return stage, outcomes
+
+
+def insisted(plant: Plant, left: float, setting: Setting) -> Refit | None:
+    """A plant whose run is all but followed, to a misfit `left`, searched close by once more.
+
+    Its minima are many where nothing holds the run to the log's position. None where that finds
+    nothing better.
+    """
+    best: Refit | None = None
+    if on_bristle(plant) or not loose(plant, setting.drive):
+        return best
+    for _ in range(ONCE_MORE):
+        if not COMPLETE < left <= DECISIVE:
+            break
+        found = closer(plant, setting.logs, setting.drive, setting.rng, 1)
+        plant = found.plant  # what has left a minimum for a worse one may find a better one next
+        if found.misfit < left:
+            best, left = found, found.misfit
+    return best
 
 
 def refined(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
