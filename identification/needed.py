@@ -311,7 +311,8 @@ def insisted(plant: Plant, left: float, setting: Setting) -> Refit | None:
     nothing better.
     """
     best: Refit | None = None
-    if on_bristle(plant) or not loose(plant, setting.drive):
+    free = setting.drive == "command" and loose(plant, setting.drive)  # a measured force has noise
+    if on_bristle(plant) or not free:
         return best
     for _ in range(ONCE_MORE):
         if not COMPLETE < left <= DECISIVE:

@@ -5,7 +5,7 @@ The choice is made on the two equations in weak form and on rest and breakaway (
 plant with the effects found is then refined on its free run (`refit`).
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -69,11 +69,12 @@ from identification.needed import (
     first_alone,
     suffices,
 )
-from identification.outcome import base_outcomes, spread
+from identification.outcome import Outcome, base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
 from identification.refit import COMPLETE, loose, misfit, refit
 from identification.result import Drive
+from identification.stage import Stage
 from identification.structure import MUCH, Model, band, led, model_of
 from identification.trace_result import (
     Dependence,
@@ -86,6 +87,7 @@ LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
+ENOUGH = 2  # effects, with which the inertia of a free body shows
 SPEED = frozenset({"v", "reversal"})
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 
@@ -113,7 +115,7 @@ def trace(
     before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
     if refused is not None and not before.led:
         raise refused
-    if before.led:
+    if before.led and hides_inertia(start, first, library, rng.spawn(1)[0], report):
         recorded = partial(recorded, led=True)
         logs = [recorded(log) for log in train]
         start, first = first_stage(logs, by_command)
@@ -139,7 +141,6 @@ def trace(
     choice = before_pieces(choice) if many else choice
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
-    # What was missing may have hidden the inertia.
     imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
     unsure = start.band == 0.0 and not imposed
     after = before
@@ -315,6 +316,17 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         )
         return False
     return True
+
+
+def hides_inertia(
+    start: Stage, first: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
+    report: Progress,
+) -> bool:  # fmt: skip
+    """Whether a rig leads the body: inertia is of no account beside what is left with effects too.
+
+    What is missing may itself have hidden the inertia of a body that is free.
+    """
+    return led(choose(start, first, library, rng, report, most=ENOUGH).base[MECHANICAL])
 
 
 def _logs(
