@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.arrays import Array
+from identification.choice import first_stage
 from identification.errors import NotIdentifiable
 from identification.evidence import MECHANICAL, Moving, moving
 from identification.held_out import left_out_error
@@ -14,8 +15,10 @@ from identification.library import built_in
 from identification.log import Log, Rig
 from identification.outcome import base_outcomes
 from identification.stage import Stage
-from identification.trace import trace
+from identification.structure import led
+from identification.trace import hides_inertia, trace
 from identification.trace_result import Trace
+from tests.identification.test_trace import made
 
 H = 0.01
 RIG = Rig("force")
@@ -121,3 +124,14 @@ def test_no_stroke_of_a_led_body_is_taken_for_rest(led: bool) -> None:
     zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
     o = base_outcomes(Stage(tuple(parts), *zeros, by_command=False))[MECHANICAL]
     assert bool(np.all(o.rows.speed >= o.slowest)) is led
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
+    effects = {"position_dependent_friction": {"c1": 150.0, "period": 0.1}}
+    log = made(21, effects) if free else strokes(1, [9e-3] * 3, 1)
+    start, first = first_stage([moving(log, held=False, by_command=False)], False)
+    assert led(first[MECHANICAL])
+    rng = np.random.default_rng(0)
+    hides = hides_inertia(start, first, built_in(), rng, lambda _stage, _share: None)
+    assert hides is not free
