@@ -74,11 +74,14 @@ def symbols_of(equation: str) -> set[str]:
 def admissible(effect: Effect, values: Values) -> bool:
     """Whether every parameter lies within its bounds.
 
-    One size of several may lie a trifle beyond: one that is 0 comes out on either side of it.
+    One size of several, or of two directions, may lie a trifle beyond: one that is 0 comes out on
+    either side of it.
     """
     most = max((abs(values[name]) for name in effect.linear), default=0.0)
 
     def slack(p: Param) -> float:
+        if p.name == "asymmetry" and split(effect):
+            return TRIFLE
         return TRIFLE * most if p.linear else 0.0
 
     return all(p.low - slack(p) <= values[p.name] <= p.high + slack(p) for p in effect.params)

@@ -95,7 +95,8 @@ class Rows:
     """A regression b = X theta: b (r,), X (r, k), sd (r,) of b, block (r,) of time, speed (r,).
 
     lost: twice the log-likelihood that b has lost, where an effect has taken away a part of what
-    was logged: without it the effect that leaves no force at all would explain every force.
+    was logged: without it the effect that leaves no force at all would explain every force;
+    positive: names of parameters that are never below 0.
     """
 
     b: Array
@@ -105,6 +106,7 @@ class Rows:
     speed: Array
     names: tuple[str, ...]
     lost: float = 0.0
+    positive: frozenset[str] = POSITIVE
 
 
 @dataclass(frozen=True, eq=False)
@@ -301,7 +303,7 @@ def stacked(parts: Sequence[Rows]) -> Rows:
     block = np.concatenate([p.block + BLOCKS * i for i, p in enumerate(parts)])
     join = [np.concatenate([getattr(p, k) for p in parts]) for k in ("b", "X", "sd", "speed")]
     lost = sum(p.lost for p in parts)
-    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost)
+    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost, parts[0].positive)
 
 
 def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None) -> Fitted:

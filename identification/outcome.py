@@ -9,7 +9,6 @@ from identification.evidence import (
     ACTUATOR,
     BREAKAWAY,
     EQUATIONS,
-    POSITIVE,
     REST,
     Fitted,
     Rows,
@@ -68,7 +67,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     ends = np.cumsum(np.bincount(bins, minlength=len(edges)))
     parts = np.split(ordered, ends[:-1])
     grams = np.cumsum([part.T @ part for part in parts[::-1]], axis=0)[::-1]
-    own = np.flatnonzero([name in POSITIVE for name in rows.names])
+    own = np.flatnonzero([name in rows.positive for name in rows.names])
     thetas, left = _of_grams(grams, own)
     slower = np.concatenate([[0], ends[:-1]])
     totals = left * size[-1] ** 2 / scale + TRIM * slower + rows.lost

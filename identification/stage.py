@@ -189,7 +189,12 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
         up: BoolArray = one.up if equation == MECHANICAL else stage.events[i].direction > 0
         own, names = [own[0] * up, own[0] * ~up], (f"{names[0]}+", f"{names[0]}-")
     b = rows.b - fixed if not names else rows.b
-    return replace(rows, b=b, X=np.column_stack([rows.X, *own]), names=(*rows.names, *names))
+    # Of several sizes one may be nothing, and noise must not bring it below.
+    sizes = {f"{effect.key}.{p.name}" for p in effect.params if p.spare and p.low == 0.0}
+    return replace(
+        rows, b=b, X=np.column_stack([rows.X, *own]), names=(*rows.names, *names),
+        positive=rows.positive | sizes,
+    )  # fmt: skip
 
 
 def _flattened(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:

@@ -3,12 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from identification.candidates import Candidate, best_of
 from identification.choice import first_stage
+from identification.evidence import moving
 from identification.karnopp import Karnopp
 from identification.library import built_in
+from identification.log import Log
 from tests.identification.motor_logs import NINE, made, seen
 
 
@@ -66,3 +69,34 @@ def test_a_lag_is_fitted_with_the_friction_that_lags(tau: float) -> None:
     assert found.values["tau"] == pytest.approx(tau, rel=0.05)
     truth = NINE.array[:5]
     assert found.outcomes["mechanical"].fit.theta[:5] == pytest.approx(truth, rel=0.05)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_chamber_whose_seal_has_no_friction_comes_out_as_nothing(seed: int) -> None:
+    # The pressures are all but mirror images, so noise brings the other size to either side of 0.
+    rng = np.random.default_rng(seed)
+    way = np.repeat(np.tile([1.0, -1.0], 10), 200)
+    n = len(way)
+    p_n = 3e5 + 2e5 * np.sin(2.0 * np.pi * np.arange(n) / 900.0)
+    log = Log(
+        "two chambers",
+        {
+            "t": 0.01 * np.arange(n, dtype=np.float64),
+            "y": 0.01 * np.cumsum(0.02 * way) + 1e-5 * rng.standard_normal(n),
+            "F": way * (4.0 + 2e-5 * p_n) + 0.2 * rng.standard_normal(n),
+            "p_p": 8e5 - p_n + 2e3 * rng.standard_normal(n),
+            "p_n": p_n,
+        },
+    )
+    stage, base = first_stage([moving(log, held=False, by_command=False)], by_command=False)
+    found = best_of(stage, built_in()["pressure_dependent_friction"], base)
+    assert found is not None
+    assert found.values["mu_p"] >= 0.0
+    assert found.values["mu_n"] - found.values["mu_p"] == pytest.approx(2e-5, rel=0.02)
+
+
+@pytest.mark.parametrize("way", [1.0, -1.0])
+def test_an_effect_of_one_direction_alone_is_found(way: float) -> None:
+    values = {"F_s": 4.0, "v_s": 0.06, "asymmetry": way}
+    found = best("stribeck", {"stribeck": values})
+    assert found.values["asymmetry"] == pytest.approx(way, abs=0.06)
