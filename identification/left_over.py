@@ -170,7 +170,7 @@ def too_much(choice: Choice, after: Model) -> bool:
         r = o.fit.residual[keep]
         left = float(np.mean(r**2)) if len(r) else 0.0
         scale = float(np.median(o.rows.sd[keep])) if len(r) else 0.0
-        part = IMPOSED_LEFT if after.led else ROUGH_LEFT
+        part = IMPOSED_LEFT if after.stage.led else ROUGH_LEFT
         missing = part * _excess(choice.first[equation]) if choice.steps else 0.0
         if left > MUCH**2 and (left - 1.0) * scale**2 > missing:
             return True

@@ -5,7 +5,7 @@ The choice is made on the two equations in weak form and on rest and breakaway (
 plant with the effects found is then refined on its free run (`refit`).
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -45,6 +45,7 @@ from identification.findings import (
     verdict_of,
 )
 from identification.forward import at_once, judged_forward
+from identification.led import is_led
 from identification.left_over import (
     ASTRAY,
     FEWEST_ROWS,
@@ -69,12 +70,11 @@ from identification.needed import (
     first_alone,
     suffices,
 )
-from identification.outcome import Outcome, base_outcomes, spread
+from identification.outcome import base_outcomes, spread
 from identification.output_error import searched_plant
 from identification.plant import units_of
 from identification.refit import COMPLETE, loose, misfit, refit
 from identification.result import Drive
-from identification.stage import Stage
 from identification.structure import MUCH, Model, band, led, model_of
 from identification.trace_result import (
     Dependence,
@@ -87,7 +87,6 @@ LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
-ENOUGH = 2  # effects, with which the inertia of a free body shows
 SPEED = frozenset({"v", "reversal"})
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 
@@ -113,9 +112,10 @@ def trace(
     report("tracing", 0.0)
     start, first = first_stage(logs, by_command)
     before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
-    if refused is not None and not before.led:
+    imposed = before.led and is_led(logs)  # and the inertia not only hidden by what is missing
+    if refused is not None and not imposed:
         raise refused
-    if before.led and hides_inertia(start, first, library, rng.spawn(1)[0], report):
+    if imposed:
         recorded = partial(recorded, led=True)
         logs = [recorded(log) for log in train]
         start, first = first_stage(logs, by_command)
@@ -141,8 +141,8 @@ def trace(
     choice = before_pieces(choice) if many else choice
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
-    imposed = before.led and (led(sliding) or spread(sliding) > MUCH**2)
-    unsure = start.band == 0.0 and not imposed
+    hidden = before.led and (led(sliding) or spread(sliding) > MUCH**2)
+    unsure = start.band == 0.0 and not hidden
     after = before
     # Where the first effect leaves next to nothing of the equations, the run may tell the next.
     more = alone is not None and 0 < len(alone.plant.effects) < len(choice.steps)
@@ -168,7 +168,7 @@ def trace(
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(before, slowest, (), logs, seen, drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, drive)
-    if after.led:
+    if after.stage.led:
         carried = share_left(errors_before, errors_after) <= IMPOSED_LEFT
     else:
         carried = not explained(choice.base) or carries(errors_before, errors_after)
@@ -229,8 +229,10 @@ def _remarks(
     rig: Rig,
 ) -> Iterator[str]:  # fmt: skip
     """What whoever reads the trace has to know of it."""
-    if after.led:
+    if after.stage.led:
         yield "the motion is imposed (inertia is of no account): no free run is judged"
+    elif after.led:
+        yield "what is left hides the inertia: no free run is judged"
     elif choice.steps and after.misfit > ASTRAY:
         yield (
             f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
@@ -316,17 +318,6 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         )
         return False
     return True
-
-
-def hides_inertia(
-    start: Stage, first: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
-    report: Progress,
-) -> bool:  # fmt: skip
-    """Whether a rig leads the body: inertia is of no account beside what is left with effects too.
-
-    What is missing may itself have hidden the inertia of a body that is free.
-    """
-    return led(choose(start, first, library, rng, report, most=ENOUGH).base[MECHANICAL])
 
 
 def _logs(

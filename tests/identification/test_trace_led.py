@@ -11,12 +11,13 @@ from identification.choice import first_stage
 from identification.errors import NotIdentifiable
 from identification.evidence import MECHANICAL, Moving, moving
 from identification.held_out import left_out_error
+from identification.led import is_led
 from identification.library import built_in
 from identification.log import Log, Rig
 from identification.outcome import base_outcomes
 from identification.stage import Stage
 from identification.structure import led
-from identification.trace import hides_inertia, trace
+from identification.trace import trace
 from identification.trace_result import Trace
 from tests.identification.test_trace import made
 
@@ -130,8 +131,15 @@ def test_no_stroke_of_a_led_body_is_taken_for_rest(led: bool) -> None:
 def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
     effects = {"position_dependent_friction": {"c1": 150.0, "period": 0.1}}
     log = made(21, effects) if free else strokes(1, [9e-3] * 3, 1)
-    start, first = first_stage([moving(log, held=False, by_command=False)], False)
+    logs = [moving(log, held=False, by_command=False)]
+    _, first = first_stage(logs, False)
     assert led(first[MECHANICAL])
-    rng = np.random.default_rng(0)
-    hides = hides_inertia(start, first, built_in(), rng, lambda _stage, _share: None)
-    assert hides is not free
+    assert is_led(logs) is not free
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_noise_is_no_inertia(seed: int) -> None:
+    logs = [strokes(bar, [9e-3] * 3, seed) for bar in (1, 5)]
+    assert is_led([moving(log, held=False, by_command=False) for log in logs])
+    short = Log("short", {k: x[:200] for k, x in logs[0].signals.items()})
+    assert is_led([moving(short, held=False, by_command=False)])  # too little to tell

@@ -1,0 +1,40 @@
+"""Whether a rig leads the body along a path, whatever the model lacks."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.evidence import Moving, mechanical
+
+SHOWN = 0.15  # of the force's quick changes, that inertia explains of a body that is free
+NEXT = 2.0  # times their length, that neighbouring windows begin apart at most
+FEWEST = 30  # pairs of neighbouring windows
+
+
+def is_led(logs: Sequence[Moving]) -> bool:
+    """Whether inertia has no part in how the force changes from one window to the next.
+
+    Most of what a model lacks changes slowly (with place, pressure, time), and constant friction
+    not at all in one direction: what is left in the differences of neighbouring windows of sliding
+    is the inertia of a body that is free, or else a rig leads it.
+    """
+    columns, forces = [], []
+    for one in logs:
+        rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+        start = one.sliding.start
+        after = np.searchsorted(start, start + one.sliding.length)
+        pairs = np.flatnonzero(after < len(start))
+        pairs = pairs[start[after[pairs]] <= start[pairs] + NEXT * one.sliding.length]
+        pairs = pairs[one.up[pairs] == one.up[after[pairs]]]
+        columns.append(rows.X[after[pairs]][:, [0, 3, 4]] - rows.X[pairs][:, [0, 3, 4]])
+        forces.append(rows.b[after[pairs]] - rows.b[pairs])
+    X, b = np.concatenate(columns), np.concatenate(forces)
+    if len(b) < FEWEST:
+        return True
+    size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
+    theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
+    if theta[0] <= 0.0:
+        return True
+    others = b - X[:, 1:] @ theta[1:]
+    left = others - X[:, 0] * theta[0]
+    return bool(np.sum(left**2) > (1.0 - SHOWN) * np.sum(others**2))
