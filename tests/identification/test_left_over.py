@@ -52,10 +52,13 @@ def test_beside_effects_an_imposed_motion_may_leave_less_than_a_third(
     found: tuple[Choice, Model], share: float, much: bool
 ) -> None:
     choice, after = found
-    imposed = replace(after, led=True, misfit=np.inf)
+    logs = tuple(replace(one, led=True) for one in after.stage.logs)
+    hidden = replace(after, led=True, misfit=np.inf)  # by what is missing: its body is free
+    imposed = replace(hidden, stage=replace(after.stage, logs=logs))
     for noise in (1.0, 3.0):  # what is left in newtons counts, whatever noise its rows have
         base = {MECHANICAL: leaving(choice.first[MECHANICAL], share, noise)}
         assert too_much(replace(choice, base=base), imposed) is much
+        assert too_much(replace(choice, base=base), hidden)
     base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.4)}
     assert too_much(replace(choice, base=base), after)  # a free run has to leave less
     assert not too_much(replace(choice, base=base), replace(after, misfit=1.0))
