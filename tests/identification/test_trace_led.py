@@ -1,6 +1,7 @@
 """Trace of a body that a rig leads along a path: every stroke counts, however slow it is."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from identification.stage import Stage
 from identification.structure import led
 from identification.trace import trace
 from identification.trace_result import Trace
-from tests.identification.test_trace import made
+from tests.identification.test_trace import PLAIN, made
 
 H = 0.01
 RIG = Rig("force")
@@ -135,6 +136,15 @@ def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
     _, first = first_stage(logs, False)
     assert led(first[MECHANICAL])
     assert is_led(logs) is not free
+
+
+def test_inertia_that_a_lag_of_viscous_friction_cancels_is_no_rig_s_motion() -> None:
+    damped = replace(PLAIN, F_vp=200.0, F_vn=200.0)
+    effects = {"frictional_lag": {"tau": damped.m / damped.F_vp}}
+    logs = [moving(made(21, effects, damped), held=False, by_command=False)]
+    _, first = first_stage(logs, False)
+    assert led(first[MECHANICAL])
+    assert not is_led(logs)
 
 
 @pytest.mark.parametrize("seed", range(4))
