@@ -11,7 +11,7 @@ from identification.candidates import with_sizes
 from identification.choice import Step, rough
 from identification.effects._base import AT_REST, Acting, Effect
 from identification.equations import by_load, in_columns
-from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving
+from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving, shortened
 from identification.karnopp import Karnopp
 from identification.log import Rig
 from identification.outcome import Outcome, spread
@@ -22,6 +22,7 @@ from identification.refit import (
     Effort,
     even,
     loose,
+    misfit,
     on_bristle,
     onward,
     refit,
@@ -40,6 +41,7 @@ SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
+PIECE = 10.0  # s of each log, which fewer marginal stops spoil than the whole
 BEYOND = 1.3  # times the band, above which sliding friction is judged
 
 
@@ -128,7 +130,10 @@ def model_of(
         )
         done = other if other.misfit < done.misfit else done
     if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
-        close = refit(done.plant, logs, drive, prior=prior, effort="near", rescues=RESCUES)
+        part = [shortened(one, PIECE) for one in logs]
+        begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
+        begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
+        close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
         done = close if close.misfit < done.misfit else done
     hopeless = missing and (bool(steps) or rough(outcomes))
     smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
