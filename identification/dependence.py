@@ -51,13 +51,14 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 
 def dependence(
-    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray, each: int = OVERLAPPING
-) -> Dependence:
+    r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray,
+    each: int = OVERLAPPING, least: float = LEAST,
+) -> Dependence:  # fmt: skip
     """Signals on which a whitened residual (n,) depends, most of all first.
 
     signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time,
-    left out in turn; each: rows that a level of a signal needs. Each signal may act otherwise in
-    the two directions.
+    left out in turn; each: rows that a level of a signal needs; least: share of the residual from
+    which a signal is named. Each signal may act otherwise in the two directions.
     """
     best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals else 0.0
@@ -68,13 +69,13 @@ def dependence(
         else:
             rate = 0.0
     order = sorted(best, key=lambda name: -best[name][0])
-    if not order or best[order[0]][0] < LEAST:
+    if not order or best[order[0]][0] < least:
         return Dependence((), max(0.0, best[order[0]][0]) if order else 0.0)
     left = r - best[order[0]][1]
     named = [order[0]]
     for name in order[1:]:
         again = smooth_share(left, signals[name], up, block, each)
-        if best[name][0] > LEAST / 2 and again[0] > ADDED:
+        if best[name][0] > least / 2 and again[0] > ADDED:
             named.append(name)
     return Dependence(tuple(named[:MOST]), best[order[0]][0], rate if named[0] == "t" else 0.0)
 

@@ -2,17 +2,18 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.choice import FAR, MATERIAL, Choice, Step
-from identification.dependence import MOST, OVERLAPPING, SEPARATE, dependence
+from identification.dependence import LEAST, MOST, OVERLAPPING, SEPARATE, dependence
 from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, REST, Moving
 from identification.grids import fewest_periods
 from identification.needed import explained, leading
 from identification.outcome import Outcome, rms, spread
-from identification.refit import COMPLETE, OF_PERIOD
+from identification.refit import COMPLETE, OF_PERIOD, soft
 from identification.result import Drive
 from identification.stage import Stage, one_way
 from identification.starts import freed, position_rms, starts, window_of
@@ -29,9 +30,11 @@ NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
 RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
 ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
+DOUBTFUL = 1.5  # the same, if its error depends on a signal; of 200 clean logs none reaches it
 PLACES = 3  # effects of place in one machine, which rather are pieces of one that no library has
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
+SLIGHTLY = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
 STRETCHES = 64  # of a log, every eighth of which is left out together
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
 
@@ -228,10 +231,26 @@ def _off(after: Model) -> float:
     return np.inf if rms_y is None else rms_y / max(spread_y, 1e-300)
 
 
-def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
+def strongest(choice: Choice, after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
+    """The strongest of the structures left in the equations, at breakaways and in the free run,
+    however little it is, as something surely is missing."""
+    found = [left_over(choice, after, any_size=True)]
+    if not after.led:
+        found += [at_breakaway(choice), in_run(after, logs, drive)]
+        if not any(one.depends_on for one in found):
+            found.append(in_run(after, logs, drive, least=SLIGHTLY))
+    return max(found, key=lambda one: one.explained if one.depends_on else -1.0)
+
+
+def in_run(
+    after: Model, logs: Sequence[Moving], drive: Drive, least: float = LEAST
+) -> Dependence:  # fmt: skip
     """Signals on which the free run's position error depends, or its rate, or its curvature (the
-    force that is missing)."""
-    parts: list[Array] = []
+    force that is missing); or else how large they are, where their sign is a matter of luck.
+
+    least: share of the rate or curvature that a signal explains where it is named.
+    """
+    errors: list[Array] = []
     rates: list[Array] = []
     bends: list[Array] = []
     windows: list[IntArray] = []
@@ -247,23 +266,28 @@ def in_run(after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
         own = {k: v[at] for k, v in s.items() if k not in NOT_SIGNALS}
         own["t"] = s["t"][at] - s["t"][0]
         own["reversal"] = since_reversal(s["d"], one.log.h)[at]
-        window = window_of(begun, len(one.log))[at]
+        window = window_of(begun, len(one.log))
         if "u" in s:
             own["du"] = np.gradient(s["u"], one.log.h)[at]
-        parts.append(np.clip(r[0][at], -FAR, FAR))
         half = max(1, round(BEND / one.log.h))
-        rates.append(_change(r[0], at, half, window_of(begun, len(one.log)), 1))
-        bends.append(_change(r[0], at, half, window_of(begun, len(one.log)), 2))
-        windows.append(window + count)
+        errors.append(r[0][at])
+        rates.append(_change(r[0], at, half, window, 1))
+        bends.append(_change(r[0], at, half, window, 2))
+        windows.append(window[at] + count)
         count += len(begun.at)
         for k, v in own.items():
             found.setdefault(k, []).append(v)
     signals = {k: np.concatenate(v) for k, v in found.items() if len(v) == len(logs)}
     signals = {k: v for k, v in signals.items() if np.ptp(v) > 0}
-    # An error lasts to the end of its window, so windows are left out whole.
+    # An error lasts to the end of its window, so windows are left out whole; and what is lost at
+    # one stop must not outweigh all others.
     block = np.concatenate(windows) % BLOCKS
     way = np.asarray(signals["v"] >= 0)
-    each = [dependence(np.concatenate(x), signals, way, block) for x in (parts, rates, bends)]
+    whole, rate, bend = (soft(np.concatenate(x)) for x in (errors, rates, bends))
+    sizes = [x**2 - np.mean(x**2) for x in (rate, bend)]
+    of = partial(dependence, signals=signals, up=way, block=block)
+    each = [of(whole)] + [of(x, least=least) for x in (rate, bend)]
+    each = [one for one in each if one.depends_on] or [of(x, least=least) for x in sizes]
     each = sorted((one for one in each if one.depends_on), key=lambda one: -one.explained)
     if not each:
         return Dependence((), 0.0)
@@ -277,7 +301,7 @@ def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> 
     where they lie in other windows."""
     low, high = np.maximum(at - half, 0), np.minimum(at + half, len(r) - 1)
     found = r[high] - r[low] if order == 1 else r[high] - 2.0 * r[at] + r[low]
-    return np.asarray(np.where(window[low] == window[high], np.clip(found, -FAR, FAR), 0.0))
+    return np.asarray(np.where(window[low] == window[high], found, 0.0))
 
 
 def signals_at(stage: Stage, equation: str) -> dict[str, Array]:

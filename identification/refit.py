@@ -188,6 +188,11 @@ def loss(r: Array) -> float:
     return float(np.sum(np.log1p((r / ROBUST) ** 2)) * ROBUST**2)
 
 
+def soft(r: Array, far: float = ROBUST) -> Array:
+    """Errors whose square sum is a robust cost: those beyond `far` count ever less."""
+    return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far)
+
+
 def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) -> Plant:
     """The plant at the best of a few band widths and stick limits, then of either direction."""
     p = plant.friction
@@ -256,7 +261,7 @@ def refit(
 
     def bent(x: Array, errors_of: Judge, tie: bool, far: float) -> Array:
         r = errors_of(plant_with(plant, names, full(x)))
-        r = np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far
+        r = soft(r, far)
         pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
         return np.concatenate([r, pull]) if tie else np.asarray(r)
 

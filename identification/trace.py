@@ -48,6 +48,7 @@ from identification.forward import at_once, judged_forward
 from identification.led import is_led
 from identification.left_over import (
     ASTRAY,
+    DOUBTFUL,
     FEWEST_ROWS,
     IMPOSED_LEFT,
     PLACES,
@@ -56,6 +57,7 @@ from identification.left_over import (
     in_run,
     left_over,
     places,
+    strongest,
     too_much,
     unrepeated,
 )
@@ -164,6 +166,9 @@ def trace(
     most = DECISIVE if choice.steps else COMPLETE
     left = Dependence((), 0.0) if after.misfit <= most else left_over(choice, after)
     changed = drift(after, choice.steps, seen, rig) if seen else ()
+    if not (left.depends_on or choice.steps or after.led) and after.misfit > DOUBTFUL:
+        left = in_run(after, logs, drive)
+        left = left if left.depends_on else at_breakaway(choice)
     verdict = verdict_of(choice, left, changed)
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(before, slowest, (), logs, seen, drive)
@@ -179,11 +184,7 @@ def trace(
     if verdict != "unknown" and (stands_in or pieced or longer or too_much(choice, after)):
         verdict = "unknown"
         another = pieced or longer  # a law of place, which is told from what the plain model leaves
-        left = Dependence((), 0.0) if another else left_over(choice, after, any_size=True)
-        if not (left.depends_on or another or after.led):
-            left = in_run(after, logs, drive)
-        if not (left.depends_on or another or after.led):
-            left = at_breakaway(choice)
+        left = Dependence((), 0.0) if another else strongest(choice, after, logs, drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
             left = left_over(plain, before, any_size=True)
