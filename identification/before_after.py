@@ -40,10 +40,10 @@ def errors_of(
                 errors[equation] = residual(stage, equation, found[equation].fit.theta, low)
         force = errors[MECHANICAL]
         whole = rms(force[1])
-        size = rms(force[0])
+        size = rms(force[0]) if len(force[0]) else None  # nothing slides
         out[name] = Errors(
             force_rms=size,
-            force_relative=size / whole if whole else None,
+            force_relative=size / whole if size is not None and whole else None,
             position_rms=None if model.led else position_rms(model.plant, over, drive),
             actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
         )

@@ -19,5 +19,6 @@ def kinks(F: Array, noise: float) -> Array:
     second = np.zeros(len(F))
     second[1:-1] = np.diff(F, 2)
     chance = 6.0 * (SHARP * noise) ** 2  # six variances in a second difference
-    square = np.maximum(second**2, 1e-300)
-    return np.asarray(-BEYOND * second * np.maximum(1.0 - chance / square, 0.0))
+    stands_out = second**2 > chance
+    part = np.divide(chance, second**2, out=np.ones(len(F)), where=stands_out)
+    return np.asarray(-BEYOND * second * (1.0 - part))

@@ -41,6 +41,20 @@ def check(log: Log, rig: Rig, first_row: int = 1) -> None:
         _check_work(log)
 
 
+def check_driven(log: Log) -> None:
+    """Raises BadLog, one line, where no force is logged or none that changes."""
+    if "F" not in log:
+        raise BadLog(
+            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
+            " with u"
+        )
+    if np.ptp(log["F"]) == 0.0:
+        raise BadLog(
+            f"{log.name}: the applied force is constant ({log['F'][0]:g}), so nothing drives"
+            " the body; check the force's columns in the card"
+        )
+
+
 def check_time(log: Log, first_row: int = 1) -> None:
     """Pass a log of at least `SHORTEST` samples whose time is finite and increases."""
     if len(log) < SHORTEST:

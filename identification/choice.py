@@ -155,7 +155,7 @@ def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Ou
     for step in steps:
         after, found = settled(replace(absorb(stage, step.candidate), scales={}))
         without = left_out_error(after, slowest)
-        if error > 0:
+        if error > 0 and MECHANICAL in step.candidate.outcomes:
             less = spread(base[MECHANICAL]) - spread(found[MECHANICAL])
             carries = without < CARRIES * error
             explains = less / max(missing, 1e-300)
@@ -283,6 +283,23 @@ def share(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
     """Share of what is missing in its equations that an effect explains."""
     missing = sum(max(base[k].criterion - len(base[k].rows.b), 0.0) for k in candidate.outcomes)
     return float(candidate.gain / max(missing, candidate.gain, 1e-300))
+
+
+def explained_part(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
+    """Part of the square beyond the sensors' noise that an effect explains in its equations, on
+    the rows that count with it."""
+    before, after = 0.0, 0.0
+    for equation, o in candidate.outcomes.items():
+        own = base[equation]
+        if o.robust:
+            without, left, noise = own.criterion, o.criterion, len(o.rows.b)
+        else:
+            keep = own.rows.speed >= o.slowest
+            without, left = (float(np.sum(x.fit.residual[keep] ** 2)) for x in (own, o))
+            noise = int(np.count_nonzero(keep))
+        before += max(without - noise, 0.0)
+        after += max(left - noise, 0.0)
+    return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
 
 
 def scales_of(found: Sequence[Candidate], base: Mapping[str, Outcome]) -> dict[str, float]:

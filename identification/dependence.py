@@ -19,6 +19,7 @@ APART = 0.1  # of the residual, that a swing in time must explain beyond any sig
 # motion makes all that depends on place or speed swing as well
 FINER = 4.0  # trial frequencies in each step that a log's length tells apart
 PLACES = 4  # of the even grid, on which rows are put, to a row
+SWINGS = 200  # rows; of fewer, the frequency that fits best does so by luck
 FEWEST = 4.0  # rows in a period
 
 
@@ -61,7 +62,7 @@ def dependence(
     which a signal is named. Each signal may act otherwise in the two directions.
     """
     best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
-    rate = frequency(r, signals["t"]) if "t" in signals else 0.0
+    rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
         swing = swinging_share(r, signals["t"], rate, block)
         if swing[0] > APART + max(share for share, _ in best.values()):

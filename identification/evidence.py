@@ -16,6 +16,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray, IntArray
 from identification.between import kinks
 from identification.differentiate import Motion, differentiate, resolution
+from identification.errors import BadLog
 from identification.karnopp import Karnopp
 from identification.log import Log
 from identification.weak_form import (
@@ -29,9 +30,12 @@ from identification.weak_form import (
 SECONDS = 0.06  # of a window
 EXACT = 1e-12  # of its range, to which any position is unsure
 FEWEST = 16  # samples in a window
+LEAST_PART = 200  # samples in a part of a log
+BEFORE = 0.5  # s before the body moves, with which a part of a log begins
 SURE = 5.0  # times the velocity's noise from which its sign is sure
 LED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)  # Hz; a slow motion needs smoothing to stand out of its noise
 MOSTLY_SURE = 0.9  # of a led body's samples, whose direction is to be sure
+STILL_UNSURE = 0.8  # of the others, at most, that more smoothing may leave; a body at rest stays so
 BLOCKS = 8  # stretches of a log that are left out in turn
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
@@ -147,11 +151,20 @@ def moving(
     motion = differentiate(log["y"], h)
     d = _direction(motion)
     for cutoff in LED_CUTOFFS if led else ():
-        if np.mean(d != 0) < MOSTLY_SURE:
-            motion = differentiate(log["y"], h, min(cutoff, motion.cutoff))
-            # Much smoothing rings where a body stops: the log itself must have gone that way.
-            d = np.where(_gone(log["y"], motion, h) == _direction(motion), _direction(motion), 0.0)
+        if np.mean(d != 0) >= MOSTLY_SURE:
+            break
+        smooth = differentiate(log["y"], h, min(cutoff, motion.cutoff))
+        # Much smoothing rings where a body stops: the log itself must have gone that way.
+        sure = np.where(_gone(log["y"], smooth, h) == _direction(smooth), _direction(smooth), 0.0)
+        if smooth.cutoff < motion.cutoff and np.mean(sure == 0) > STILL_UNSURE * np.mean(d == 0):
+            break
+        motion, d = smooth, sure
     length = max(FEWEST, 2 * round(SECONDS / h / 2))
+    if len(log) <= length:
+        raise BadLog(
+            f"{log.name}: {len(log)} samples in {len(log) * h:.3g} s, {length + 1} needed for one"
+            f" stretch of {length * h:.3g} s; log a longer run"
+        )
     sliding = sliding_windows(d, length, h)
     view = np.lib.stride_tricks.sliding_window_view(np.abs(motion.v), length + 1)
     u = log["u"] if "u" in log else np.zeros(len(log))
@@ -188,11 +201,16 @@ def _gone(y: Array, motion: Motion, h: float) -> Array:
     return np.where(np.abs(step) > SURE * np.sqrt(2.0) * motion.noise, np.sign(step), 0.0)
 
 
-def shortened(one: Moving, seconds: float, begin: int = 0) -> Moving:
-    """So many seconds of a log from a sample on, with its motion."""
-    n = min(len(one.log) - begin, max(2, round(seconds / one.log.h)))
+def shortened(one: Moving, seconds: float, begin: int | None = None) -> Moving:
+    """So many seconds of a log from a sample on, with its motion; where none is given, from just
+    before the body first moves. A part may stand still, so the noise is the whole log's."""
+    n = min(len(one.log), max(LEAST_PART, round(seconds / one.log.h)))
+    if begin is None:
+        begin = int(np.argmax(one.signals["d"] != 0)) - round(BEFORE / one.log.h)
+    begin = min(max(begin, 0), len(one.log) - n)
     cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
-    return replace(one.again(cut), reference=one.reference)
+    part = replace(one.again(cut), noise_y=one.noise_y, noise_F=one.noise_F)
+    return replace(part, reference=one.reference)
 
 
 def _beside_control(log: Log) -> float:

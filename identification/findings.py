@@ -1,21 +1,20 @@
 """What is told of a choice: verdict, effects and sizes, rivals, the run that would tell more."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from identification.alike import alike
 from identification.arrays import Array
 from identification.candidates import Candidate
-from identification.choice import Choice, Step, rescaled, share
+from identification.choice import Choice, Step, explained_part
 from identification.effects._base import Param
 from identification.evidence import ACTUATOR, MECHANICAL, Moving
 from identification.held_out import left_out
 from identification.karnopp import NAMES
 from identification.left_over import signals_at
 from identification.log import Rig
-from identification.outcome import Outcome, base_outcomes, rms
+from identification.outcome import Outcome, rms
 from identification.plant import Actuator, units_of
 from identification.result import Drive, Estimate
 from identification.stage import Stage
@@ -73,11 +72,7 @@ def found_effect(step: Step, after: Model, choice: Choice) -> FoundEffect:
     }
     explained = step.explained
     if explained is None:
-        bare = replace(
-            step.stage, scales={}
-        )  # beside the sensors' noise, not the best of a library
-        plain = base_outcomes(bare)
-        explained = share(rescaled(bare, step.candidate, plain), plain)
+        explained = explained_part(step.candidate, step.base)
     return FoundEffect(effect, params, explained, step.p_value)
 
 

@@ -9,7 +9,8 @@ from identification.evidence import Moving, mechanical
 SHOWN = 0.15  # of the force's quick changes, that inertia explains of a body that is free
 TOLD = 0.6  # of them, that inertia and damping explain of one that follows the force (led: 0.3)
 NEXT = 2.0  # times their length, that neighbouring windows begin apart at most
-FEWEST = 30  # pairs of neighbouring windows
+LUCK = 25.0  # times what chance explains of noise
+FEWEST = 30  # pairs of neighbouring windows, without which nothing tells that a rig leads it
 
 
 def is_led(logs: Sequence[Moving]) -> bool:
@@ -20,7 +21,7 @@ def is_led(logs: Sequence[Moving]) -> bool:
     is the inertia of a body that is free, or else a rig leads it. A lag of viscous friction may
     cancel the inertia; the force's changes then still tell those of the speed.
     """
-    columns, forces = [], []
+    columns, forces, noise = [], [], 0.0
     for one in logs:
         rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
         start = one.sliding.start
@@ -30,12 +31,19 @@ def is_led(logs: Sequence[Moving]) -> bool:
         pairs = pairs[one.up[pairs] == one.up[after[pairs]]]
         columns.append(rows.X[after[pairs]][:, [0, 3, 4]] - rows.X[pairs][:, [0, 3, 4]])
         forces.append(rows.b[after[pairs]] - rows.b[pairs])
+        noise += float(np.sum(rows.sd[after[pairs]] ** 2 + rows.sd[pairs] ** 2))
     X, b = np.concatenate(columns), np.concatenate(forces)
     if len(b) < FEWEST:
-        return True
+        return False
     size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
     theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
     others = b - X[:, 1:] @ theta[1:]
-    left = np.sum((others - X[:, 0] * theta[0]) ** 2)
-    shown = theta[0] > 0.0 and left <= (1.0 - SHOWN) * np.sum(others**2)
-    return not (shown or left <= (1.0 - TOLD) * np.sum(b**2))
+    left = float(np.sum((others - X[:, 0] * theta[0]) ** 2))
+
+    def tells(square: float, part: float) -> bool:
+        """Whether more than luck, and this part of what is no noise, is explained of a square."""
+        gained = square - left
+        return gained > LUCK * noise / len(b) and gained > part * (square - noise)
+
+    inertia = theta[0] > 0.0 and tells(float(np.sum(others**2)), SHOWN)
+    return not (inertia or tells(float(np.sum(b**2)), TOLD))

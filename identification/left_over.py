@@ -34,6 +34,7 @@ DOUBTFUL = 1.5  # the same, if its error depends on a signal; of 200 clean logs 
 PLACES = 3  # effects of place in one machine, which rather are pieces of one that no library has
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
+CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
 SLIGHTLY = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
 STRETCHES = 64  # of a log, every eighth of which is left out together
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
@@ -234,12 +235,17 @@ def _off(after: Model) -> float:
 def strongest(choice: Choice, after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
     """The strongest of the structures left in the equations, at breakaways and in the free run,
     however little it is, as something surely is missing."""
-    found = [left_over(choice, after, any_size=True)]
-    if not after.led:
-        found += [at_breakaway(choice), in_run(after, logs, drive)]
-        if not any(one.depends_on for one in found):
-            found.append(in_run(after, logs, drive, least=SLIGHTLY))
-    return max(found, key=lambda one: one.explained if one.depends_on else -1.0)
+    found = left_over(choice, after, any_size=True)
+    if after.led:
+        return found
+
+    def told(one: Dependence) -> float:
+        return one.explained if one.depends_on else 0.0
+
+    found = max(found, in_run(after, logs, drive), key=told)
+    few = at_breakaway(choice)
+    found = few if told(few) > CLEARLY * told(found) else found
+    return found if found.depends_on else in_run(after, logs, drive, least=SLIGHTLY)
 
 
 def in_run(

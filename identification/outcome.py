@@ -75,7 +75,7 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     total, theta = totals[best], thetas[best] * size[-1] / size[:-1]
     residual = A[:, -1] - A[:, :-1] @ theta
     fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
-    return Outcome(rows, fit, float(total), float(edges[best]))
+    return Outcome(rows, fit, float(total), 0.0 if stage.led else float(edges[best]))
 
 
 def _resistant(rows: Rows, scale: float) -> Fitted:

@@ -8,6 +8,7 @@ import numpy as np
 from identification.actuator import ActuatorFit, fit_actuator
 from identification.arrays import Array, IntArray
 from identification.box import Box, search_box
+from identification.check import check_driven
 from identification.errors import BadLog
 from identification.experiment import Run, impulse_of, noise_of, prepare_run
 from identification.karnopp import Karnopp
@@ -92,16 +93,7 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
             f"{logs[0].name}: a motor is driven by its command; leave out the drive by force"
         )
     for log in logs:
-        if "F" not in log:
-            raise BadLog(
-                f"{log.name}: no applied force; give the card F, both pressures, or"
-                " force_per_command with u"
-            )
-        if np.ptp(log["F"]) == 0.0:
-            raise BadLog(
-                f"{log.name}: the applied force is constant ({log['F'][0]:g}), so nothing drives"
-                " the body; check the force's columns in the card"
-            )
+        check_driven(log)
     hold = rig.kind == "motor"
     firsts = tuple(first_estimate(log, held=hold) for log in logs)
     with_command = not hold and all("u" in log and np.ptp(log["u"]) > 0 for log in logs)

@@ -218,7 +218,8 @@ def _flattened(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: R
 def _beside(fresh: Rows, rows: Rows) -> Rows:
     """Fresh plain columns, with the further columns that `rows` has."""
     more = rows.X[:, fresh.X.shape[1] :]
-    return replace(fresh, X=np.column_stack([fresh.X, more]), names=rows.names)
+    both = np.column_stack([fresh.X, more])
+    return replace(fresh, X=both, names=rows.names, positive=rows.positive)
 
 
 def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[list[Array], Array]:

@@ -14,6 +14,7 @@ import numpy as np
 from identification.alike import told_apart
 from identification.before_after import carries, errors_of, noise_of, share_left
 from identification.candidates import best_of
+from identification.check import check_driven
 from identification.choice import (
     Choice,
     choose,
@@ -104,6 +105,8 @@ def trace(
     where the command is logged, u [V], on an even clock. Raises BadLog where a signal is missing,
     NotIdentifiable where too little of the motion slides.
     """
+    for log in (*train, *test):
+        check_driven(log)
     report = on_progress or (lambda _stage, _share: None)
     remarks: list[str] = []
     by_command = _by_command(train, rig, library, remarks)
@@ -120,6 +123,7 @@ def trace(
     if imposed:
         recorded = partial(recorded, led=True)
         logs = [recorded(log) for log in train]
+        _enough(logs)
         start, first = first_stage(logs, by_command)
         before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
         library = _told_by_speed(library, logs, remarks)
@@ -230,10 +234,10 @@ def _remarks(
     rig: Rig,
 ) -> Iterator[str]:  # fmt: skip
     """What whoever reads the trace has to know of it."""
-    if after.stage.led:
+    if after.led and after.stage.led:
         yield "the motion is imposed (inertia is of no account): no free run is judged"
     elif after.led:
-        yield "what is left hides the inertia: no free run is judged"
+        yield "inertia does not show beside what is left: no free run is judged"
     elif choice.steps and after.misfit > ASTRAY:
         yield (
             f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
@@ -255,6 +259,8 @@ def _remarks(
             "the force hardly ever opposes the motion, so friction in proportion to it would not"
             f" show{motor} (a run that brakes hard would show it)"
         )
+    if seen and not any(len(one.sliding.start) for one in seen):
+        yield "the body does not slide in the test logs, so they say nothing of the force error"
     if not seen:
         yield "no test log: the test errors are those of stretches left out in turn"
 

@@ -1,7 +1,8 @@
 """What a command names on its line: the card, and the runs in its log files."""
 
+from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from identification.errors import BadLog
@@ -28,7 +29,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
     Raises BadCard, BadLog; also where the files are of different machines or one is named twice.
     """
     card = load_card(card_path(card_name), with_recipe=False)
-    runs: list[Source] = []
+    found: list[tuple[Path, Source]] = []
     remarks: list[str] = []
     rigs: dict[Path, Rig] = {}
     for name in names:
@@ -39,7 +40,9 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
         rigs[whole] = card.rig(path.name)
         prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
-        runs.extend(_source(path, run) for run in prepared.runs)
+        found.extend((whole, _source(path, run)) for run in prepared.runs)
+    names_of = Counter(path.name for path in rigs)
+    runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
     for path, rig in rigs.items():
         if rig != rigs[first]:
@@ -53,3 +56,9 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
 def _source(path: Path, run: Log) -> Source:
     found = fingerprint(path, run)
     return Source(run, found.file, found.sha256, found.rows)
+
+
+def _told_apart(source: Source, path: Path) -> Source:
+    """The run named with its folder, as another file has the same name."""
+    name = source.log.name.replace(path.name, f"{path.parent.name}/{path.name}", 1)
+    return replace(source, log=replace(source.log, name=name))

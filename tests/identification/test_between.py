@@ -76,3 +76,8 @@ def test_breakaways_that_a_force_only_just_reaches_are_followed(
     bare = moving(pneumatic(seed), held=False, by_command=False)
     without = misfit(Plant(NINE), [bare], "force", every=True)
     assert found < 0.2 * without
+
+
+def test_a_force_whose_noise_is_huge_has_no_kinks() -> None:
+    assert not np.any(kinks(np.zeros(40), 1e4))
+    assert not np.any(kinks(np.zeros(40), 0.0))

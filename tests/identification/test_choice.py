@@ -1,17 +1,19 @@
 """Choice on the equations: the next best where the best bends the rest, and bristles by rest."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from benchmarks.outside_rig import EFFECTS, write
 from identification.candidates import best_of
-from identification.choice import choose, first_stage, gives_way
-from identification.evidence import REST, moving
+from identification.choice import choose, explained_part, first_stage, gives_way, trusted
+from identification.evidence import ACTUATOR, REST, moving
 from identification.library import built_in
 from identification.log import Log
 from identification.stage import Stage
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
+from tests.identification.test_trace import made as pneumatic
 
 
 def quiet(_stage: str, _share: float) -> None:
@@ -59,3 +61,21 @@ def test_a_bristle_that_explains_rest_gives_way() -> None:
     start, first = first_stage([seen(log)], False)
     candidate = best_of(start, built_in()["presliding"], first)
     assert candidate is not None and gives_way(candidate, first)
+
+
+def test_logs_left_out_say_nothing_against_an_effect_of_another_equation() -> None:
+    effects = {"leakage": {"leak": 1.5}}
+    logs = [moving(pneumatic(seed, effects), held=False, by_command=True) for seed in (21, 22)]
+    start, first = first_stage(logs, True)
+    library = {"leakage": built_in()["leakage"]}
+    found = choose(start, first, library, np.random.default_rng(0), quiet)
+    assert list(found.steps[0].candidate.outcomes) == [ACTUATOR]
+    assert trusted(start, found.steps)[2] == list(found.steps)
+
+
+def test_the_part_explained_is_that_of_the_square_beyond_the_noise() -> None:
+    start, first = first_stage([seen(made(4, {"spring": {"k": 40.0}}))], False)
+    library = {"spring": built_in()["spring"]}
+    step = choose(start, first, library, np.random.default_rng(0), quiet).steps[0]
+    assert explained_part(step.candidate, step.base) > 0.95
+    assert explained_part(replace(step.candidate, outcomes=step.base), step.base) == 0.0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array, IntArray
-from identification.dependence import dependence
+from identification.dependence import SEPARATE, dependence
 
 
 def signals(n: int, rng: np.random.Generator) -> dict[str, Array]:
@@ -77,3 +77,13 @@ def test_what_depends_on_a_periodic_place_is_no_vibration() -> None:
     found = dependence(r, named, named["v"] >= 0, block)
     assert found.depends_on[0] == "y"
     assert found.swing == 0.0
+
+
+def test_few_rows_tell_no_swing() -> None:
+    swings = 0
+    for seed in range(200):  # the frequency that fits best is one of many
+        rng = np.random.default_rng(seed)
+        s = {"t": np.sort(rng.uniform(0.0, 60.0, 40)), "v": rng.standard_normal(40)}
+        found = dependence(rng.standard_normal(40), s, s["v"] > 0, np.arange(40) % 8, SEPARATE)
+        swings += found.swing > 0.0
+    assert swings == 0

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.evidence import Rows, moving, solve
+from identification.errors import BadLog
+from identification.evidence import LEAST_PART, Rows, moving, shortened, solve
 from identification.log import Log
 
 
@@ -23,3 +24,29 @@ def test_what_no_row_tells_comes_out_as_nothing() -> None:
     one = np.ones(40)
     rows = Rows(3.0 * X[:, 0], X, one, np.zeros(40, dtype=np.int64), one, ("m", "F_cp"))
     assert solve(rows).theta == pytest.approx([3.0, 0.0], abs=1e-12)
+
+
+def standing(h: float = 2e-3, n: int = 20_000) -> Log:
+    """A log that stands on one count of its encoder for 12 s, and then swings."""
+    t = h * np.arange(n, dtype=np.float64)
+    swing = 0.05 * np.sin(2.0 * np.pi * 0.7 * np.clip(t - 12.0, 0.0, None))
+    return Log("stands", {"t": t, "y": 2e-5 * np.round(swing / 2e-5), "F": np.cos(t)})
+
+
+def test_a_part_of_a_log_begins_where_the_body_does_and_has_the_noise_of_the_whole() -> None:
+    one = moving(standing(), held=False, by_command=False)
+    part = shortened(one, 5.0)
+    assert 11.0 < part.log["t"][0] < 12.0
+    assert len(part.log) == 2500
+    assert (part.noise_y, part.noise_F) == (one.noise_y, one.noise_F)
+    assert shortened(one, 100.0).log.signals.keys() == one.log.signals.keys()
+    slow = moving(standing(0.2, 500), held=False, by_command=False)
+    assert len(shortened(slow, 5.0).log) == LEAST_PART  # fewer samples show no motion
+
+
+def test_a_log_shorter_than_one_stretch_is_refused() -> None:
+    n = 5000
+    t = 1e-5 * np.arange(n)
+    log = Log("short", {"t": t, "y": np.sin(100.0 * t), "F": np.cos(100.0 * t)})
+    with pytest.raises(BadLog, match=r"short: 5000 samples in 0\.05 s, 6001 needed"):
+        moving(log, held=False, by_command=False)

@@ -15,6 +15,7 @@ from identification.left_over import (
     in_run,
     left_over,
     places,
+    strongest,
     too_much,
     unrepeated,
     unsized,
@@ -205,3 +206,30 @@ def test_breakaways_tell_that_they_depend_on_the_time_at_rest() -> None:
     plain, _ = lacking({}, seeds=seeds)
     assert at_breakaway(plain).depends_on == ()
     assert at_breakaway(replace(choice, base={})).depends_on == ()
+
+
+@pytest.mark.parametrize(
+    ("missing", "signals"),
+    [
+        ({"rising_stiction": {"F_r": 6.0, "tau": 0.3}}, {"rest"}),
+        ({"backlash": {"width": 3e-4}}, {"u", "F", "v"}),
+        ({}, set[str]()),
+    ],
+)
+def test_the_strongest_of_equations_breakaways_and_run_is_named(
+    missing: dict[str, dict[str, float]], signals: set[str]
+) -> None:
+    choice, after = lacking(missing, seeds=(5, 6, 7))
+    found = strongest(choice, after, after.stage.logs, "command")
+    assert set(found.depends_on) == signals
+
+
+def test_how_large_an_error_is_tells_where_its_sign_is_a_matter_of_luck() -> None:
+    # Breakaways come a little early or late, by chance: no mean depends on anything.
+    _, after = lacking({})
+    one = after.stage.logs[0]
+    rng, sigma = np.random.default_rng(2), one.noise_y
+    slow = np.abs(one.signals["v"]) < np.quantile(np.abs(one.signals["v"]), 0.4)
+    lost = np.cumsum(np.where(slow, 3.0 * sigma * rng.standard_normal(len(slow)), 0.0))
+    blurred = replace(one, log=one.log.with_signals(y=one.log["y"] + lost))
+    assert "v" in in_run(after, [blurred], "command").depends_on

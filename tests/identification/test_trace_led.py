@@ -9,7 +9,7 @@ from scipy.signal import lfilter
 
 from identification.arrays import Array
 from identification.choice import first_stage
-from identification.errors import NotIdentifiable
+from identification.errors import BadLog, NotIdentifiable
 from identification.evidence import MECHANICAL, Moving, moving
 from identification.held_out import left_out_error
 from identification.led import is_led
@@ -153,3 +153,44 @@ def test_noise_is_no_inertia(seed: int) -> None:
     assert is_led([moving(log, held=False, by_command=False) for log in logs])
     short = Log("short", {k: x[:200] for k, x in logs[0].signals.items()})
     assert is_led([moving(short, held=False, by_command=False)])  # too little to tell
+
+
+def bursts(rate: float, seed: int) -> Log:
+    """A rig that swings the body by 1 mm at this rate [Hz] and rests as long: a second each."""
+    h, rng = 2e-3, np.random.default_rng(seed)
+    t = h * np.arange(15_000, dtype=np.float64)
+    y = 1e-3 * np.sin(2.0 * np.pi * rate * h * np.cumsum(t % 2.0 < 1.0))
+    force = COULOMB * np.sign(np.gradient(y)) + NOISE_F * rng.standard_normal(len(t))
+    return Log("bursts", {"t": t, "y": y + 2e-6 * rng.standard_normal(len(t)), "F": force})
+
+
+@pytest.mark.parametrize("rate", [2.0, 4.0, 6.0])
+def test_rest_between_strokes_is_not_smoothed_away(rate: float) -> None:
+    log = bursts(rate, 1)
+    free, imposed = (moving(log, held=False, by_command=False, led=led) for led in (False, True))
+    assert len(imposed.sliding.start) == len(free.sliding.start)
+    assert imposed.signals["v"] == pytest.approx(free.signals["v"])
+
+
+def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
+    train = [strokes(1, [speed] * 4, 1) for speed in (4e-3, 5e-3)]
+    slower = strokes(5, [3e-3] * 4, 3)  # slower than any that was learned from, at more pressure
+    found = traced(train, [slower])
+    size = found.before["test"].force_rms
+    assert size is not None and size == pytest.approx(4.0 * PER_BAR, rel=0.1)
+    n = 3000
+    still = Log(
+        "still",
+        {
+            "t": H * np.arange(n, dtype=np.float64),
+            "y": colored(n, np.random.default_rng(1)),
+            "F": NOISE_F * np.random.default_rng(2).standard_normal(n),
+            "p_n": 1e5 + 2e3 * np.random.default_rng(3).standard_normal(n),
+        },
+    )
+    found = traced(train, [still])
+    assert found.before["test"].force_rms is None
+    assert any("does not slide in the test logs" in remark for remark in found.remarks)
+    dead = still.with_signals(F=np.zeros(n))
+    with pytest.raises(BadLog, match="still: the applied force is constant"):
+        traced(train, [dead])

@@ -1,0 +1,30 @@
+"""The runs that a command names."""
+
+from pathlib import Path
+
+import pytest
+
+from identification.errors import BadLog
+from tests.workbench.log_files import CARD, signals
+from workbench.sources import read_sources
+
+
+def files(folder: Path, *names: str) -> list[str]:
+    """Logs of these names below the folder, and the card beside them."""
+    (folder / "card.toml").write_text(CARD, encoding="utf-8")
+    for name in names:
+        path = folder / name
+        path.parent.mkdir(exist_ok=True)
+        rows = zip(*(signals()[key] for key in ("t", "y", "F")), strict=True)
+        lines = [",".join(f"{x:.9g}" for x in row) for row in rows]
+        path.write_text("t,y,F\n" + "\n".join(lines), encoding="utf-8")
+    return [str(folder / name) for name in names]
+
+
+def test_files_of_one_name_in_two_folders_are_told_apart(tmp_path: Path) -> None:
+    names = files(tmp_path, "monday/run.csv", "friday/run.csv", "friday/other.csv")
+    found = read_sources(names, str(tmp_path / "card.toml")).runs
+    assert [run.log.name for run in found] == ["monday/run.csv", "friday/run.csv", "other.csv"]
+    assert [run.file for run in found] == ["run.csv", "run.csv", "other.csv"]
+    with pytest.raises(BadLog, match=r"run\.csv: given twice"):
+        read_sources([names[0], names[0]], str(tmp_path / "card.toml"))
