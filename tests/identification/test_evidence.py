@@ -46,7 +46,7 @@ def test_a_part_of_a_log_begins_where_the_body_does_and_has_the_noise_of_the_who
 
 def test_a_log_shorter_than_one_stretch_is_refused() -> None:
     n = 5000
-    t = 1e-5 * np.arange(n)
+    t = 1e-5 * np.arange(n, dtype=np.float64)
     log = Log("short", {"t": t, "y": np.sin(100.0 * t), "F": np.cos(100.0 * t)})
     with pytest.raises(BadLog, match=r"short: 5000 samples in 0\.05 s, 6001 needed"):
         moving(log, held=False, by_command=False)
