@@ -162,6 +162,7 @@ class ClaimRow(Base):
     token: Mapped[str]
     owner: Mapped[str]
     until: Mapped[datetime]
+    lease_ms: Mapped[int | None] = mapped_column(BigInteger)
 
 
 class ReopeningRow(Base):

@@ -51,6 +51,39 @@ def test_a_table_of_something_else_is_left_alone(tmp_path: Path) -> None:
         Registry(str(path))
 
 
+def test_an_empty_file_is_no_new_registry(tmp_path: Path) -> None:
+    path = tmp_path / "r.db"
+    path.touch()
+    for create in (True, False):
+        with pytest.raises(BadRegistry, match=r"is empty \(0 bytes\).*restore it"):
+            Registry(str(path), create=create)
+    assert path.stat().st_size == 0
+    path.unlink()
+    Registry(str(path)).close()
+    assert [one.name for one in tmp_path.iterdir()] == ["r.db"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("INSERT INTO alembic_version VALUES ('0001')", "names 2 layouts"),
+        ("DROP TABLE notice", "its table 'notice' is gone"),
+        ("DROP TRIGGER {outcome}", "nothing keeps its table 'outcome'"),
+    ],
+)
+def test_a_database_changed_by_hand_is_refused(where: str, change: str, said: str) -> None:
+    with Registry(where) as registry, registry.database.writing() as session:
+        if "TRIGGER" not in change:
+            session.execute(text(change))
+        elif registry.database.dialect == "sqlite":
+            for event in ("update", "delete", "replace"):
+                session.execute(text(change.format(outcome=f"outcome_{event}")))
+        else:
+            session.execute(text(change.format(outcome="outcome_append_only ON outcome")))
+    with pytest.raises(BadRegistry, match=said):
+        Registry(where)
+
+
 def many(where: str, who: int) -> None:
     """What each of several processes does: add versions of one machine and promote them."""
     with Registry(where) as registry:
