@@ -36,7 +36,7 @@ def upgrade(connection: Connection, where: str) -> None:
 
 
 def revision(connection: Connection, where: str) -> str | None:
-    """The layout's revision; None where there is none yet. Raises BadRegistry where it is double."""
+    """The layout's revision; None where there is none yet. Raises BadRegistry where it has two."""
     if not inspect(connection).has_table("alembic_version"):
         return None
     found = connection.execute(text("SELECT version_num FROM alembic_version")).scalars().all()
