@@ -120,7 +120,7 @@ def window_run(
             bristle_step=begun.step,
         )
 
-    sensors = [acting.effect for acting in plant.effects if acting.effect.acts == "sensor"]
+    sensors = [acting.effect for acting in plant.effects if acting.effect.place.shows]
     # A play is as wide open as the motion before has left it.
     at = begun.at - (1 if any(one.evolve is not None for one in sensors) else 0)
     try:

@@ -16,7 +16,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import (
     AT_REST,
-    GIVEN_UNIT,
     MAX_PARAMS,
     MAX_SIGNALS,
     Effect,
@@ -143,7 +142,7 @@ def check_linear(effect: Effect) -> None:
         size = 1e-9 * (abs(a) + abs(b) + abs(none)) + 1e-300  # a number may lose its digits
         if not abs(share * a + (1.0 - share) * b - c) <= size:
             raise Broken(f"value is not linear in {', '.join(effect.linear)}, declared to be so")
-        if effect.acts != "sensor" and none != 0.0:  # its value is the position, nothing added
+        if not effect.place.shows and none != 0.0:  # its value is the position, nothing added
             raise Broken(f"with {', '.join(effect.linear)} at 0 it still gives {none:.3g}")
 
 
@@ -152,7 +151,7 @@ def check_depends_on(effect: Effect) -> None:
     found = {name for name in ("t", "y", "v", "F", "u") if moved_by(effect, name)}
     by_friction = moved_by(effect, "f")  # or it but tells sliding from rest
     found |= {"v"} if by_friction and not set(AT_REST) & set(effect.names) else set()
-    found |= {"u"} if effect.acts == "delay" else set()
+    found |= {"u"} if effect.place.delays else set()
     found |= {k for i, k in enumerate(effect.signals) if _moved_in(effect, "s", i, "value")}
     remembers = moved_by(effect, "z")  # a bristle's state is the simulation's own
     by_state = remembers and effect.evolve is not None
@@ -196,13 +195,13 @@ def check_units(effect: Effect) -> None:
             function = sympy.lambdify(
                 [sympy.Symbol(n, real=True) for n in names], equation, [_quantities(), "math"]
             )
-            registry.Quantity(function(*numbers)).to(GIVEN_UNIT[effect.acts])
+            registry.Quantity(function(*numbers)).to(effect.place.unit)
         except (pint.PintError, TypeError, AttributeError) as error:
             errors.append(" ".join(str(error).split()))
         else:
             return
     advice = "" if not remembers or effect.state_unit else "; say the state's unit as state_unit"
-    raise Broken(f"units do not multiply out to {GIVEN_UNIT[effect.acts]}: {errors[0]}{advice}")
+    raise Broken(f"units do not multiply out to {effect.place.unit}: {errors[0]}{advice}")
 
 
 def moved_by(effect: Effect, name: str, part: str = "value") -> bool:
@@ -214,7 +213,9 @@ def moved_by(effect: Effect, name: str, part: str = "value") -> bool:
 
 def _moves(effect: Effect, part: str, change: Callable[[Draw, Draw], Draw]) -> bool:
     rng = np.random.default_rng(9)
-    base = {"sensor": "y", "command": "u"}.get(effect.acts) if part == "value" else None
+    place = effect.place
+    own = "y" if place.shows else "u" if place.on_command and not place.delays else None
+    base = own if part == "value" else None
     for _ in range(DRAWS):
         one = draw(effect, rng)
         two = change(one, draw(effect, rng))

@@ -76,7 +76,7 @@ def check_signals(effect: Effect) -> None:
 def check_never_drives(effect: Effect, values: Mapping[str, float] = MappingProxyType({})) -> None:
     """Friction takes energy while the body slides; values: of its parameters, else typical."""
     acting = effect.acting(values) if values else typical(effect)
-    if effect.acts in ("slip", "stiction", "friction"):
+    if effect.place.rubs or effect.place.holds:
         moved = run_with(ELECTRIC, trial_log(10.0), acting)
         # In the band eq. (1) itself has the friction of the force's direction, not the motion's.
         sliding = np.isin(moved.mode, (SLIP_P, SLIP_N))
@@ -84,7 +84,7 @@ def check_never_drives(effect: Effect, values: Mapping[str, float] = MappingProx
         taken = energy_taken(moved, ELECTRIC.friction.m)[whole]
         if taken.size and np.min(taken) < DRIVES:
             raise Broken(f"as friction it gives the body {-np.min(taken):.3g} J in one sample")
-    if effect.acts == "bristle":
+    if effect.place.elastic:
         for stiffness in STIFF:
             one = acting.values | {effect.params[0].name: stiffness}
             moved = run_with(ELECTRIC, trial_log(10.0), effect.acting(one))
@@ -95,12 +95,12 @@ def check_never_drives(effect: Effect, values: Mapping[str, float] = MappingProx
 
 def check_vanishes(effect: Effect) -> None:
     """Of no size it changes nothing (a bristle replaces sticking, whatever its stiffness)."""
-    if effect.acts == "bristle":
+    if effect.place.elastic:
         return
     small = {p.name: 0.0 if p.linear else p.typical for p in effect.params}
     if not effect.linear:
         small[effect.names[0]] = effect.params[0].low
-    exact = not effect.evolve or effect.acts == "sensor" or bool(effect.linear)
+    exact = not effect.evolve or effect.place.shows or bool(effect.linear)
     log = trial_log(10.0)
     for plant in (HYDRAULIC, ELECTRIC):
         plain, found = run_with(plant, log), run_with(plant, log, effect.acting(small))

@@ -71,14 +71,12 @@ def check(folder: Path, as_json: bool) -> int:
 
 def described(effect: "Effect") -> dict[str, Any]:
     """An effect as JSON has it."""
-    from identification.effects._base import GIVES
-
     return {
         "key": effect.key,
         "meaning": effect.meaning,
         "equation": effect.equation,
         "acts": effect.acts,
-        "gives": GIVES[effect.acts],
+        "gives": effect.place.gives,
         "depends_on": effect.depends_on,
         "signals": effect.signals,
         "state_unit": effect.state_unit,
@@ -99,12 +97,10 @@ def _lines(found: "list[Effect]") -> "RenderableType":
     from rich.padding import Padding
     from rich.text import Text
 
-    from identification.effects._base import GIVES
-
     parts: list[RenderableType] = []
     for one in found:
         parts.append(Text(f"{one.key}: {one.meaning}"))
-        lines = [f"{one.equation}", f"gives the {GIVES[one.acts]}"]
+        lines = [f"{one.equation}", f"gives the {one.place.gives}"]
         for p in one.params:
             usual = f"{p.typical:g}" if p.default is None else f"{p.default:g} unless given"
             lines.append(f"{p.name} [{p.unit}]: {p.meaning} ({usual})")
