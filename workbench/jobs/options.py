@@ -16,7 +16,7 @@ import click
 from workbench.options import POSITIVE, effects_option
 
 if TYPE_CHECKING:
-    from workbench.jobs.alarms import Webhook
+    from workbench.jobs.alarms import Delivery, Webhook
     from workbench.jobs.metrics import Figures
     from workbench.jobs.passes import PassReport, Report
     from workbench.registry.store import Registry
@@ -70,6 +70,14 @@ def job_options(command: Command) -> Command:
 
 
 @dataclass(frozen=True)
+class Done:
+    """What a pass did, and what became of the alarms; None without a webhook."""
+
+    judged: "PassReport"
+    alarms: "Delivery | None"
+
+
+@dataclass(frozen=True)
 class Worker:
     """One worker: `once` is a pass with its alarms and metrics."""
 
@@ -81,16 +89,14 @@ class Worker:
     figures: "Figures"
     stop: Callable[[], bool]
 
-    def once(self) -> "PassReport":
+    def once(self) -> Done:
         """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
         from workbench.challenge import Terms
-        from workbench.jobs.alarms import send_alarms
         from workbench.jobs.lease import Patience
         from workbench.jobs.metrics import write_metrics
         from workbench.jobs.passes import Pass, Settings
         from workbench.judging import Chain
         from workbench.own_effects import library
-        from workbench.registry.queue import Queue
 
         given = self.options
         settings = Settings(
@@ -103,13 +109,20 @@ class Worker:
         terms = Terms(held_out=given.margin)
         judge = Chain(terms=terms, seed=given.seed, library=library(given.effects))
         done = Pass(self.registry, judge, settings, clock, self.report, self.stop).run(given.root)
-        if self.webhook is not None:
-            queue = Queue(self.registry.database)
-            send_alarms(queue, self.webhook, now=clock(), report=self.report)
+        alarms = self._alarms()
         self.figures.passed(clock(), len(done.failed))
         if given.metrics is not None:
             write_metrics(given.metrics, self.figures)
-        return done
+        return Done(done, alarms)
+
+    def _alarms(self) -> "Delivery | None":
+        from workbench.jobs.alarms import send_alarms
+        from workbench.registry.outbox import Outbox
+
+        if self.webhook is None:
+            return None
+        outbox = Outbox(self.registry.database)
+        return send_alarms(outbox, self.webhook, clock=clock, report=self.report, stop=self.stop)
 
 
 @contextmanager

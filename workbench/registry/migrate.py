@@ -11,7 +11,7 @@ from workbench.registry.tables import Base
 if TYPE_CHECKING:
     from alembic.config import Config
 
-HEAD = "0001"  # known without importing Alembic, which most starts do not need
+HEAD = "0002"  # known without importing Alembic, which most starts do not need
 LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
 
 

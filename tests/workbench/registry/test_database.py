@@ -35,6 +35,17 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
     assert ScriptDirectory.from_config(config()).get_current_head() == HEAD
 
 
+def test_a_registry_of_the_first_layout_is_brought_up_to_date(where: str) -> None:
+    with Registry(where) as registry:
+        registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
+        with registry.database.writing() as session:
+            session.execute(text("DROP TABLE outbox"))
+            session.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+    with Registry(where) as registry:
+        test_steps_and_tables_agree(registry)
+        assert [v.number for v in registry.versions("a")] == [1]
+
+
 def test_a_newer_layout_is_refused(where: str) -> None:
     with Registry(where) as registry, registry.database.writing() as session:
         session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
