@@ -31,7 +31,7 @@ COMMANDS = {
     "watch": "Do so again and again, by schedule and on new files.",
     "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
 }
-ENDING = (signal.SIGTERM, signal.SIGHUP)
+ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
 ADVICE = {

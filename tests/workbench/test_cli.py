@@ -255,8 +255,8 @@ def test_signals_are_as_before_after_a_command(outcome: Fail) -> None:
 def test_a_signal_that_is_ignored_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
     try:
-        monkeypatch.setattr(cli, "_run", lambda _: signal.raise_signal(signal.SIGHUP) or 0)
-        assert cli.main([]) == 0
+        monkeypatch.setattr(cli, "_run", lambda _: signal.raise_signal(signal.SIGHUP))
+        cli.main([])
         assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
     finally:
         signal.signal(signal.SIGHUP, before)

@@ -18,10 +18,12 @@ from sqlalchemy.exc import (
     InternalError,
     NoSuchModuleError,
     OperationalError,
+    ProgrammingError,
     TimeoutError,
 )
 from sqlalchemy.orm import Session
 
+from workbench.links import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import upgrade
 
@@ -93,7 +95,8 @@ class Database:
                 raise BadRegistry(
                     f"registry {self.where}: {error.orig}; name a registry's file, or a new one"
                 ) from None
-            if error.statement is None:  # of an option in the URL that the driver does not know
+            # Without a statement it is of an option in the URL that the driver does not know.
+            if isinstance(error, ProgrammingError) and error.statement is None:
                 said = " ".join(str(error.orig).split())
                 raise BadRegistry(f"registry {self.where}: {said}; correct the URL") from None
             raise
@@ -155,6 +158,9 @@ def _shown(url: URL) -> str:
 
 
 def _refuse_missing(path: Path) -> None:
+    broken = broken_link(path)
+    if broken:
+        raise BadRegistry(f"registry {path}: {broken}")
     if not path.exists():
         raise BadRegistry(
             f"registry {path}: no such file; 'workbench registry add' makes one, or name it by"

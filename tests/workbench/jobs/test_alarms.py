@@ -1,13 +1,9 @@
 """Alarms reach a webhook once; one that it refuses delays itself alone, and a dead one nothing."""
 
-import json
 import logging
-import threading
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -16,6 +12,7 @@ import httpx
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from tests.workbench.jobs.listener import Listener
 from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from workbench.jobs.alarms import (
@@ -36,47 +33,6 @@ from workbench.registry.store import Registry
 from workbench.registry.values import Alarm
 
 MINUTE = timedelta(minutes=1)
-
-
-class Listener(ThreadingHTTPServer):
-    """Takes alarms; answers with each of `answers` in turn, then by `by_machine`, or with 200."""
-
-    def __init__(self) -> None:
-        super().__init__(("127.0.0.1", 0), Handler)
-        self.taken: list[dict[str, Any]] = []
-        self.keys: list[str | None] = []
-        self.answers: list[int] = []
-        self.by_machine: dict[str, int] = {}
-
-
-class Handler(BaseHTTPRequestHandler):
-    server: Listener
-
-    def do_POST(self) -> None:
-        said = json.loads(self.rfile.read(int(self.headers["Content-Length"])))
-        status = self.server.by_machine.get(said["machine"], 200)
-        if self.server.answers:
-            status = self.server.answers.pop(0)
-        if status == 200:
-            self.server.taken.append(said)
-            self.server.keys.append(self.headers["Idempotency-Key"])
-        self.send_response(status)
-        self.send_header("Location", "http://127.0.0.1:9/elsewhere")
-        self.end_headers()
-
-    def log_message(self, format: str, *args: object) -> None:
-        """Nothing on the terminal."""
-
-
-@pytest.fixture
-def listener() -> Iterator[Listener]:
-    server = Listener()
-    thread = threading.Thread(target=server.serve_forever)
-    thread.start()
-    yield server
-    server.shutdown()
-    thread.join()
-    server.server_close()
 
 
 @pytest.fixture
@@ -261,6 +217,21 @@ def test_any_name_goes_through(listener: Listener, name: str) -> None:
     shown = name.encode("utf-8", "backslashreplace").decode()
     assert (taken["machine"], taken["reason"]) == (shown, f"{shown}: bad")
     assert listener.keys == [key(alarm(name))]
+
+
+def test_any_machine_goes_from_its_folder_to_the_webhook(
+    registry: Registry, listener: Listener, tmp_path: Path
+) -> None:
+    names = ["Pr\u00fcfstand", "\udcff", 'a "b"', "\u65e5" * 80]
+    in_force(registry, *names)
+    for name in names:
+        machine(tmp_path / "m", name, {f"{name}.csv"[-80:]: f"bad {len(name)}"})
+    for count in (4, 0):
+        done = Pass(registry, judge, settings("w"), clock, ignore).run(tmp_path / "m")
+        assert (len(done.outcomes), done.failed) == (count, {})
+    assert send(registry, webhook(listener)) == Delivery(4)
+    shown = {name.encode("utf-8", "backslashreplace").decode() for name in names}
+    assert {taken["machine"] for taken in listener.taken} == shown
 
 
 def test_keys_tell_alarms_apart_and_stay_as_they_are() -> None:
