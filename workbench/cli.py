@@ -25,6 +25,7 @@ COMMANDS = {
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",
     "simulate": "Make the log of a recipe, its truth beside it.",
+    "effects": "List the effects that 'trace' knows; check your own.",
     "paper": "Run the paper in simulation, its figures beside ours.",
     "registry": "Show and change what is in force on each machine.",
     "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",

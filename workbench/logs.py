@@ -1,6 +1,7 @@
 """Log files read by their card: canonical signals in SI, the applied force F_e among them."""
 
 import hashlib
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -61,7 +62,12 @@ def fingerprint(path: Path, log: Log) -> Fingerprint:
     """Name, sha256 and rows of the file from which `log` was read."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")
-    return Fingerprint(path.name, digest.hexdigest(), len(log))
+    return Fingerprint(shown_name(path), digest.hexdigest(), len(log))
+
+
+def shown_name(path: Path) -> str:
+    """The file's name as text; bytes that are not UTF-8 as "\\xff"."""
+    return os.fsencode(path.name).decode("utf-8", "backslashreplace")
 
 
 def _with_force(log: Log, path: Path, card: Card) -> Log:
@@ -92,7 +98,7 @@ def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
         with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
             signals[name] = _to_si(numbers, name, spec, card, path)
         _refuse_absurd(signals[name], name, path, table.first_row)
-    return Log(path.name, _same_length(signals, path)), table.first_row
+    return Log(shown_name(path), _same_length(signals, path)), table.first_row
 
 
 def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:

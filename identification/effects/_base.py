@@ -37,6 +37,10 @@ GIVES: Mapping[Acts, str] = {
     "delay": "time by which the command is late [s]",
     "sensor": "position that the transducer shows in place of y [m]",
 }
+GIVEN_UNIT: Mapping[Acts, str] = {
+    "slip": "N", "stiction": "N", "friction": "N", "bristle": "N/m", "force": "N",
+    "actuator": "N/s", "command": "V", "delay": "s", "sensor": "m",
+}  # fmt: skip
 Kernel = Callable[..., float]
 # A number and numbers, as the kernels' eleven arguments are annotated.
 R = float
@@ -86,7 +90,9 @@ class Effect:
     and the names of `params` and `signals`. evolve: the state after dt, `evolve(dt, t, ..., p)`;
     initial: the state at the start, as `value` (0 where None). signals: names of the log's signals
     that it uses, of which those in `needs` must be there (others read as 0). depends_on: signals
-    with which its contribution varies. Raises BadModel where the declaration contradicts itself.
+    with which its contribution varies, at once or by its state ("rest", "reversal": by what the
+    motion before has left). state_unit: unit of z, which may be any. Raises BadModel where the
+    declaration contradicts itself.
     """
 
     key: str
@@ -101,7 +107,7 @@ class Effect:
     initial: Kernel | None = None
     signals: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    separate: str = ""
+    state_unit: str | None = None
 
     def __post_init__(self) -> None:
         problem = None

@@ -25,7 +25,8 @@ def command(as_json: bool, **given: Any) -> int:
     tested against the model in force ('workbench registry add' puts the first there); on drift a
     new model and design are made, on another structure the log is traced; what is new replaces the
     old only if it wins on held-out data and in simulation. Safe to run at any time and many at
-    once; what a killed run left, the next does. Progress is told as JSON lines on standard error.
+    once; what a killed run left, the next does. A log older than one behind the model in force is
+    judged and recorded, and changes nothing. Progress is told as JSON lines on standard error.
     Exit status 1: an alarm (drift, a log set aside); 2: a machine could not be handled, the
     registry is away, or the webhook has not taken an alarm. Such an alarm is tried again by later
     passes, less and less often, and given up after a day.

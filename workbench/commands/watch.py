@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import traceback
 from contextlib import ExitStack
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,8 @@ def command(cron: str, port: int | None, address: str, as_json: bool, **given: A
             settle=timedelta(seconds=options.settle),
             clock=clock,
             stop=stop,
+            report=found.report,
+            marker=options.marker,
         )
         found.report("stopped")
 
@@ -58,6 +61,9 @@ def _once(found: "Worker") -> bool:
         done = found.once()
     except (UserError, OSError, MemoryError) as error:
         found.report("pass_failed", reason=" ".join(str(error).split()))
+        return False
+    except Exception:  # a fault of ours in one pass must not end those to come
+        found.report("fault_of_ours", traceback=traceback.format_exc())
         return False
     judged, alarms = done.judged, done.alarms
     found.report("pass_done", judged=len(judged.outcomes), growing=judged.growing,

@@ -2,13 +2,15 @@
 
 import os
 import re
+import secrets
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, func, make_url, select
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -46,8 +48,11 @@ class Database:
     def __init__(self, where: str, *, create: bool = True) -> None:
         url = _url(where)
         self.where = url.database if url.drivername == "sqlite" else _shown(url)
-        if url.drivername == "sqlite" and not create:
-            _refuse_missing(Path(str(url.database)))
+        if url.drivername == "sqlite":
+            path = Path(str(url.database))
+            _refuse_place(path, create)
+            if not path.exists():
+                _make_whole(path)
         self._engine = _engine(url, str(self.where))
         try:
             with self._guarded(), self._engine.begin() as connection:
@@ -81,25 +86,37 @@ class Database:
         """Give every connection back."""
         self._engine.dispose()
 
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """What the driver says of a database away or full, as RegistryAway in one line."""
-        try:
-            yield
-        except IntegrityError:
-            raise
-        except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
-            raise RegistryAway(_away(str(self.where), error)) from error
-        except DatabaseError as error:
-            if isinstance(error.orig, sqlite3.DatabaseError):
-                raise BadRegistry(
-                    f"registry {self.where}: {error.orig}; name a registry's file, or a new one"
-                ) from None
-            # Without a statement it is of an option in the URL that the driver does not know.
-            if isinstance(error, ProgrammingError) and error.statement is None:
-                said = " ".join(str(error.orig).split())
-                raise BadRegistry(f"registry {self.where}: {said}; correct the URL") from None
-            raise
+    def now(self, here: datetime) -> datetime:
+        """The time by the database's clock, `here` where it has none of its own (SQLite)."""
+        if self.dialect == "sqlite":
+            return here
+        with self.reading() as session:
+            found: datetime = session.execute(select(func.clock_timestamp())).scalar_one()
+        return found
+
+    def _guarded(self) -> AbstractContextManager[None]:
+        return _guarded(str(self.where))
+
+
+@contextmanager
+def _guarded(where: str) -> Iterator[None]:
+    """What the driver says of a database away or full, as RegistryAway in one line."""
+    try:
+        yield
+    except IntegrityError:
+        raise
+    except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
+        raise RegistryAway(_away(where, error)) from error
+    except DatabaseError as error:
+        if isinstance(error.orig, sqlite3.DatabaseError):
+            raise BadRegistry(
+                f"registry {where}: {error.orig}; name a registry's file, or a new one"
+            ) from None
+        # Without a statement it is of an option in the URL that the driver does not know.
+        if isinstance(error, ProgrammingError) and error.statement is None:
+            said = " ".join(str(error.orig).split())
+            raise BadRegistry(f"registry {where}: {said}; correct the URL") from None
+        raise
 
 
 def location(given: str | None) -> str:
@@ -157,24 +174,46 @@ def _shown(url: URL) -> str:
     return url.set(drivername="postgresql", query=kept).render_as_string(hide_password=True)
 
 
-def _refuse_missing(path: Path) -> None:
-    broken = broken_link(path)
+def _refuse_place(path: Path, create: bool) -> None:
+    """Raises BadRegistry where no registry can be at `path`, or none is and none is to be made."""
+    if path.is_dir():
+        raise BadRegistry(f"registry {path}: is a folder; name a file in it")
+    broken = None if create else broken_link(path)
     if broken:
         raise BadRegistry(f"registry {path}: {broken}")
-    if not path.exists():
+    if not path.exists() and not create:
         raise BadRegistry(
             f"registry {path}: no such file; 'workbench registry add' makes one, or name it by"
             f" --registry or {VARIABLE}"
         )
+    if not path.absolute().parent.is_dir():
+        raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
+    if path.exists() and path.stat().st_size == 0:
+        raise BadRegistry(
+            f"registry {path}: is empty (0 bytes), which no registry ever is; restore it from a"
+            " copy, or remove the file to begin a new one"
+        )
+
+
+def _make_whole(path: Path) -> None:
+    """A new registry's file, laid out before it has its name, so that none is ever empty."""
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        engine = _engine(URL.create("sqlite", database=str(part)), str(path))
+        try:
+            with _guarded(str(path)), engine.begin() as connection:
+                upgrade(connection, str(path))
+        finally:
+            engine.dispose()  # the last connection brings the log of writes into the file
+        with suppress(FileExistsError):  # another process was faster; its file counts
+            os.link(part, path)
+    finally:
+        for rest in ("", "-wal", "-shm", "-journal"):
+            part.with_name(part.name + rest).unlink(missing_ok=True)
 
 
 def _engine(url: URL, where: str) -> Engine:
     if url.drivername == "sqlite":
-        path = Path(str(url.database))
-        if path.is_dir():
-            raise BadRegistry(f"registry {path}: is a folder; name a file in it")
-        if not path.absolute().parent.is_dir():
-            raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
         engine = create_engine(url, connect_args={"timeout": BUSY})
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)

@@ -59,22 +59,11 @@ class UtcTime(TypeDecorator[datetime]):
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
 
-class AnyText(TypeDecorator[str]):
-    """A text; what has no form in UTF-8, such as a file name's odd bytes, is kept spelled out."""
-
-    impl = Text
-    cache_ok = True
-
-    def process_bind_param(self, value: str | None, dialect: Dialect) -> str | None:
-        """The text as the database can keep it."""
-        return None if value is None else value.encode("utf-8", "backslashreplace").decode("utf-8")
-
-
 class Base(DeclarativeBase):
     """All tables of the registry."""
 
     metadata = MetaData(naming_convention=NAMES)
-    type_annotation_map = {str: AnyText(), datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's form
+    type_annotation_map = {str: Text(), datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's form
 
 
 class MachineRow(Base):
@@ -173,6 +162,7 @@ class ClaimRow(Base):
     token: Mapped[str]
     owner: Mapped[str]
     until: Mapped[datetime]
+    lease_ms: Mapped[int | None] = mapped_column(BigInteger)
 
 
 class ReopeningRow(Base):

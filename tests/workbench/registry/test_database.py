@@ -35,12 +35,12 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
     assert ScriptDirectory.from_config(config()).get_current_head() == HEAD
 
 
-def test_a_registry_of_the_first_layout_is_brought_up_to_date(where: str) -> None:
+def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> None:
     with Registry(where) as registry:
         registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
         with registry.database.writing() as session:
             session.execute(text("DROP TABLE outbox"))
-            session.execute(text("UPDATE alembic_version SET version_num = '0001'"))
+            session.execute(text("UPDATE alembic_version SET version_num = '0002'"))
     with Registry(where) as registry:
         test_steps_and_tables_agree(registry)
         assert [v.number for v in registry.versions("a")] == [1]
@@ -60,6 +60,39 @@ def test_a_table_of_something_else_is_left_alone(tmp_path: Path) -> None:
     other.close()
     with pytest.raises(BadRegistry, match="holds a table 'log' of something else"):
         Registry(str(path))
+
+
+def test_an_empty_file_is_no_new_registry(tmp_path: Path) -> None:
+    path = tmp_path / "r.db"
+    path.touch()
+    for create in (True, False):
+        with pytest.raises(BadRegistry, match=r"is empty \(0 bytes\).*restore it"):
+            Registry(str(path), create=create)
+    assert path.stat().st_size == 0
+    path.unlink()
+    Registry(str(path)).close()
+    assert [one.name for one in tmp_path.iterdir()] == ["r.db"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("INSERT INTO alembic_version VALUES ('0001')", "names 2 layouts"),
+        ("DROP TABLE notice", "its table 'notice' is gone"),
+        ("DROP TRIGGER {outcome}", "nothing keeps its table 'outcome'"),
+    ],
+)
+def test_a_database_changed_by_hand_is_refused(where: str, change: str, said: str) -> None:
+    with Registry(where) as registry, registry.database.writing() as session:
+        if "TRIGGER" not in change:
+            session.execute(text(change))
+        elif registry.database.dialect == "sqlite":
+            for event in ("update", "delete", "replace"):
+                session.execute(text(change.format(outcome=f"outcome_{event}")))
+        else:
+            session.execute(text(change.format(outcome="outcome_append_only ON outcome")))
+    with pytest.raises(BadRegistry, match=said):
+        Registry(where)
 
 
 def many(where: str, who: int) -> None:
