@@ -65,9 +65,11 @@ def _once(found: "Worker") -> bool:
     except Exception:  # a fault of ours in one pass must not end those to come
         found.report("fault_of_ours", traceback=traceback.format_exc())
         return False
-    found.report("pass_done", judged=len(done.outcomes), growing=done.growing, busy=done.busy,
-                 failed=dict(done.failed))  # fmt: skip
-    return done.growing > 0
+    judged, alarms = done.judged, done.alarms
+    found.report("pass_done", judged=len(judged.outcomes), growing=judged.growing,
+                 busy=judged.busy, failed=dict(judged.failed),
+                 alarms_waiting=alarms.waiting if alarms else 0)  # fmt: skip
+    return judged.growing > 0
 
 
 def _served(found: "Worker", address: str, port: int) -> ExitStack:

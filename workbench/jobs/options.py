@@ -16,7 +16,8 @@ import click
 from workbench.options import POSITIVE, effects_option
 
 if TYPE_CHECKING:
-    from workbench.jobs.alarms import Webhook
+    from workbench.jobs.alarms import Delivery, Webhook
+    from workbench.jobs.lease import Clock
     from workbench.jobs.metrics import Figures
     from workbench.jobs.passes import PassReport, Report
     from workbench.registry.order import Order
@@ -88,6 +89,14 @@ def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> st
 
 
 @dataclass(frozen=True)
+class Done:
+    """What a pass did, and what became of the alarms; None without a webhook."""
+
+    judged: "PassReport"
+    alarms: "Delivery | None"
+
+
+@dataclass(frozen=True)
 class Worker:
     """One worker: `once` is a pass with its alarms and metrics."""
 
@@ -99,16 +108,14 @@ class Worker:
     figures: "Figures"
     stop: Callable[[], bool]
 
-    def once(self) -> "PassReport":
+    def once(self) -> Done:
         """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
         from workbench.challenge import Terms
-        from workbench.jobs.alarms import send_alarms
         from workbench.jobs.lease import Patience, shared_clock
         from workbench.jobs.metrics import write_metrics
         from workbench.jobs.passes import Pass, Settings
         from workbench.judging import Chain
         from workbench.own_effects import library
-        from workbench.registry.queue import Queue
 
         given = self.options
         settings = Settings(
@@ -125,13 +132,20 @@ class Worker:
         shared = settings.patience(shared_clock, self.registry.database, clock)
         work = Pass(self.registry, judge, settings, shared, self.report, self.stop, clock)
         done = work.run(given.root)
-        if self.webhook is not None:
-            queue = Queue(self.registry.database)
-            send_alarms(queue, self.webhook, now=clock(), report=self.report)
+        alarms = self._alarms(shared)
         self.figures.passed(clock(), len(done.failed))
         if given.metrics is not None:
             write_metrics(given.metrics, self.figures)
-        return done
+        return Done(done, alarms)
+
+    def _alarms(self, shared: "Clock") -> "Delivery | None":
+        from workbench.jobs.alarms import send_alarms
+        from workbench.registry.outbox import Outbox
+
+        if self.webhook is None:
+            return None
+        outbox = Outbox(self.registry.database)
+        return send_alarms(outbox, self.webhook, clock=shared, report=self.report, stop=self.stop)
 
 
 @contextmanager

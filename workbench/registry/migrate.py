@@ -11,7 +11,7 @@ from workbench.registry.tables import APPEND_ONLY, Base
 if TYPE_CHECKING:
     from alembic.config import Config
 
-HEAD = "0002"  # known without importing Alembic, which most starts do not need
+HEAD = "0003"  # known without importing Alembic, which most starts do not need
 RESTORE = "somebody has changed the database by hand; restore it from a copy"
 LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
 

@@ -36,7 +36,6 @@ from workbench.registry.tables import (
     AttemptRow,
     ClaimRow,
     LogRow,
-    NoticeRow,
     OutcomeRow,
     ReopeningRow,
     VersionRow,
@@ -48,7 +47,6 @@ from workbench.registry.values import (
     Judgement,
     Outcome,
     SeenLog,
-    Verdict,
     Version,
 )
 
@@ -269,31 +267,6 @@ class Queue:
         )
         with self._database.reading() as session:
             return tuple(_outcome(session, row, done) for row, done in session.execute(query))
-
-    def unsent(self, verdicts: Sequence[Verdict], *, since: datetime) -> tuple[Outcome, ...]:
-        """Results of these verdicts from `since` on that no webhook has taken, oldest first."""
-        told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
-        query = (
-            select(LogRow, OutcomeRow)
-            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
-            .outerjoin(NoticeRow, told)
-            .where(
-                OutcomeRow.verdict.in_(verdicts),
-                OutcomeRow.at >= since,
-                NoticeRow.log_id.is_(None),
-            )
-            .order_by(OutcomeRow.at, LogRow.id)
-        )
-        with self._database.reading() as session:
-            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
-
-    def sent(self, outcome: Outcome, *, now: datetime) -> None:
-        """Note that a webhook has taken the alarm; nothing where it is noted already."""
-        with self._database.writing() as session:
-            lock_machine(session, outcome.machine, now)
-            row = _log(session, outcome.machine, outcome.log)
-            if session.get(NoticeRow, (row.id, outcome.turn)) is None:
-                session.add(NoticeRow(log_id=row.id, turn=outcome.turn, at=now))
 
     def verdicts(self) -> dict[tuple[str, str], int]:
         """How many logs have each verdict, by machine and verdict."""

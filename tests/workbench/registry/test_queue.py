@@ -232,13 +232,8 @@ def test_logs_to_be_judged_again_are_named_one_by_one(queue: Queue) -> None:
     assert queue.reopen("m", ["aaaab"], reason="r", by="t", now=NOW) == ("twin.csv",)
 
 
-def test_alarms_are_kept_until_they_are_taken(queue: Queue) -> None:
+def test_verdicts_are_counted(queue: Queue) -> None:
     claim = claimed(queue)
-    done = queue.finish(claim, LOG, Judgement("set_aside", "bad"), by="w", now=NOW)
+    queue.finish(claim, LOG, Judgement("set_aside", "bad"), by="w", now=NOW)
     queue.finish(claim, OTHER, Judgement("none", "quiet"), by="w", now=NOW)
-    assert queue.unsent(["set_aside", "promoted"], since=NOW) == (done,)
-    assert queue.unsent(["set_aside"], since=NOW + LEASE) == ()
-    queue.sent(done, now=NOW)
-    queue.sent(done, now=NOW)
-    assert queue.unsent(["set_aside", "promoted"], since=NOW) == ()
     assert queue.verdicts() == {("m", "set_aside"): 1, ("m", "none"): 1}
