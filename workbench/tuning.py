@@ -83,7 +83,7 @@ def design(
         refused=refused,
         recommended=recommended,
         compensator=_compensator(model),
-        remarks=tuple(_remarks(model, plant, found)),
+        remarks=(*model.read, *_remarks(model, plant, found)),
         versions=versions(),
     )
 
