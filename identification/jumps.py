@@ -36,12 +36,13 @@ _FASTER = 3.0  # times the largest step elsewhere
 # wraps low ones, which 5 % of them do not change; for jumps what quick machines logged slowly need.
 _SPIKES, _WRAPS, _JUMPS = (0.8, 8.0), (0.9, 6.0), (0.95, 5.0)
 _COUNTS = 5.0  # times the smallest step: an encoder flickers by one count, seldom by two
-_QUIET = 0.2  # of a spike: largest step around it, and difference of the levels on its two sides
+_QUIET = 0.2  # of a spike: largest step and way around it, and difference of the levels beside it
 _AROUND = 5  # samples to either side
 _OTHERS = 2  # steps around a spike that may belong to another one
 _MOST = 0.05  # share of samples at which jumps are looked for
 _FORCE_RANGE = 3.0  # times the range of the rest, above which an isolated force is no force
-_FOLLOWS = 2.0  # times the mean way of the log, above which a force was followed by motion
+_DRIVES = 10.0  # times the noise of a force, its range where it is no train of pulses
+_FOLLOWS = 3.0  # times the log's median change of speed, above which a force drove the body
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,8 @@ def spikes(log: Log, name: str, rotary: bool = False) -> Mask:
         least = _least(x, _RETURNS * _FASTEST[rotary] * log.h**2, *_SPIKES)
     else:
         low, high = np.quantile(x, [0.005, 0.995])
+        if name == "F" and high - low < _DRIVES * np.quantile(np.abs(np.diff(x, 2)), _SPIKES[0]):
+            return inside
         least = max(_FORCE_RANGE * float(high - low), _least(x, 0.0, *_SPIKES))
     step = _steps(log["t"], x, log.h)
     for length in range(1, LONGEST_SPIKE + 1):
@@ -124,18 +127,34 @@ def _returning(x: Array, step: Array, length: int, least: float) -> NDArray[np.i
         [x[first + j] - before - (after - before) * (j + 1) / (length + 1) for j in range(length)]
     )
     height = np.where(np.abs(np.sum(np.sign(away), axis=0)) == length, np.min(np.abs(away), 0), 0.0)
-    large = (height > least) & (np.abs(after - before) < _QUIET * height)
+    even = (length + 1) * _even(step)[first - 1]
+    large = (height > least) & (np.abs(after - before - even) < _QUIET * height)
     found = first[large]
     quiet = [_around(step, i, length) < _QUIET * height[i - 1] for i in found]
     return found[np.array(quiet, dtype=bool)] if found.size else found
 
 
+def _even(step: Array) -> Array:
+    """The median step around each, which is that of even motion, (n - 1,)."""
+    from scipy.ndimage import median_filter
+
+    return np.asarray(median_filter(step, 2 * _AROUND + 1, mode="nearest"))
+
+
 def _around(step: Array, first: int, length: int) -> float:
-    """Largest step near a spike, leaving out its own and those that another one may make."""
-    near = np.concatenate(
-        (step[max(first - 1 - _AROUND, 0) : first - 1], step[first + length :][:_AROUND])
-    )
-    return float(np.sort(np.abs(near))[-1 - _OTHERS]) if near.size > _OTHERS else 0.0
+    """Largest step near a spike, but for two steps of another one, and way, beyond even motion.
+
+    Another spike comes back; a step that stays, as before an impact, does not.
+
+    Infinite too near to an end of the log for a judgement.
+    """
+    before, after = step[max(first - 1 - _AROUND, 0) : first - 1], step[first + length :][:_AROUND]
+    if len(before) < _AROUND or len(after) < _AROUND:
+        return np.inf
+    even = np.median(np.concatenate((before, after)))
+    each = np.sort(np.abs(np.concatenate((before, after)) - even))[-1 - _OTHERS]
+    ways = [abs(float(np.sum(side - np.median(side)))) for side in (before, after)]
+    return max(float(each), *ways)
 
 
 def _outlying(y: Array, step: Array, least: float) -> NDArray[np.intp]:
@@ -164,9 +183,13 @@ def _motion(step: Array, at: NDArray[np.intp]) -> Array:
 
 
 def _followed(inside: Mask, y: Array) -> bool:
-    """Whether the body went further after these samples than elsewhere: a force that drove it."""
-    way = np.abs(y[4 * _AROUND :] - y[: -4 * _AROUND])
-    at = inside[: len(way)]
+    """Whether the body's speed changed more at these samples than elsewhere: a force that drove it.
+
+    The change is that of the way over `2 * _AROUND` samples before and after.
+    """
+    far = 2 * _AROUND
+    change = np.abs(y[2 * far :] - 2.0 * y[far:-far] + y[: -2 * far])
+    at = inside[far:-far]
     if not np.any(at) or np.all(at):
         return True
-    return bool(np.mean(way[at]) > _FOLLOWS * np.mean(way[~at]))
+    return bool(np.median(change[at]) > _FOLLOWS * np.median(change[~at]))

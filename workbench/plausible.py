@@ -42,6 +42,7 @@ LINEAR: Mapping[str, Size] = {
     "pressure": Size(5e3, 1e8, "Pa", _PRESSURE),  # vacuum grippers to 1000 bar
     "area": Size(1e-7, 1.0, "m^2", _AREA),
     "mass": Size(1e-7, 1e6, "kg"),
+    "acceleration": Size(0.03, 1e4, "m/s^2", _LENGTH),  # of the peak force; shakers reach 1e3
     "bandwidth": Size(0.03, 2e4, "rad/s"),  # 5 mHz, which no position loop is for, to 3 kHz
 }
 ROTARY: Mapping[str, Size] = {
@@ -50,6 +51,7 @@ ROTARY: Mapping[str, Size] = {
     "speed": Size(1e-6, 2e4, "rad/s", _ANGLE),  # spindles reach 2e4
     "force": Size(1e-7, 1e7, "N m", _TORQUE),
     "mass": Size(1e-11, 1e6, "kg m^2"),
+    "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
 }
 _UNUSED = 1e-3  # share of the command's limit that a log reaches at least
 
@@ -89,8 +91,12 @@ def model_remarks(model: Model) -> tuple[str, ...]:
     mass = model.friction["m"].value
     if mass is None:
         return ()
-    where = "m (unit of t, y or the force)"
+    where = "friction.m, by the units of t, y and the force"
     line = _judged("mass", mass, model.rig, where, "the moving body has")
+    if line is None and mass > 0:
+        said = f"on {mass:.4g} {model.friction['m'].unit} the logs' largest force makes"
+        reached = model.force_peak / mass
+        line = _judged("acceleration", reached, model.rig, "the unit of y (or t)", said)
     return (line,) if line else ()
 
 
@@ -134,9 +140,10 @@ def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str
     size = (ROTARY if rig.motion == "rotary" else LINEAR)[quantity]
     if value == 0.0 or size.low <= value <= size.high:
         return None
-    other = next((s for s in _slips(size) if size.low <= value * s[0] <= size.high), None)
+    middle = np.sqrt(size.low * size.high)
+    other = min(_slips(size), key=lambda slip: abs(np.log(value * slip[0] / middle)), default=None)
     hint = "check the units in the card"
-    if other:
+    if other and size.low <= value * other[0] <= size.high:
         hint = f"{other[1]} would make it {value * other[0]:.4g} {size.unit}; check the unit"
     return (
         f"{where}: {said} {value:.4g} {size.unit}, where servo machines have {size.low:g} to"
@@ -146,7 +153,7 @@ def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str
 
 def _slips(size: Size) -> Iterator[tuple[float, str]]:
     """Factors that a slip of unit takes out of a value, either way round, and their names."""
-    unit = size.unit.removesuffix("/s") if size.unit.endswith("/s") else size.unit
+    unit = size.unit.split("/s")[0]
     for factor, name in size.slips:
         yield factor, f"{name} in place of {unit}"
     for factor, name in size.slips:
