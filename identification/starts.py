@@ -162,7 +162,7 @@ def _calm(one: Moving, wanted: int, step: int, speed: Array, enough: float) -> i
 
     Near the band a state within its noise may stop or not: what is sure of itself is fast.
     """
-    reach, last = int(REACH * step), len(one.log) - 1
+    reach, last = max(1, int(REACH * step)), len(one.log) - 1
     span = np.arange(wanted - reach, min(wanted + reach, last))
     if np.max(speed[span]) < enough:
         span = np.arange(wanted - reach, min(wanted + round(LATER * step), last))

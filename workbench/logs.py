@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array
-from identification.clean import Prepared, applied_force, check, prepare, repair
+from identification.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.errors import BadCard, BadLog
 from identification.log import Log
 from workbench.card import Card, SignalSpec
@@ -39,12 +39,12 @@ class Fingerprint:
 def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
-    Isolated missing samples are interpolated. A `kind = "force"` rig with pressures keeps the
+    Isolated missing samples and spikes are interpolated. A `kind = "force"` rig with pressures keeps the
     force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or its
     content is not what the card says.
     """
     raw, first_row = _read_signals(path, card)
-    log = _with_force(repair(raw, first_row).log, path, card)
+    log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
     check(log, card.rig(path.name), first_row)
     return log
 
@@ -52,10 +52,14 @@ def read_log(path: Path, card: Card) -> Log:
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
     raw, first_row = _read_signals(path, card)
-    repaired = repair(raw, first_row)
+    repaired = _repaired(raw, first_row, path, card)
     log = _with_force(repaired.log, path, card)
     prepared = prepare(log, card.rig(path.name), first_row)
     return Prepared(prepared.runs, (*repaired.remarks, *prepared.remarks))
+
+
+def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:
+    return repair(raw, first_row, rotary=card.rig(path.name).motion == "rotary")
 
 
 def fingerprint(path: Path, log: Log) -> Fingerprint:
