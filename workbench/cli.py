@@ -6,6 +6,7 @@ import json
 import os
 import sys
 import traceback
+import warnings
 from collections.abc import Sequence
 from contextlib import suppress
 
@@ -30,6 +31,9 @@ COMMANDS = {
 }
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
+LONGEST_WORD = 200  # characters of a name, and of a whole message
+LONGEST_LINE = 900
+CUT = "[...]"
 ADVICE = {
     errno.ENOSPC: "; free some space, or choose another folder with --out",
     errno.EDQUOT: "; free some space, or choose another folder with --out",
@@ -72,8 +76,13 @@ def cli(ctx: click.Context) -> None:
 
 
 def one_line(text: str) -> str:
-    """The text on one line, without characters that a terminal would obey."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in _folded(text))
+    """The text on one line that a screen can hold, without characters that a terminal would obey.
+
+    Long names, then a long text, lose their middle: a message ends in what to do.
+    """
+    words = (_shortened(word, LONGEST_WORD) for word in text.split())
+    line = _shortened(" ".join(words), LONGEST_LINE)
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 def verdict(error: BaseException) -> tuple[int, str]:
@@ -103,7 +112,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Exit status of the command line `argv`, by default the arguments of this process."""
     arguments = tuple(sys.argv[1:] if argv is None else argv)
     try:
-        return _run(arguments)
+        with warnings.catch_warnings():
+            if not _debug(arguments):  # "error" filters, as in the tests, still act
+                warnings.showwarning = _drop_warning
+            return _run(arguments)
     except (Exception, KeyboardInterrupt) as error:
         status, message = verdict(error)
         if status == 3 and _debug(arguments):
@@ -151,8 +163,16 @@ def _flush_or_drop() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _folded(text: str) -> str:
-    return " ".join(text.split())
+def _shortened(text: str, most: int) -> str:
+    """The text, its middle left out where it is longer than `most` characters."""
+    if len(text) <= most:
+        return text
+    kept = (most - len(CUT)) // 2
+    return text[:kept] + CUT + text[-kept:]
+
+
+def _drop_warning(*_: object, **__: object) -> None:
+    """Where a warning would be shown: it is for whoever develops, not for the user."""
 
 
 def _os_message(error: OSError) -> str:

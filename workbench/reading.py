@@ -10,6 +10,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
 from workbench.card import nearest
+from workbench.files import RESULT_BYTES, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
 
@@ -51,6 +52,8 @@ def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
 
 
 def _read_json(path: Path) -> object:
+    refuse_special(path, BadModel)
+    refuse_larger(path, RESULT_BYTES, "a result", BadModel)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:

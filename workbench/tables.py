@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from identification.errors import BadLog
 from workbench.card import FileSpec, Format, nearest
+from workbench.files import refuse_special
 from workbench.mat import tags_are_sound
 from workbench.text import read_text_table
 
@@ -118,6 +119,7 @@ def find_format(path: Path, head: bytes) -> Format:
 
 
 def _head(path: Path) -> bytes:
+    refuse_special(path, BadLog)
     try:
         with path.open("rb") as file:
             head = file.read(1024)

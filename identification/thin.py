@@ -1,0 +1,89 @@
+"""Very long logs brought to what a fit can use: a slower clock by means, then the liveliest part.
+
+A fit gains nothing from a rate at which the body hardly moves between two samples, nor from the
+tenth quarter of an hour. Logs of usual size are passed on as they are, bit for bit.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.log import Log
+
+LARGEST = 400_000
+"""Samples up to which a log is taken as it is."""
+
+SLOWEST = 1e-3
+"""Sampling period [s] up to which a longer log is averaged; switches of mode need that much."""
+
+
+class Thinned(NamedTuple):
+    """A log of at most `LARGEST` samples, and what was left out."""
+
+    log: Log
+    remarks: tuple[str, ...]
+
+
+def thinned(log: Log) -> Thinned:
+    """The log, if it has more than `LARGEST` samples at a slower clock and cut to its liveliest part.
+
+    Each sample is then the mean of so many around its instant, which takes out what a slower clock
+    would fold down. The command is held between samples, so it is the mean until the next instant.
+    """
+    remarks = []
+    whole = log
+    if len(log) > LARGEST and (step := _step(log)) > 1:
+        log = _averaged(log, step)
+        remarks.append(
+            f"{log.name}: {len(whole)} samples every {whole.h:.4g} s, taken as means of {step}"
+            f" (every {log.h:.4g} s)"
+        )
+    if len(log) > LARGEST:
+        start = _liveliest(log["y"])
+        part = log.part(start, start + LARGEST)
+        t = part["t"]
+        remarks.append(
+            f"{log.name}: of its {log.duration:.5g} s the {part.duration:.4g} s from"
+            f" t = {t[0]:.6g} s were used, where the body moves most; cut the log to choose"
+            " another part"
+        )
+        log = part
+    return Thinned(log, tuple(remarks))
+
+
+def _step(log: Log) -> int:
+    """Samples in a mean: enough for `LARGEST` of them, but none slower than `SLOWEST`."""
+    return min(int(1.01 * SLOWEST / log.h), -(-len(log) // LARGEST))
+
+
+def _averaged(log: Log, step: int) -> Log:
+    half = step // 2
+    count = (len(log) - half) // step
+
+    def means(values: Array, first: int) -> Array:
+        blocks: Array = values[first : first + count * step].reshape(count, step)
+        return blocks.mean(axis=1)
+
+    signals = {}
+    for name, values in log.signals.items():
+        if name == "u":  # from the instant on, which of an even number lies between two samples
+            signals[name] = 0.5 * (means(values, (step - 1) // 2) + means(values, half))
+        elif np.all((values == values.min()) | (values == values.max())):
+            signals[name] = values[half : half + count * step : step]
+        else:
+            signals[name] = means(values, 0)
+    return Log(log.name, signals)
+
+
+def _liveliest(y: Array) -> int:
+    """First sample of the part of `LARGEST` samples in which the position goes the longest way.
+
+    The way is taken over means, so that noise hardly counts.
+    """
+    block = 100
+    count = len(y) // block
+    means = y[: count * block].reshape(count, block).mean(axis=1)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(means)))])
+    span = LARGEST // block
+    return int(np.argmax(way[span - 1 :] - way[: count - span + 1])) * block
