@@ -11,37 +11,44 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import Log
 
-LARGEST = 400_000
+LARGEST = 200_000
 """Samples up to which a log is taken as it is."""
+
+KEPT = 100_000
+"""Samples that are kept of a longer one, at most: a search over them takes about a minute."""
 
 SLOWEST = 1e-3
 """Sampling period [s] up to which a longer log is averaged; switches of mode need that much."""
 
 
 class Thinned(NamedTuple):
-    """A log of at most `LARGEST` samples, and what was left out."""
+    """A log of at most `LARGEST` samples, and what was left out of it."""
 
     log: Log
     remarks: tuple[str, ...]
 
 
 def thinned(log: Log) -> Thinned:
-    """The log, if it has more than `LARGEST` samples at a slower clock and cut to its liveliest part.
+    """The log; one of more than `LARGEST` samples at a slower clock, cut to its liveliest part.
 
     Each sample is then the mean of so many around its instant, which takes out what a slower clock
     would fold down. The command is held between samples, so it is the mean until the next instant.
     """
-    remarks = []
-    whole = log
-    if len(log) > LARGEST and (step := _step(log)) > 1:
-        log = _averaged(log, step)
+    if len(log) <= LARGEST:
+        return Thinned(log, ())
+    remarks, step = [], _step(log)
+    if step > 1:
         remarks.append(
-            f"{log.name}: {len(whole)} samples every {whole.h:.4g} s, taken as means of {step}"
-            f" (every {log.h:.4g} s)"
+            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken as means of {step} (every"
+            f" {step * log.h:.4g} s)"
         )
-    if len(log) > LARGEST:
+        log = _averaged(log, step)
+    if len(log) > KEPT:
         start = _liveliest(log["y"])
-        part = log.part(start, start + LARGEST)
+        # Copies: a view would hold the whole log in memory.
+        part = Log(
+            log.name, {k: v[start : start + KEPT].copy() for k, v in log.signals.items()}
+        )
         t = part["t"]
         remarks.append(
             f"{log.name}: of its {log.duration:.5g} s the {part.duration:.4g} s from"
@@ -53,8 +60,8 @@ def thinned(log: Log) -> Thinned:
 
 
 def _step(log: Log) -> int:
-    """Samples in a mean: enough for `LARGEST` of them, but none slower than `SLOWEST`."""
-    return min(int(1.01 * SLOWEST / log.h), -(-len(log) // LARGEST))
+    """Samples in a mean: enough for `KEPT` of them, but none slower than `SLOWEST`."""
+    return min(int(1.01 * SLOWEST / log.h), -(-len(log) // KEPT))
 
 
 def _averaged(log: Log, step: int) -> Log:
@@ -77,7 +84,7 @@ def _averaged(log: Log, step: int) -> Log:
 
 
 def _liveliest(y: Array) -> int:
-    """First sample of the part of `LARGEST` samples in which the position goes the longest way.
+    """First sample of the part of `KEPT` samples in which the position goes the longest way.
 
     The way is taken over means, so that noise hardly counts.
     """
@@ -85,5 +92,5 @@ def _liveliest(y: Array) -> int:
     count = len(y) // block
     means = y[: count * block].reshape(count, block).mean(axis=1)
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(means)))])
-    span = LARGEST // block
+    span = KEPT // block
     return int(np.argmax(way[span - 1 :] - way[: count - span + 1])) * block

@@ -35,6 +35,7 @@ DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
 FAST = 0.99
 LARGEST = 4  # na, nb and nk tried where no orders are given
+FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
 
@@ -74,6 +75,7 @@ def identify(
     options = options or Options()
     logs = [source.log for source in sources]
     for log in logs:  # wrong options are refused before the long part
+        check_period(options.design_period, log.name, log.duration)
         decimation(log.h, options.design_period)
     fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
     unit = units_of(rig.motion)["F_cp"]
@@ -285,6 +287,16 @@ def common_period(logs: Sequence[Log], period: float | None) -> tuple[float, tup
                 " --design-period that is a multiple of both"
             )
     return h, steps
+
+
+def check_period(period: float | None, name: str, duration: float) -> None:
+    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they tell
+    nothing."""
+    if period is not None and FEWEST * period > duration:
+        raise BadModel(
+            f"design period {period:g} s, {name} lasts {duration:.4g} s: fewer than {FEWEST}"
+            f" periods; ask for at most {duration / FEWEST:.3g}"
+        )
 
 
 def decimation(h: float, period: float | None) -> int:
