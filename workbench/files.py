@@ -39,4 +39,7 @@ def refuse_larger(path: Path, most: int, what: str, wrong: type[UserError]) -> N
     except (OSError, ValueError):
         return
     if size > most:
-        raise wrong(f"{path}: has {size / 1e6:.3g} MB, {what} at most {most / 1e6:g} MB; give {what}")
+        raise wrong(
+            f"{path}: has {size / 1e6:.4g} MB, {what} at most {most / 1e6:g} MB; give another file,"
+            " or a part of it"
+        )

@@ -94,7 +94,7 @@ def damaged_bytes(rng: np.random.Generator) -> Family:
                     for at in own.integers(0, min(len(content), 4000), 1 + number % 5):
                         content[int(at)] ^= 1 << int(own.integers(0, 8))
                 case "doubled":
-                    content += content
+                    content = content * 2
                 case "zeros":
                     content[place : place + 2000] = bytes(2000)
                 case _:
