@@ -4,8 +4,9 @@
 
 Logs of each format, cards, models, designs, states, options, names and files, each spoilt in its
 own way (`tests/bad_inputs/cases.py`), run in processes of their own. Right is an exit status of 0,
-1 or 2, at most one line on standard error, within the limit [s], and no half-written file. A row
-for each case that ends otherwise, then the counts. Exit status 1 where there is one.
+1 or 2, at most one line on standard error, within the limit [s, of two processors], and no
+half-written file. A row for each case that ends otherwise, then the counts. Exit status 1 where
+there is one.
 """
 
 import argparse
@@ -19,6 +20,8 @@ from pathlib import Path
 from tests.bad_inputs.cases import Case, cases
 from tests.bad_inputs.running import Ended, ended, in_process_of_its_own
 from tests.bad_inputs.shop import Shop, make_shop
+
+RIGHT = ("exit status 0", "exit status 1", "exit status 2")
 
 
 def judged(number: int, total: int, seed: int, folder: str, limit: float) -> Ended:
@@ -64,7 +67,7 @@ def main() -> int:
     print(f"{len(wanted)} cases, seed {given.seed}; the slowest took {slowest:.1f} s")
     for what, number in sorted(counts.items()):
         print(f"  {what}: {number}")
-    return int(any(not what.startswith(("exit status 0", "exit status 1", "exit status 2")) for what in counts))
+    return int(any(not what.startswith(RIGHT) for what in counts))
 
 
 if __name__ == "__main__":

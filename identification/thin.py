@@ -31,16 +31,17 @@ class Thinned(NamedTuple):
 def thinned(log: Log) -> Thinned:
     """The log; one of more than `LARGEST` samples at a slower clock, cut to its liveliest part.
 
-    Each sample is then the mean of so many around its instant, which takes out what a slower clock
-    would fold down. The command is held between samples, so it is the mean until the next instant.
+    A sample is then the mean over the middle third of its new period: over the whole of it the mean
+    is not the place of a body that is thrown, which a fit to the noise would take for an effect.
+    The command is held between samples, so it is the mean until the next instant.
     """
     if len(log) <= LARGEST:
         return Thinned(log, ())
     remarks, step = [], _step(log)
     if step > 1:
         remarks.append(
-            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken as means of {step} (every"
-            f" {step * log.h:.4g} s)"
+            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every"
+            f" {step * log.h:.4g} s"
         )
         log = _averaged(log, step)
     if len(log) > KEPT:
@@ -65,21 +66,22 @@ def _step(log: Log) -> int:
 
 
 def _averaged(log: Log, step: int) -> Log:
-    half = step // 2
-    count = (len(log) - half) // step
+    """Every `step`-th instant of the log, its values means around it."""
+    middle, half = step // 2, max(0, step // 3 - 1) // 2
+    count = (len(log) - middle) // step
 
-    def means(values: Array, first: int) -> Array:
+    def means(values: Array, first: int, width: int) -> Array:
         blocks: Array = values[first : first + count * step].reshape(count, step)
-        return blocks.mean(axis=1)
+        return blocks[:, :width].mean(axis=1)
 
     signals = {}
     for name, values in log.signals.items():
-        if name == "u":  # from the instant on, which of an even number lies between two samples
-            signals[name] = 0.5 * (means(values, (step - 1) // 2) + means(values, half))
-        elif np.all((values == values.min()) | (values == values.max())):
-            signals[name] = values[half : half + count * step : step]
+        if name == "u":
+            signals[name] = means(values, middle, step)
+        elif name == "t" or np.all((values == values.min()) | (values == values.max())):
+            signals[name] = means(values, middle, 1)
         else:
-            signals[name] = means(values, 0)
+            signals[name] = means(values, middle - half, 2 * half + 1)
     return Log(log.name, signals)
 
 

@@ -37,6 +37,7 @@ FAST = 0.99
 LARGEST = 4  # na, nb and nk tried where no orders are given
 FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
+RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
 
 
@@ -259,7 +260,7 @@ def _held_out(model: ArxModel, held: Sequence[tuple[Array, Array]]) -> tuple[flo
     with np.errstate(over="ignore", invalid="ignore"):
         runs = np.concatenate([simulation_errors(model, u, y) for u, y in held])
         free = float(np.sqrt(np.mean(runs**2)))
-    return float(np.sqrt(np.mean(steps**2))), free if np.isfinite(free) else None
+    return float(np.sqrt(np.mean(steps**2))), free if free < RUNAWAY else None
 
 
 def _tests(model: ArxModel, runs: Sequence[tuple[Array, Array]]) -> ArxTests | None:

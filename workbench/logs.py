@@ -16,10 +16,10 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.thin import LARGEST, thinned
 from workbench.card import Card, SignalSpec
+from workbench.files import ABSURD
 from workbench.tables import damaged, read_table
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
-ABSURD = 1e30  # in SI; products of such values overflow
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
 
 

@@ -10,9 +10,10 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
 from workbench.card import nearest
-from workbench.files import RESULT_BYTES, refuse_larger, refuse_special
+from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 
 Value = TypeVar("Value")
+DIGITS = 30  # of a whole number in a result
 
 
 def read_result(path: Path, kind: type[Value], schema: str) -> Value:
@@ -65,7 +66,9 @@ def _read_json(path: Path) -> object:
     except OSError as error:
         raise BadModel(f"{path}: cannot be read ({error.strerror}); check its rights") from None
     try:
-        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        return json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole
+        )
     except json.JSONDecodeError as error:
         raise BadModel(
             f"{path}: is not JSON ({error}); give the file that a command wrote"
@@ -86,7 +89,15 @@ def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
         raise ValueError(f"holds {text}, finite numbers needed; write null and a reason")
+    if abs(value) > ABSURD:
+        raise ValueError(f"holds {text}, which no machine reaches; correct it, or run it again")
     return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > DIGITS:
+        raise ValueError(f"holds {text[:DIGITS]}..., which no machine reaches; correct it")
+    return int(text)
 
 
 def _unknown(raw: object, kind: Any, where: str) -> str | None:

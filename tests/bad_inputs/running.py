@@ -2,6 +2,7 @@
 
 import os
 import resource
+import signal
 import tempfile
 import time
 import traceback
@@ -11,7 +12,7 @@ from multiprocessing.context import ForkServerContext
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.bad_inputs.cases import Case, cases
+from tests.bad_inputs.cases import Case
 from tests.bad_inputs.shop import Shop
 
 MEMORY = 6_000_000_000
@@ -66,7 +67,10 @@ def ended(case: Case, shop: Shop, run: Callable[[list[str]], tuple[int | None, s
 
 
 def in_process_of_its_own(seconds: float) -> Callable[[list[str]], tuple[int | None, str]]:
-    """A `run` for `ended` that forks a process and ends it after so many seconds."""
+    """A `run` for `ended` that forks a process and ends it after so many seconds.
+
+    They are of two processors; a process that waits is ended after six times as many of the clock.
+    """
     context = get_context("forkserver")
     context.set_forkserver_preload(list(HEAVY))
 
@@ -81,20 +85,23 @@ def _run(
 ) -> tuple[int | None, str]:
     with tempfile.TemporaryDirectory() as name:
         said = Path(name) / "stderr"
-        process = context.Process(target=_child, args=(arguments, str(said), str(Path.cwd())))
+        process = context.Process(target=_child, args=(arguments, str(said), str(Path.cwd()), seconds))
         process.start()
-        process.join(seconds)
+        process.join(6 * seconds)
         if process.is_alive():
             process.kill()
             process.join()
             return None, ""
+        if process.exitcode in (-signal.SIGXCPU, -signal.SIGKILL):
+            return None, ""
         return process.exitcode, said.read_text("utf-8", "replace") if said.exists() else ""
 
 
-def _child(arguments: list[str], said: str, folder: str) -> None:
+def _child(arguments: list[str], said: str, folder: str, seconds: float) -> None:
     """The command line with its streams in files, as a shell would start it."""
     os.chdir(folder)
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CPU, (int(2 * seconds), int(2 * seconds) + 5))
     for number, path in ((0, os.devnull), (1, os.devnull), (2, said)):
         os.dup2(os.open(path, os.O_RDWR | os.O_CREAT), number)
     from workbench.cli import main
@@ -105,8 +112,3 @@ def _child(arguments: list[str], said: str, folder: str) -> None:
         traceback.print_exc()
         status = 99
     os._exit(status)
-
-
-def sample(number: int, seed: int, keep: Callable[[Case], bool]) -> list[Case]:
-    """The cases among `number` that `keep` takes."""
-    return [case for case in cases(number, seed) if keep(case)]
