@@ -11,10 +11,21 @@ BoolArray = NDArray[np.bool_]
 
 
 def frozen(values: Any) -> Array:
-    """Read-only float64 copy of `values`, so that no caller's array is ever changed."""
+    """Read-only float64 copy of `values`, so that no caller's array is ever changed.
+
+    What nobody can write already is passed on as it is: a long log's signals are large.
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and _is_frozen(values):
+        return values
     out = np.array(values, dtype=np.float64)
     out.flags.writeable = False
     return out
+
+
+def _is_frozen(values: Array) -> bool:
+    base = values.base
+    own = base is None or (isinstance(base, np.ndarray) and not base.flags.writeable)
+    return own and not values.flags.writeable
 
 
 def read_only(values: Array) -> Array:

@@ -21,6 +21,8 @@ _SWAPPED = -0.01
 _MUCH_SMOOTHER = 0.7
 _TRUE = 0.1  # share above which force and position go together
 _BLOCKS = 10_000
+_STEADY = 0.01  # of the force, below which its changes move nothing that the rest does not
+_PERIODS = (1e-9, 1e6)  # s between samples; no logger is faster or slower
 # A noisy sensor does not repeat one value; a quantised one, or one without noise at rest, does.
 _STUCK_RUN = 50  # samples
 _STUCK_ELSEWHERE = 1e-3  # share of repeats outside such runs, below which they are a fault
@@ -72,6 +74,22 @@ def check_driven(log: Log) -> None:
             f"{log.name}: the applied force is constant ({log['F'][0]:g}), so nothing drives"
             " the body; check the force's columns in the card"
         )
+    if "y" in log:
+        _check_moving_force(log)
+
+
+def _check_moving_force(log: Log) -> None:
+    """Refuse a force that hardly changes while the body goes both ways: a search for the friction
+    that explains it would not end."""
+    way = np.diff(_blocks(log["y"]))
+    back = min(float(way[way > 0].sum()), float(-way[way < 0].sum()))
+    low, high = float(log["F"].min()), float(log["F"].max())
+    if back > 0.1 * float(np.ptp(log["y"])) and high - low < _STEADY * max(abs(low), abs(high)):
+        raise BadLog(
+            f"{log.name}: the applied force stays between {low:.6g} and {high:.6g} while the body"
+            " goes both ways, so something else drives it; check the units of the force's columns"
+            " (bar and Pa mixed up?), the areas and the supply pressure in the card"
+        )
 
 
 def check_time(log: Log, first_row: int = 1) -> None:
@@ -84,6 +102,12 @@ def check_time(log: Log, first_row: int = 1) -> None:
     if not np.all(np.isfinite(t)):
         row = first_row + int(np.flatnonzero(~np.isfinite(t))[0])
         raise BadLog(f"{log.name}: time in row {row} is not a number; remove the row")
+    period = float(t[-1] - t[0]) / (len(t) - 1)
+    if 0.0 < period < _PERIODS[0] or period > _PERIODS[1]:
+        raise BadLog(
+            f"{log.name}: sampled every {period:.3g} s, {_PERIODS[0]:g} to {_PERIODS[1]:g} s needed;"
+            " check the unit of t in the card"
+        )
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if wrong.size:
         k = int(wrong[0])

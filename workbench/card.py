@@ -18,6 +18,7 @@ Beyond the contract's example a card may say (all optional, all additive):
     [recipe] see workbench/recipe.py
 """
 
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -31,6 +32,7 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from identification.errors import BadCard, BadModel
 from identification.library import Library
 from identification.log import Rig, RigKind
+from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 from workbench.recipe import Positive, Recipe, RecipeSection, Section
 from workbench.sensors import column_scale, parse_gain
 from workbench.units import Motion, Scale, si_unit
@@ -211,8 +213,14 @@ def load_card(path: Path, library: Library | None = None, *, with_recipe: bool =
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
+    refuse_special(path, BadCard)
+    refuse_larger(path, CARD_BYTES, "a card", BadCard)
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        if found := _DEEP.search(text):
+            line = text.count("\n", 0, found.start()) + 1
+            raise BadCard(f"{path}: line {line}: {_TOO_DEEP}")
+        return tomllib.loads(text)
     except FileNotFoundError:
         raise BadCard(f"{path}: no such card; give a path or the name of a shipped card") from None
     except IsADirectoryError:
@@ -223,8 +231,15 @@ def _read_toml(path: Path) -> dict[str, Any]:
         raise BadCard(f"{path}: cannot be read ({error.strerror}); check its rights") from None
     except tomllib.TOMLDecodeError as error:
         raise BadCard(f"{path}: is not TOML: {error}; correct that line") from None
+    except RecursionError:
+        raise BadCard(f"{path}: {_TOO_DEEP}") from None
+    except ValueError as error:  # a whole number of thousands of digits
+        raise BadCard(f"{path}: holds no card's number ({error}); correct it") from None
 
 
+_TOO_DEEP = "tables or lists lie deeper in each other than in any card; correct it"
+# The TOML reader's time and memory grow with the square of a dotted key's length.
+_DEEP = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+){32}""")
 _KINDS = {  # what pydantic finds missing, in the words of a card
     "string_type": "a text in quotes needed",
     "float_type": "a number needed",

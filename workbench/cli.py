@@ -8,6 +8,7 @@ import signal
 import sys
 import threading
 import traceback
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -35,6 +36,9 @@ COMMANDS = {
 ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
+LONGEST_WORD = 200  # characters of a name, and of a whole message
+LONGEST_LINE = 900
+CUT = "[...]"
 ADVICE = {
     errno.ENOSPC: "; free some space, or choose another folder with --out",
     errno.EDQUOT: "; free some space, or choose another folder with --out",
@@ -85,8 +89,13 @@ def cli(ctx: click.Context) -> None:
 
 
 def one_line(text: str) -> str:
-    """The text on one line, without characters that a terminal would obey."""
-    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in _folded(text))
+    """The text on one line that a screen can hold, without characters that a terminal would obey.
+
+    Long names, then a long text, lose their middle: a message ends in what to do.
+    """
+    words = (_shortened(word, LONGEST_WORD) for word in text.split())
+    line = _shortened(" ".join(words), LONGEST_LINE)
+    return "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in line)
 
 
 def verdict(error: BaseException) -> tuple[int, str]:
@@ -118,7 +127,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Exit status of the command line `argv`, by default the arguments of this process."""
     arguments = tuple(sys.argv[1:] if argv is None else argv)
     try:
-        with _cleared_on_a_signal():
+        with _cleared_on_a_signal(), warnings.catch_warnings():
+            if not _debug(arguments):  # "error" filters, as in the tests, still act
+                warnings.showwarning = _drop_warning
             return _run(arguments)
     except (Exception, KeyboardInterrupt) as error:
         status, message = verdict(error)
@@ -188,8 +199,16 @@ def _flush_or_drop() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _folded(text: str) -> str:
-    return " ".join(text.split())
+def _shortened(text: str, most: int) -> str:
+    """The text, its middle left out where it is longer than `most` characters."""
+    if len(text) <= most:
+        return text
+    kept = (most - len(CUT)) // 2
+    return text[:kept] + CUT + text[-kept:]
+
+
+def _drop_warning(*_: object, **__: object) -> None:
+    """Where a warning would be shown: it is for whoever develops, not for the user."""
 
 
 def _os_message(error: OSError) -> str:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from identification.errors import BadCard, BadLog
 from workbench.card import Card, FileEntry, nearest
+from workbench.files import refuse_special
 from workbench.links import broken_link
 
 VARIABLE = "WORKBENCH_DATA"
@@ -38,6 +39,7 @@ def card_path(name: str | Path) -> Path:
     shipped = shipped_cards()
     if str(name) in shipped:
         return shipped[str(name)]
+    refuse_special(path, BadCard)
     if path.is_dir():
         raise BadCard(f"{path}: is a directory without a card.toml; give the card's path")
     raise BadCard(f"{name}: no such card file and no shipped card{nearest(str(name), shipped)}")
@@ -83,7 +85,8 @@ def _nearest(path: Path, card: Card) -> str:
 def _verified(path: Path, entry: FileEntry | None) -> Path:
     if entry is None or entry.sha256 is None:
         return path
-    found = hashlib.sha256(path.read_bytes()).hexdigest()
+    with path.open("rb") as file:
+        found = hashlib.file_digest(file, "sha256").hexdigest()
     if found != entry.sha256:
         raise BadLog(
             f"{path}: sha256 {found[:12]}... is not the card's {entry.sha256[:12]}...; "

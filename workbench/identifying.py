@@ -35,7 +35,9 @@ DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
 FAST = 0.99
 LARGEST = 4  # na, nb and nk tried where no orders are given
+FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
+RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
 
 
@@ -74,6 +76,7 @@ def identify(
     options = options or Options()
     logs = [source.log for source in sources]
     for log in logs:  # wrong options are refused before the long part
+        check_period(options.design_period, log.name, log.duration)
         decimation(log.h, options.design_period)
     fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
     unit = units_of(rig.motion)["F_cp"]
@@ -257,7 +260,7 @@ def _held_out(model: ArxModel, held: Sequence[tuple[Array, Array]]) -> tuple[flo
     with np.errstate(over="ignore", invalid="ignore"):
         runs = np.concatenate([simulation_errors(model, u, y) for u, y in held])
         free = float(np.sqrt(np.mean(runs**2)))
-    return float(np.sqrt(np.mean(steps**2))), free if np.isfinite(free) else None
+    return float(np.sqrt(np.mean(steps**2))), free if free < RUNAWAY else None
 
 
 def _tests(model: ArxModel, runs: Sequence[tuple[Array, Array]]) -> ArxTests | None:
@@ -285,6 +288,16 @@ def common_period(logs: Sequence[Log], period: float | None) -> tuple[float, tup
                 " --design-period that is a multiple of both"
             )
     return h, steps
+
+
+def check_period(period: float | None, name: str, duration: float) -> None:
+    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they tell
+    nothing."""
+    if period is not None and FEWEST * period > duration:
+        raise BadModel(
+            f"design period {period:g} s, {name} lasts {duration:.4g} s: fewer than {FEWEST}"
+            f" periods; ask for at most {duration / FEWEST:.3g}"
+        )
 
 
 def decimation(h: float, period: float | None) -> int:

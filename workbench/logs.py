@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.arrays import Array
+from identification.arrays import Array, frozen
 from identification.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.errors import BadCard, BadLog
 from identification.log import Log
+from identification.thin import LARGEST, thinned
 from workbench.card import Card, SignalSpec
+from workbench.files import ABSURD
 from workbench.tables import damaged, read_table
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
-ABSURD = 1e30  # in SI; products of such values overflow
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
 
 
@@ -53,9 +54,13 @@ def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
     raw, first_row = _read_signals(path, card)
     repaired = _repaired(raw, first_row, path, card)
-    log = _with_force(repaired.log, path, card)
-    prepared = prepare(log, card.rig(path.name), first_row)
-    return Prepared(prepared.runs, (*repaired.remarks, *prepared.remarks))
+    del raw  # of a long log a gigabyte
+    rig = card.rig(path.name)
+    if len(repaired.log) > LARGEST:  # here, where rows still count as in the file
+        check(repaired.log, rig, first_row)
+    thin = thinned(repaired.log)
+    prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
+    return Prepared(prepared.runs, (*repaired.remarks, *thin.remarks, *prepared.remarks))
 
 
 def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:
@@ -102,6 +107,7 @@ def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
         with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
             signals[name] = _to_si(numbers, name, spec, card, path)
         _refuse_absurd(signals[name], name, path, table.first_row)
+        signals[name] = frozen(signals[name])
     return Log(shown_name(path), _same_length(signals, path)), table.first_row
 
 

@@ -11,23 +11,24 @@ import click
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-class Positive(click.FloatRange):
-    """A finite number above 0: a period, a margin, a limit."""
-
-    def __init__(self) -> None:
-        super().__init__(min=0, min_open=True)
+class Finite(click.FloatRange):
+    """A finite number within bounds: a period, a margin, a limit."""
 
     def convert(
         self, value: Any, param: click.Parameter | None, ctx: click.Context | None
     ) -> float:
-        """The number; a usage error where it is none, not finite, or 0 or less."""
+        """The number; a usage error where it is none, not finite, or out of bounds."""
         found = float(super().convert(value, param, ctx))
         if not math.isfinite(found):
-            self.fail(f"{value} is not finite; a number above 0 needed.", param, ctx)
+            self.fail(
+                f"{value} is not finite; a number {self._describe_range()} needed.", param, ctx
+            )
         return found
 
 
-POSITIVE = Positive()
+POSITIVE = Finite(min=0, min_open=True)
+SECONDS = Finite(min=0, max=1e9)
+SECONDS_ABOVE_0 = Finite(min=0, max=1e9, min_open=True)
 
 
 def card_option(command: Command) -> Command:

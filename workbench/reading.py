@@ -10,9 +10,11 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
 from workbench.card import nearest
+from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 from workbench.links import broken_link
 
 Value = TypeVar("Value")
+DIGITS = 30  # of a whole number in a result
 
 
 def read_result(path: Path, kind: type[Value], schema: str) -> Value:
@@ -52,6 +54,8 @@ def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
 
 
 def _read_json(path: Path) -> object:
+    refuse_special(path, BadModel)
+    refuse_larger(path, RESULT_BYTES, "a result", BadModel)
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
@@ -65,7 +69,9 @@ def _read_json(path: Path) -> object:
         wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
         raise BadModel(f"{path}: {wrong}") from None
     try:
-        return json.loads(text, parse_constant=_refuse_constant, parse_float=_finite)
+        return json.loads(
+            text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole
+        )
     except json.JSONDecodeError as error:
         raise BadModel(
             f"{path}: is not JSON ({error}); give the file that a command wrote"
@@ -86,7 +92,15 @@ def _finite(text: str) -> float:
     value = float(text)
     if not math.isfinite(value):
         raise ValueError(f"holds {text}, finite numbers needed; write null and a reason")
+    if abs(value) > ABSURD:
+        raise ValueError(f"holds {text}, which no machine reaches; correct it, or run it again")
     return value
+
+
+def _whole(text: str) -> int:
+    if len(text) > DIGITS:
+        raise ValueError(f"holds {text[:DIGITS]}..., which no machine reaches; correct it")
+    return int(text)
 
 
 def _unknown(raw: object, kind: Any, where: str) -> str | None:

@@ -39,6 +39,7 @@ from identification.karnopp import Karnopp
 from identification.library import Library, built_in
 from identification.plant import Actuator, Motor, Plant
 from workbench.effect_values import written_effect
+from workbench.files import ABSURD
 from workbench.units import Motion
 
 LONGEST = 1e8  # samples of a recipe: a gigabyte a signal
@@ -128,9 +129,17 @@ class Section(BaseModel):
             for key in values:
                 if key not in cls.model_fields:
                     raise PydanticCustomError("unknown_key", "{key}", {"key": str(key)})
+                _refuse_absurd(str(key), values[key])
                 if isinstance(values[key], bool) and not _takes_bool(cls, str(key)):
                     raise ValueError(f"{key} needs a value, not true or false")
         return values
+
+
+def _refuse_absurd(key: str, value: object) -> None:
+    """Raises ValueError where the value, or one in the list, is a number that no machine has."""
+    for one in value if isinstance(value, list) else [value]:
+        if isinstance(one, int | float) and one != 0 and not 1 / ABSURD <= abs(one) <= ABSURD:
+            raise ValueError(f"{key} = {str(one)[:20]} is a number that no machine has; correct it")
 
 
 def _takes_bool(section: type[Section], key: str) -> bool:

@@ -21,7 +21,7 @@ from identification.simulate import FreeRun, free_run
 from workbench import recipe as recipes
 from workbench.card import Card
 from workbench.effect_values import exact
-from workbench.logs import ABSURD
+from workbench.files import ABSURD
 from workbench.model import as_number
 from workbench.parameter_units import actuator_units, friction_units
 from workbench.recipe import Recipe

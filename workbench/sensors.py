@@ -11,7 +11,7 @@ import re
 from typing import NamedTuple
 
 from identification.errors import BadCard
-from workbench.units import Motion, Scale, conversion, kind, scale_or_none, si_unit
+from workbench.units import LONGEST, Motion, Scale, conversion, kind, scale_or_none, si_unit
 
 _GAIN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)?\s*(.*?)\s*", re.DOTALL)
 _OUTPUTS = ("V", "A", "1")  # what sensors give; a number as gain is taken for these only
@@ -27,6 +27,8 @@ class Gain(NamedTuple):
 def parse_gain(gain: float | str) -> Gain:
     """The gain as a card writes it; raises ValueError, in words, where it is none or 0."""
     if isinstance(gain, str):
+        if len(gain) > LONGEST:
+            raise ValueError('gain is too long; write it as in gain = "80 V/m"')
         found = _GAIN.fullmatch(gain)
         number, unit = found.groups() if found else (None, "")
         parsed = Gain(1.0 if number is None else float(number), unit or None)

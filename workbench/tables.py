@@ -15,11 +15,15 @@ from numpy.typing import NDArray
 
 from identification.errors import BadLog
 from workbench.card import FileSpec, Format, nearest
+from workbench.files import refuse_larger, refuse_special
 from workbench.links import broken_link
 from workbench.mat import tags_are_sound
 from workbench.text import read_text_table
 
 RawColumn = NDArray[Any]
+MOST_ROWS = 20_000_000  # of which a gigabyte of signals can be made
+BINARY_BYTES = 1_000_000_000
+JSON_BYTES = 100_000_000  # of text; as Python's values it takes ten times that
 _PACKED = {
     b"\x1f\x8b": "compressed by gzip; unpack it (gunzip) and give the file in it",
     b"BZh": "compressed by bzip2; unpack it (bunzip2) and give the file in it",
@@ -119,6 +123,7 @@ def find_format(path: Path, head: bytes) -> Format:
 
 
 def _head(path: Path) -> bytes:
+    refuse_special(path, BadLog)
     try:
         with path.open("rb") as file:
             head = file.read(1024)
@@ -157,6 +162,14 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
         raise BadLog(f"{path}: is not a {form} file by its first bytes{advice}")
 
 
+def _refuse_long(path: Path, rows: int) -> None:
+    if rows > MOST_ROWS:
+        raise BadLog(
+            f"{path}: has {rows} rows, at most {MOST_ROWS} are read; cut the log, or keep every"
+            " tenth row"
+        )
+
+
 def _is_text(head: bytes) -> bool:
     return all(32 <= byte < 127 or byte in b"\t\r\n" for byte in head)
 
@@ -170,7 +183,8 @@ def _read_parquet(path: Path, spec: FileSpec) -> Table:
     import pyarrow.parquet as pq
 
     names = tuple(str(name) for name in pq.read_schema(path).names)
-    pq.ParquetFile(path).close()
+    with pq.ParquetFile(path) as file:
+        _refuse_long(path, file.metadata.num_rows)
 
     def fetch(number: int) -> RawColumn:
         with pq.ParquetFile(path) as file:
@@ -183,11 +197,16 @@ def _read_parquet(path: Path, spec: FileSpec) -> Table:
 def _read_mat(path: Path, spec: FileSpec) -> Table:
     import scipy.io
 
-    bytes_read = path.read_bytes()
-    if b"\x89HDF" in bytes_read[:1024]:
+    if b"\x89HDF" in _head(path):
         return _read_hdf5(path, spec)
-    if bytes_read.startswith(b"MATLAB 5") and not tags_are_sound(bytes_read):
+    refuse_larger(path, BINARY_BYTES, "a MAT file", BadLog)
+    bytes_read = path.read_bytes()
+    sound = not bytes_read.startswith(b"MATLAB 5") or tags_are_sound(bytes_read)
+    del bytes_read
+    if not sound:
         raise damaged(path, "mat", ValueError("a tag does not fit"))
+    for _name, shape, _kind in scipy.io.whosmat(str(path)):
+        _refuse_long(path, max(shape, default=0))
     content: Any = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
     found = {name: value for name, value in content.items() if not name.startswith("__")}
     for key in spec.rows.split(".") if spec.rows else ():
@@ -209,21 +228,31 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
             raise BadLog(f"{path}: no group or data set {spec.rows!r}{nearest(spec.rows, file)}")
         root = file[spec.rows.replace(".", "/")] if spec.rows else file
         if isinstance(root, h5py.Dataset):
+            _refuse_long(path, max(root.shape, default=0))
             values = root[()]
             if values.dtype.names:
                 return _vectors({name: values[name] for name in values.dtype.names}, spec)
             return _matrix(path, values.T if matlab else values, spec)
-        found: dict[str, RawColumn] = {}
+        names: list[str] = []
 
         def visit(name: str, item: Any) -> None:
             if isinstance(item, h5py.Dataset) and not name.startswith("#refs#"):
-                found[name] = np.atleast_1d(np.asarray(item[()]))
+                _refuse_long(path, item.size)
+                names.append(name)
 
         root.visititems(visit)
-    return _vectors(found, spec)
+        place = root.name
+
+    def fetch(number: int) -> RawColumn:
+        with h5py.File(path, "r") as file:
+            values = np.atleast_1d(np.asarray(file[place][names[number]][()])).ravel()
+        return values[spec.skip_rows :] if values.size > 1 else values
+
+    return Table(tuple(names), fetch, 1 + spec.skip_rows)
 
 
 def _read_json(path: Path, spec: FileSpec) -> Table:
+    refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
     try:
         content = json.loads(path.read_text(encoding=spec.encoding))
     except (UnicodeDecodeError, json.JSONDecodeError) as error:

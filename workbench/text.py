@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 
 from identification.errors import BadLog
 from workbench.card import FileSpec
+from workbench.files import refuse_larger
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _DELIMITERS = (";", "\t", ",", " ", "|")
 MANY = 10  # rows of a wrong length that make the header suspect instead
+LARGEST = 400_000_000  # bytes of a text file; three times that is needed to read it
 _LOOK = 65536  # characters looked at to find the layout
 
 
@@ -41,6 +43,7 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
 
     Raises BadLog where the file is not text, has no rows, or a row has the wrong number of fields.
     """
+    refuse_larger(path, LARGEST, "a text log", BadLog)
     text = _decode(path, spec.encoding)
     lines = text[:_LOOK].splitlines()
     start = spec.skip_rows
@@ -62,7 +65,9 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
             " that it is the right file"
         )
     first_row = start + int(headed) + 1
-    columns = _parse(path, body, layout, len(names), first_row)
+    content = body.encode("utf-8")
+    del text, body  # of a long log a gigabyte
+    columns = _parse(path, content, layout, len(names), first_row)
     return TextTable(names, columns, first_row, headed)
 
 
@@ -157,12 +162,11 @@ def _body(text: str, start: int, spec: FileSpec, layout: _Layout) -> str:
 
 
 def _parse(
-    path: Path, body: str, layout: _Layout, width: int, first_row: int
+    path: Path, content: bytes, layout: _Layout, width: int, first_row: int
 ) -> Callable[[int], NDArray[Any]]:
     import pyarrow as pa
     from pyarrow import csv as arrow
 
-    content = body.encode("utf-8")
     wrong: list[tuple[int, int]] = []
 
     def note(row: Any) -> str:

@@ -10,7 +10,7 @@ from design.linear import ForceGains, force_gains, linear_plant
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.arrays import Array
-from identification.errors import BadSpecification, NotIdentifiable
+from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.plant import Actuator, Motor
 from identification.result import Estimate
 from workbench.design_values import (
@@ -22,12 +22,14 @@ from workbench.design_values import (
     Linear,
     margin_values,
 )
+from workbench.identifying import check_period
 from workbench.model import Model, used, versions
 from workbench.parameter_units import Shown, shown
 from workbench.plausible import bandwidth_remarks, stored_remarks
 
 NORMAL_95 = 1.96  # standard deviations to either side that hold 95 %
 DEFAULT_PERIOD = 10e-3  # s, the paper's rig
+FINEST = 20  # times faster than its logs that a controller may be designed
 N_C = 2.0  # the paper's, in simulation and on the rig
 E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
 LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
@@ -51,6 +53,7 @@ def design(
     NotIdentifiable where the model carries no design.
     """
     asked = asked or Asked()
+    _check_period(period, model)
     plant, force = linear_of(model, source, period)
     goals = goals or Goals(effort=effort_limit(model))
     found: dict[str, Controller] = {}
@@ -92,6 +95,18 @@ def design(
         ),
         versions=versions(),
     )
+
+
+def _check_period(period: float | None, model: Model) -> None:
+    """Raises BadModel where a period [s] is far from what the model's logs show."""
+    longest = max(model.log, key=lambda entry: entry.duration)
+    check_period(period, longest.file, longest.duration)
+    fastest = min(entry.h for entry in model.log)
+    if period is not None and period < fastest / FINEST:
+        raise BadModel(
+            f"design period {period:g} s, the model's logs were sampled every {fastest:g} s; ask for"
+            f" at least {fastest / FINEST:.3g}"
+        )
 
 
 def _recommended(found: Mapping[str, Controller]) -> Literal["rst", "pid", "none"]:

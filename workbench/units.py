@@ -27,6 +27,11 @@ _NAMES = {
 # Logs of forces are often in pounds: as a force they are read as pounds-force.
 _POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
 _POUND = re.compile(r"\b(lbs?|klb)\b")
+LONGEST = 100  # characters of a unit
+MOST_POWERS = 6  # in a unit, as in kg^2 m^4 s^-6 A^-2
+_DIGIT = r"[+-]?\d(?:\.\d{1,3})?"
+# What follows "**": one digit, perhaps with a sign or a fraction; then the rest, if any.
+_EXPONENT = re.compile(rf"\s*(?:{_DIGIT}|\(\s*{_DIGIT}\s*\))(?![\w.])\s*(.*)", re.DOTALL)
 
 
 class Scale(NamedTuple):
@@ -102,14 +107,26 @@ def conversion(unit: str, target: str | None, per: str | None = None) -> Scale |
 
 
 def _parsed(unit: str) -> "pint.Unit":
+    if len(unit) > LONGEST or not _powers_are_small(unit):
+        raise _unknown(unit)
     try:
         return _registry().Unit("dimensionless" if unit.strip() in ("", "1") else unit)
     except Exception as error:  # pint raises tokenizer and attribute errors on odd text
         raise _unknown(unit) from error
 
 
+def _powers_are_small(unit: str) -> bool:
+    """Whether every power is a plain exponent, as in m^2: pint would work out 9**9**9**9."""
+    from pint.util import string_preprocessor
+
+    powers = string_preprocessor(unit).split("**")[1:]
+    rests = [found and found[1] for found in map(_EXPONENT.fullmatch, powers)]
+    return len(powers) <= MOST_POWERS and all(rests[:-1]) and None not in rests[-1:]
+
+
 def _unknown(unit: str) -> BadCard:
-    return BadCard(f"unit {unit!r} is unknown; write it as in 'mm', 'bar', 'N m'")
+    shown = unit if len(unit) <= LONGEST else f"{unit[:LONGEST]}..."
+    return BadCard(f"unit {shown!r} is unknown; write it as in 'mm', 'bar', 'N m'")
 
 
 def _to_si(value: float, unit: "pint.Unit", base: "pint.Unit | None") -> float:

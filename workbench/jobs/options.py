@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from workbench.options import POSITIVE, effects_option
+from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery, Webhook
@@ -53,7 +53,7 @@ def job_options(command: Command) -> Command:
                      "postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]"),
         click.option("--first", is_flag=True,
                      help="Give a machine without a model its first from its first log."),
-        click.option("--settle", type=click.FloatRange(min=0), default=10.0, show_default=True,
+        click.option("--settle", type=SECONDS, default=10.0, show_default=True,
                      metavar="S", help="Take a file that has not changed for this long."),
         click.option("--marker", metavar="SUFFIX", callback=_suffix,
                      help="Take a file once one named <file>SUFFIX lies beside it, as .done; "
@@ -62,11 +62,11 @@ def job_options(command: Command) -> Command:
                      default="time-or-name", show_default=True,
                      help="What tells that a log is older than another, so that it puts no model "
                      "in force: the file's time, or also the numbers in its name."),
-        click.option("--lease", type=POSITIVE, default=120.0, show_default=True, metavar="S",
+        click.option("--lease", type=SECONDS_ABOVE_0, default=120.0, show_default=True, metavar="S",
                      help="Take a silent worker's machine over after this long."),
-        click.option("--patience", type=click.FloatRange(min=0), default=60.0, show_default=True,
+        click.option("--patience", type=SECONDS, default=60.0, show_default=True,
                      metavar="S", help="Wait this long for a database that is away."),
-        click.option("--margin", type=click.FloatRange(0, 1, max_open=True), default=0.1,
+        click.option("--margin", type=Finite(0, 1, max_open=True), default=0.1,
                      show_default=True, help="Relative fall of a held-out error that wins."),
         click.option("--webhook", metavar="URL", help="Send alarms there, as JSON by POST."),
         click.option("--metrics", type=click.Path(path_type=Path), metavar="FILE",

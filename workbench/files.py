@@ -1,0 +1,48 @@
+"""Files that a user names: what never ends is not opened, and what no result or card is not read."""
+
+import stat
+from pathlib import Path
+
+from identification.errors import UserError
+
+CARD_BYTES = 1_000_000
+"""Size above which a file is no card; the largest that ships has 5 kB."""
+
+RESULT_BYTES = 50_000_000
+"""Size above which a file is no model, design or state; a posterior makes the largest, of 1 MB."""
+
+ABSURD = 1e30
+"""In SI, what no machine reaches: products of such values overflow."""
+
+_KINDS = {
+    stat.S_IFIFO: "a pipe",
+    stat.S_IFCHR: "a device",
+    stat.S_IFBLK: "a device",
+    stat.S_IFSOCK: "a socket",
+}
+
+
+def refuse_special(path: Path, wrong: type[UserError]) -> None:
+    """Raises `wrong`, one line, where the path is a pipe, a device or a socket.
+
+    To open or to read one may take for ever. What else is wrong with a path shows on opening.
+    """
+    try:
+        kind = _KINDS.get(stat.S_IFMT(path.stat().st_mode))
+    except (OSError, ValueError):
+        return
+    if kind:
+        raise wrong(f"{path}: is {kind}, not a file; write its data to a file and give that")
+
+
+def refuse_larger(path: Path, most: int, what: str, wrong: type[UserError]) -> None:
+    """Raises `wrong`, one line, where the file has more than `most` bytes; `what` it should be."""
+    try:
+        size = path.stat().st_size
+    except (OSError, ValueError):
+        return
+    if size > most:
+        raise wrong(
+            f"{path}: has {size / 1e6:.4g} MB, {what} at most {most / 1e6:g} MB; give another file,"
+            " or a part of it"
+        )
