@@ -38,7 +38,7 @@ def check(log: Log, rig: Rig, first_row: int = 1) -> None:
 
     Raises BadLog, one line each, where the log is too short, time repeats or goes back, a value
     is not finite, the position is constant, jumps, wraps, sticks or is beyond the stroke, the
-    command is far beyond its limit, the force has the wrong sign, or force and position are swapped.
+    command is far beyond its limit, the force has the wrong sign, or is swapped with the position.
     """
     check_time(log, first_row)
     _check_finite(log, first_row)
@@ -134,8 +134,8 @@ def _check_command(log: Log, rig: Rig, first_row: int) -> None:
     beyond = np.flatnonzero(np.abs(u) > _BEYOND_LIMIT * limit) if limit else np.array([])
     if beyond.size:
         raise BadLog(
-            f"{log.name}: the command u runs from {u.min():g} to {u.max():g}, beyond"
-            f" {_BEYOND_LIMIT:g} times the card's control_limit_v = {limit:g} in {beyond.size} rows,"
+            f"{log.name}: the command u runs from {u.min():g} to {u.max():g}, in {beyond.size} rows"
+            f" beyond {_BEYOND_LIMIT:g} times the card's control_limit_v = {limit:g},"
             f" first in row {first_row + int(beyond[0])}; check unit, gain and offset of u (mV for"
             " V?), or correct the limit, which is in the unit of u"
         )

@@ -5,8 +5,8 @@ changes by at most acceleration times h squared, so a step that differs by more 
 its neighbours is none of the body's. An impact changes the step once and stays on one side; noise
 and an encoder's counts do it all along the log, and so are part of its own level.
 
-The factors were chosen on rough machines of seeds 1 and 2 (benchmarks/sound_logs.py) and the
-measured sets, and judged on others: see there.
+The factors were chosen on rough machines, the measured sets and the shipped recipes, and judged on
+others: see benchmarks/sound_logs.py.
 """
 
 from dataclasses import dataclass

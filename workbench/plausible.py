@@ -1,8 +1,8 @@
 """Sizes that servo machines have, and the slip of a unit that a size far off suggests.
 
-The ranges are wide on purpose: a remark on a sound machine is worse than none. They hold positioners
-of a milligram and friction bearings under a hundred tonnes, cylinders of 1 mm and of 1 m, drives
-logged at 10 Hz and at 50 kHz. A remark changes nothing; it names what to look at.
+The ranges are wide on purpose: a remark on a sound machine is worse than none. They hold
+positioners of a milligram and friction bearings under a hundred tonnes, cylinders of 1 mm and of
+1 m, drives logged at 10 Hz and at 50 kHz. A remark changes nothing; it names what to look at.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -26,7 +26,7 @@ _AREA: Slips = ((1e-6, "mm^2"), (1e-4, "cm^2"))
 
 @dataclass(frozen=True)
 class Size:
-    """What a quantity of a machine lies between, in its SI unit, and the units it is mistaken in."""
+    """What a quantity lies between in its SI unit, and the units that are mistaken for it."""
 
     low: float
     high: float
@@ -87,7 +87,7 @@ def log_remarks(
 
 
 def model_remarks(model: Model) -> tuple[str, ...]:
-    """A line for each parameter whose size no machine has; what the logs say stands in their own."""
+    """A line where the mass, or what the logs' force makes of it, is of no machine's size."""
     mass = model.friction["m"].value
     if mass is None:
         return ()

@@ -91,7 +91,7 @@ def test_one_lasting_jump_is_refused_with_row_and_size(size: float) -> None:
 def test_a_counter_that_wraps_is_refused(period: float, h: float) -> None:
     log = moving(h=h)
     wrapped = log.with_signals(y=np.mod(log["y"] + 0.013, period))
-    with pytest.raises(BadLog, match="such jumps, all about as large.*wraps at the end") as caught:
+    with pytest.raises(BadLog, match=r"such jumps, all about as large.*wraps at the end") as caught:
         prepare(wrapped, RIG)
     assert "unwrap the column" in str(caught.value)
     assert "signed = true" in str(caught.value)
@@ -139,9 +139,8 @@ def test_slips_of_a_stick_slip_are_no_fault(h: float) -> None:
     rng = np.random.default_rng(5)
     t = h * np.arange(round(20.0 / h), dtype=np.float64)
     y = np.zeros_like(t)
-    for begin, size in zip(
-        np.sort(rng.uniform(0, 20, 25)), rng.uniform(5e-4, 2e-3, 25), strict=True
-    ):
+    begins, sizes = np.sort(rng.uniform(0, 20, 25)), rng.uniform(5e-4, 2e-3, 25)
+    for begin, size in zip(begins, sizes, strict=True):
         share = np.clip((t - begin) / 6e-3, 0.0, 1.0)
         y += size * share**2 * (3 - 2 * share)
     log = Log("slips", {"t": t, "y": y + 1e-6 * rng.standard_normal(t.size)})
@@ -177,9 +176,7 @@ def test_a_command_far_beyond_the_card_s_limit_is_refused(limit: float, scale: f
     rng = np.random.default_rng(1)
     check(log.with_signals(u=u * (1.0 + 0.05 * rng.standard_normal(u.size))), rig)
     check(log.with_signals(u=scale * u), RIG)
-    with pytest.raises(
-        BadLog, match=f"control_limit_v = {limit:g} in .* rows, first in row "
-    ) as one:
+    with pytest.raises(BadLog, match=f"control_limit_v = {limit:g}, first in row ") as one:
         check(log.with_signals(u=scale * u), rig)
     assert "check unit, gain and offset of u" in str(one.value)
     assert "\n" not in str(one.value)
