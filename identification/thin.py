@@ -40,16 +40,13 @@ def thinned(log: Log) -> Thinned:
     remarks, step = [], _step(log)
     if step > 1:
         remarks.append(
-            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every"
-            f" {step * log.h:.4g} s"
+            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every {step * log.h:.4g} s"
         )
         log = _averaged(log, step)
     if len(log) > KEPT:
         start = _liveliest(log["y"])
         # Copies: a view would hold the whole log in memory.
-        part = Log(
-            log.name, {k: v[start : start + KEPT].copy() for k, v in log.signals.items()}
-        )
+        part = Log(log.name, {k: v[start : start + KEPT].copy() for k, v in log.signals.items()})
         t = part["t"]
         remarks.append(
             f"{log.name}: of its {log.duration:.5g} s the {part.duration:.4g} s from"

@@ -20,7 +20,9 @@ class Finite(click.FloatRange):
         """The number; a usage error where it is none, not finite, or out of bounds."""
         found = float(super().convert(value, param, ctx))
         if not math.isfinite(found):
-            self.fail(f"{value} is not finite; a number {self._describe_range()} needed.", param, ctx)
+            self.fail(
+                f"{value} is not finite; a number {self._describe_range()} needed.", param, ctx
+            )
         return found
 
 

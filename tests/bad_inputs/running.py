@@ -85,7 +85,9 @@ def _run(
 ) -> tuple[int | None, str]:
     with tempfile.TemporaryDirectory() as name:
         said = Path(name) / "stderr"
-        process = context.Process(target=_child, args=(arguments, str(said), str(Path.cwd()), seconds))
+        process = context.Process(
+            target=_child, args=(arguments, str(said), str(Path.cwd()), seconds)
+        )
         process.start()
         process.join(6 * seconds)
         if process.is_alive():
