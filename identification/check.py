@@ -105,8 +105,8 @@ def check_time(log: Log, first_row: int = 1) -> None:
     period = float(t[-1] - t[0]) / (len(t) - 1)
     if 0.0 < period < _PERIODS[0] or period > _PERIODS[1]:
         raise BadLog(
-            f"{log.name}: sampled every {period:.3g} s, {_PERIODS[0]:g} to {_PERIODS[1]:g} s needed;"
-            " check the unit of t in the card"
+            f"{log.name}: sampled every {period:.3g} s, {_PERIODS[0]:g} to {_PERIODS[1]:g} s"
+            " needed; check the unit of t in the card"
         )
     wrong = np.flatnonzero(np.diff(t) <= 0)
     if wrong.size:

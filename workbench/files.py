@@ -1,4 +1,4 @@
-"""Files that a user names: what never ends is not opened, and what no result or card is not read."""
+"""Files that a user names: what never ends, and what is too large, is refused before it is read."""
 
 import stat
 from pathlib import Path

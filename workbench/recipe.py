@@ -139,7 +139,9 @@ def _refuse_absurd(key: str, value: object) -> None:
     """Raises ValueError where the value, or one in the list, is a number that no machine has."""
     for one in value if isinstance(value, list) else [value]:
         if isinstance(one, int | float) and one != 0 and not 1 / ABSURD <= abs(one) <= ABSURD:
-            raise ValueError(f"{key} = {str(one)[:20]} is a number that no machine has; correct it")
+            raise ValueError(
+                f"{key!r} = {str(one)[:20]} is a number that no machine has; correct it"
+            )
 
 
 def _takes_bool(section: type[Section], key: str) -> bool:

@@ -104,8 +104,8 @@ def _check_period(period: float | None, model: Model) -> None:
     fastest = min(entry.h for entry in model.log)
     if period is not None and period < fastest / FINEST:
         raise BadModel(
-            f"design period {period:g} s, the model's logs were sampled every {fastest:g} s; ask for"
-            f" at least {fastest / FINEST:.3g}"
+            f"design period {period:g} s, the model's logs were sampled every {fastest:g} s; ask"
+            f" for at least {fastest / FINEST:.3g}"
         )
 
 

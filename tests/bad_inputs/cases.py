@@ -74,7 +74,9 @@ Family = Iterator[Case]
 def cases(number: int, seed: int) -> list[Case]:
     """So many cases, in turn from every family."""
     streams = np.random.SeedSequence(seed).spawn(len(FAMILIES))
-    open_ones = [family(np.random.default_rng(s)) for family, s in zip(FAMILIES, streams)]
+    open_ones = [
+        family(np.random.default_rng(s)) for family, s in zip(FAMILIES, streams, strict=True)
+    ]
     out: list[Case] = []
     while len(out) < number and open_ones:
         for one in list(open_ones):
@@ -104,7 +106,9 @@ def damaged_bytes(rng: np.random.Generator) -> Family:
         form = FORMATS[number % len(FORMATS)]
         how = ("cut", "flipped", "flipped", "doubled", "zeros", "noise")[int(rng.integers(0, 6))]
 
-        def make(shop: Shop, folder: Path, form: str = form, how: str = how) -> list[str]:
+        def make(
+            shop: Shop, folder: Path, form: str = form, how: str = how, number: int = number
+        ) -> list[str]:
             own = np.random.default_rng(number)
             content = bytearray((shop.folder / form).read_bytes())
             place = int(own.integers(0, len(content)))
@@ -121,13 +125,14 @@ def damaged_bytes(rng: np.random.Generator) -> Family:
                 case _:
                     content[place : place + 500] = own.bytes(500)
             (folder / form).write_bytes(content)
-            return _reading(own, shop, str(folder / form), shop.card())
+            return ["predict", shop.result("model"), str(folder / form), "--card", shop.card()]
 
         yield Case(f"bytes {form} {how} {number}", make)
 
 
 def odd_texts(rng: np.random.Generator) -> Family:
     """A CSV whose text is none, or not that of a table."""
+    _ = rng
     edits: dict[str, Callable[[str], str]] = {
         "no header": lambda text: text.partition("\n")[2],
         "header alone": lambda text: text.partition("\n")[0],
@@ -160,7 +165,7 @@ def odd_texts(rng: np.random.Generator) -> Family:
         def make(shop: Shop, folder: Path, edit: Callable[[str], str] = edit) -> list[str]:
             text = edit(Path(shop.log()).read_text("utf-8"))
             (folder / "a.csv").write_bytes(text.encode("latin-1", "replace"))
-            return _reading(rng, shop, str(folder / "a.csv"), shop.card())
+            return ["predict", shop.result("model"), str(folder / "a.csv"), "--card", shop.card()]
 
         yield Case(f"text {how}", make)
 
@@ -305,7 +310,12 @@ def card_values(rng: np.random.Generator) -> Family:
         line, value = int(rng.integers(0, 60)), written[int(rng.integers(0, len(written)))]
 
         def make(
-            shop: Shop, folder: Path, rig: str = rig, line: int = line, value: str = value
+            shop: Shop,
+            folder: Path,
+            rig: str = rig,
+            line: int = line,
+            value: str = value,
+            number: int = number,
         ) -> list[str]:
             card = folder / "card.toml"
             card.write_text(_edited(CARDS[rig], line, value), "utf-8")
@@ -325,7 +335,12 @@ def card_units(rng: np.random.Generator) -> Family:
         name = names[int(rng.integers(0, len(names)))]
 
         def make(
-            shop: Shop, folder: Path, rig: str = rig, unit: str = unit, name: str = name
+            shop: Shop,
+            folder: Path,
+            rig: str = rig,
+            unit: str = unit,
+            name: str = name,
+            number: int = number,
         ) -> list[str]:
             text = re.sub(
                 rf'^({name} = .*unit = )"[^"]*"',
@@ -344,6 +359,7 @@ def card_units(rng: np.random.Generator) -> Family:
 
 def card_bytes(rng: np.random.Generator) -> Family:
     """Files that are no cards, some made to break the reader."""
+    _ = rng
     deep = 20_000
     contents: dict[str, bytes] = {
         "empty": b"",
@@ -376,7 +392,8 @@ def card_bytes(rng: np.random.Generator) -> Family:
 
         def make(shop: Shop, folder: Path, content: bytes = content) -> list[str]:
             (folder / "card.toml").write_bytes(content)
-            return _reading(rng, shop, shop.log(), str(folder / "card.toml"))
+            card = str(folder / "card.toml")
+            return ["predict", shop.result("model"), shop.log(), "--card", card]
 
         yield Case(f"card of {how}", make)
 
@@ -426,6 +443,7 @@ def result_values(rng: np.random.Generator) -> Family:
             draw: float = draw,
             value: Any = value,
             remove: bool = remove,
+            number: int = number,
         ) -> list[str]:
             content = json.loads(Path(shop.result(name)).read_text("utf-8"))
             paths = list(_leaves(content))

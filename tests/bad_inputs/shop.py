@@ -1,4 +1,4 @@
-"""What bad inputs are made from: sound cards, logs in every format, a model, a design and a state."""
+"""What bad inputs are made from: sound cards, logs of every format, a model, design and state."""
 
 from contextlib import redirect_stdout
 from dataclasses import dataclass

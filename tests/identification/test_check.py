@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.check import check
+from identification.check import check, check_driven
 from identification.errors import BadLog
 from identification.log import Log, Rig
 
@@ -27,3 +27,21 @@ def test_a_rest_is_no_fault_without_noise_or_with_counts(noise: float) -> None:
     if noise:
         y = 2e-5 * np.round(y / 2e-5)
     check(Log("made", {"t": t, "y": y}), Rig("force"))
+
+
+def test_a_force_that_hardly_changes_while_the_body_goes_both_ways_is_refused() -> None:
+    t = 0.01 * np.arange(1000)
+    y, F = 0.1 * np.sin(t), np.cos(t)
+    check_driven(Log("a", {"t": t, "y": y, "F": F}))
+    check_driven(Log("a", {"t": t, "y": y, "F": 50.0 + F}))
+    check_driven(Log("a", {"t": t, "y": 0.1 * t, "F": 300.0 + F}))
+    for level in (300.0, -300.0):
+        with pytest.raises(BadLog, match="so something else drives it; check the units"):
+            check_driven(Log("a", {"t": t, "y": y, "F": level + F}))
+
+
+@pytest.mark.parametrize(("by", "period"), [(1e-9, "1e-11"), (1e9, r"1e\+07")])
+def test_a_clock_that_no_logger_has_is_refused(by: float, period: str) -> None:
+    t = 0.01 * np.arange(1000)
+    with pytest.raises(BadLog, match=f"sampled every {period} s.*check the unit of t"):
+        check(Log("a", {"t": t * by, "y": np.sin(t), "F": np.cos(t)}), Rig("force"))

@@ -137,6 +137,43 @@ def test_error_is_one_line(
     assert capsys.readouterr() == ("", line + "\n")
 
 
+def test_long_names_and_long_messages_lose_their_middle() -> None:
+    name = "/".join(["a" * 100] * 50)
+    said = cli.one_line(f"error: {name}: File name too long; choose another folder with --out")
+    assert said.startswith("error: aaaa")
+    assert said.endswith("aaaa: File name too long; choose another folder with --out")
+    assert len(said) < 300 and "[...]" in said
+    assert len(cli.one_line("a word " * 1000 + "end")) <= 900
+    assert cli.one_line("a word " * 1000 + "end").endswith("word end")
+
+
+def test_a_warning_is_no_line_of_a_command_but_an_error_in_the_tests(
+    outcome: Fail, capsys: pytest.CaptureFixture[str]
+) -> None:
+    code = (
+        "import sys, warnings, click\n"
+        "from types import ModuleType\n"
+        "from workbench import cli\n"
+        "module = ModuleType('workbench.commands.probe')\n"
+        "module.command = click.Command('probe', callback=lambda: warnings.warn('overflow'))\n"
+        "sys.modules[module.__name__] = module\n"
+        "cli.COMMANDS['probe'] = 'x'\n"
+        "sys.exit(cli.main(['probe']))\n"
+    )
+    for shown, debug in ((False, "0"), (True, "1")):
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={**os.environ, "WORKBENCH_DEBUG": debug},
+        )
+        assert ("overflow" in done.stderr) is shown
+    outcome(RuntimeWarning("overflow"))
+    assert cli.main(["probe"]) == 3
+    assert "RuntimeWarning" in capsys.readouterr().err
+
+
 def test_a_refusal_asked_as_json_is_an_object(
     outcome: Fail, capsys: pytest.CaptureFixture[str]
 ) -> None:

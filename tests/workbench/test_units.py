@@ -71,3 +71,26 @@ def test_wrong_units_are_refused(unit: str, signal: str, message: str) -> None:
 def test_lengths_scale_by_their_prefix(unit: str, value: float) -> None:
     sizes = {"mm": 1e-3, "cm": 1e-2, "km": 1e3, "inch": 0.0254, "um": 1e-6}
     assert value * scale(unit, "y").factor == pytest.approx(value * sizes[unit], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "unit",
+    [
+        *("m**9**9**9**9", "10 cubed cubed cubed", "m**(9**9)", "m**99999999", "10^(9)^(9)^(9) m"),
+        *(
+            "((((((((10**9)**9)**9)**9)**9)**9)**9)**9) m",
+            "1e9999 m",
+            "(" * 5000 + "m",
+            "m" * 100_000,
+        ),
+    ],
+)
+def test_units_that_would_be_worked_out_for_ever_are_unknown(unit: str) -> None:
+    with pytest.raises(BadCard, match="is unknown; write it as in") as caught:
+        scale(unit, "y", "linear")
+    assert len(str(caught.value)) < 200
+
+
+@pytest.mark.parametrize("unit", ["kg m^2/s^2", "kg*m**2*s**-2", "kg m² s^(-2)", "(m/s)^2 kg"])
+def test_powers_of_sound_units_are_read(unit: str) -> None:
+    assert scale(unit, "F", "rotary").factor == pytest.approx(1.0)
