@@ -23,9 +23,9 @@ def frozen(values: Any) -> Array:
 
 
 def _is_frozen(values: Array) -> bool:
-    base = values.base
-    own = base is None or (isinstance(base, np.ndarray) and not base.flags.writeable)
-    return own and not values.flags.writeable
+    base: object = values.base
+    locked = base is None or (isinstance(base, np.ndarray) and not base.flags.writeable)
+    return locked and not values.flags.writeable
 
 
 def read_only(values: Array) -> Array:

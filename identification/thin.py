@@ -69,7 +69,7 @@ def _averaged(log: Log, step: int) -> Log:
 
     def means(values: Array, first: int, width: int) -> Array:
         blocks: Array = values[first : first + count * step].reshape(count, step)
-        return blocks[:, :width].mean(axis=1)
+        return np.asarray(blocks[:, :width].mean(axis=1), dtype=np.float64)
 
     signals = {}
     for name, values in log.signals.items():

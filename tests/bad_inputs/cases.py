@@ -9,6 +9,7 @@ import re
 import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 from typing import Any
@@ -194,7 +195,7 @@ def odd_signals(rng: np.random.Generator) -> Family:
         "stuck": lambda x: np.where(np.arange(len(x)) > 1500, x[1500], x),
         "growing": lambda x: x * np.exp(np.linspace(0, 60, len(x))),
         **{
-            f"times {by:g}": lambda x, by=by: x * by
+            f"times {by:g}": partial(np.multiply, by)
             for by in (1e-300, 1e-30, 1e-10, 1e-5, 1e-3, 0.1, 10.0, 1e3, 1e5, 1e10, 1e28, 1e150)
         },
     }
@@ -231,7 +232,9 @@ def odd_clocks(rng: np.random.Generator) -> Family:
         "far": lambda t: t + 1e17,
         "square": lambda t: t**2,
         "logarithm": lambda t: np.log(t + 1e-9),
-        **{f"times {by:g}": lambda t, by=by: t * by for by in (1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e29)},
+        **{
+            f"times {by:g}": partial(np.multiply, by) for by in (1e-300, 1e-9, 1e-3, 1e3, 1e9, 1e29)
+        },
     }
     for place, (how, fault) in enumerate([*faults.items()] * 3):
 
@@ -405,8 +408,10 @@ def _leaves(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]
     """Paths of all entries of a JSON value, inner ones too."""
     if path:
         yield path
-    inside = value.items() if isinstance(value, dict) else ()
-    if isinstance(value, list):
+    inside: list[tuple[Any, Any]] = []
+    if isinstance(value, dict):
+        inside = list(value.items())
+    elif isinstance(value, list):
         inside = list(enumerate(value[:3]))
     for key, entry in inside:
         yield from _leaves(entry, (*path, key))
@@ -595,7 +600,7 @@ def files(rng: np.random.Generator) -> Family:
         here.bind(str(path.relative_to(Path.cwd())))
         here.close()
 
-    makers: dict[str, Callable[[Path], None]] = {
+    makers: dict[str, Callable[[Path], object]] = {
         "folder": lambda path: path.mkdir(),
         "pipe": lambda path: os.mkfifo(path),
         "endless": lambda path: path.symlink_to("/dev/zero"),
@@ -604,7 +609,7 @@ def files(rng: np.random.Generator) -> Family:
         "socket": plug,
         "sparse": sparse,
         "terminal": lambda path: path.symlink_to("/dev/tty"),
-        "zeros": lambda path: path.write_bytes(bytes(10_000)) and None,
+        "zeros": lambda path: path.write_bytes(bytes(10_000)),
     }
     for how, place in ((how, place) for place in range(13) for how in makers):
 

@@ -8,9 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from identification.arrays import Array
+from tests.chain import identified
 from tests.workbench.log_files import WRITERS
 from workbench.card import load_card
 from workbench.cli import main
+from workbench.model import model_document
+from workbench.output import dumps
 from workbench.recording import as_columns, record
 
 _RECIPE = """
@@ -110,10 +113,10 @@ def make_shop(folder: Path) -> Shop:
         WRITERS["a.csv"](folder / f"{rig}.csv", columns)
     for name, write in WRITERS.items():
         write(folder / name, shop.columns())
-    model, design = folder / "model", folder / "design"
+    Path(shop.result("model")).parent.mkdir()
+    Path(shop.result("model")).write_text(dumps(model_document(identified().model)), "utf-8")
     for arguments in (
-        ["identify", shop.log(), "--card", shop.card(), "--out", str(model)],
-        ["design", shop.result("model"), "--out", str(design)],
+        ["design", shop.result("model"), "--out", str(folder / "design")],
         ["drift", shop.result("model"), shop.log(), "--card", shop.card(), "--state",
          shop.result("state"), "--out", str(folder / "drift")],
     ):  # fmt: skip

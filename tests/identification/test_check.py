@@ -30,7 +30,7 @@ def test_a_rest_is_no_fault_without_noise_or_with_counts(noise: float) -> None:
 
 
 def test_a_force_that_hardly_changes_while_the_body_goes_both_ways_is_refused() -> None:
-    t = 0.01 * np.arange(1000)
+    t = 0.01 * np.arange(1000, dtype=np.float64)
     y, F = 0.1 * np.sin(t), np.cos(t)
     check_driven(Log("a", {"t": t, "y": y, "F": F}))
     check_driven(Log("a", {"t": t, "y": y, "F": 50.0 + F}))
@@ -42,6 +42,6 @@ def test_a_force_that_hardly_changes_while_the_body_goes_both_ways_is_refused() 
 
 @pytest.mark.parametrize(("by", "period"), [(1e-9, "1e-11"), (1e9, r"1e\+07")])
 def test_a_clock_that_no_logger_has_is_refused(by: float, period: str) -> None:
-    t = 0.01 * np.arange(1000)
+    t = 0.01 * np.arange(1000, dtype=np.float64)
     with pytest.raises(BadLog, match=f"sampled every {period} s.*check the unit of t"):
         check(Log("a", {"t": t * by, "y": np.sin(t), "F": np.cos(t)}), Rig("force"))
