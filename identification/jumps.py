@@ -28,8 +28,8 @@ LONGEST_SPIKE = 3
 # smaller spikes are in the measured sets (a laser on a rod, 0.3 mm), and do no harm.
 _FASTEST = {False: 100.0, True: 1e4}
 _RETURNS = 0.1
-# A jump stands out from the next largest change of step by this factor. Sound logs that need more
-# than the acceleration above, as those in a wrong unit, have neighbours in size: 1.8 at most.
+# A jump stands out from the next largest change of step by this factor: in sound logs that need
+# more than the acceleration above, as those in a wrong unit, changes of all sizes stand together.
 _GAP = 5.0
 _FASTER = 3.0  # times the largest step elsewhere
 # Times a quantile of the second difference: 24 standard deviations of white noise. For spikes and
@@ -144,9 +144,8 @@ def _even(step: Array) -> Array:
 def _around(step: Array, first: int, length: int) -> float:
     """Largest step near a spike, but for two steps of another one, and way, beyond even motion.
 
-    Another spike comes back; a step that stays, as before an impact, does not.
-
-    Infinite too near to an end of the log for a judgement.
+    Another spike comes back; a step that stays, as before an impact, does not. Infinite too near
+    to an end of the log for a judgement.
     """
     before, after = step[max(first - 1 - _AROUND, 0) : first - 1], step[first + length :][:_AROUND]
     if len(before) < _AROUND or len(after) < _AROUND:

@@ -93,7 +93,8 @@ def model_remarks(model: Model) -> tuple[str, ...]:
         return ()
     where = "friction.m, by the units of t, y and the force"
     line = _judged("mass", mass, model.rig, where, "the moving body has")
-    if line is None and mass > 0:
+    clock = any(_judged("period", entry.h, model.rig, "", "") for entry in model.log)
+    if line is None and mass > 0 and not clock:  # a wrong clock makes the mass wrong, and is said
         said = f"on {mass:.4g} {model.friction['m'].unit} the logs' largest force makes"
         reached = model.force_peak / mass
         line = _judged("acceleration", reached, model.rig, "the unit of y (or t)", said)
