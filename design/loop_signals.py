@@ -47,7 +47,7 @@ Signals = Mapping[str, Array | OfForce]
 def command_delay(effects: tuple[Acting, ...]) -> float:
     """Delay of the command [s]."""
     for one in effects:
-        if one.effect.acts == "delay":
+        if one.effect.place.delays:
             return float(one.effect.value(0, 0, 0, 0, 0, 1, 0, 0, 0, (0.0,) * MAX_SIGNALS, one.p))
     return 0.0
 

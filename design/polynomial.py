@@ -86,11 +86,6 @@ def divide(c: Array, factor: Array) -> tuple[Array, float]:
     return quotient, float(np.abs(c - matrix @ quotient).max()) / scale
 
 
-def reciprocal(c: Array) -> Array:
-    """The polynomial whose roots are 1/z: coefficients in reverse order."""
-    return np.ascontiguousarray(c[::-1])
-
-
 def evaluate(c: Array, z: ComplexArray | Array | complex) -> ComplexArray:
     """c(z^-1) at the points z (not 0), shape of `z`."""
     q = 1.0 / np.asarray(z, dtype=np.complex128)

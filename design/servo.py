@@ -109,11 +109,6 @@ class FrictionCompensator:
         """The velocity of the last step [m/s]."""
         return float(self._memory.last[3])
 
-    @property
-    def unfiltered(self) -> float:
-        """F_comp of the last step [N], before filter C."""
-        return float(self._memory.last[1])
-
 
 def simulate_servo(
     plant: Plant,

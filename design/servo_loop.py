@@ -73,7 +73,7 @@ def servo_kernel(
             law, memory, acts, reference[k], feed[k // ratio], measured, felt, wanted, integral, pi,
             shake[k], limits, k_a,
         )  # fmt: skip
-        history[past + k] = acting_command(codes, addresses, q, s, z, now, u)
+        history[past + k] = acting_command(codes, addresses, q, s, z, now, u, h)
         g = plant[K1] * delayed(history, past + k, late)
         if motor:
             F, g = g, 0.0

@@ -72,7 +72,7 @@ def contribution(
     q = np.zeros(MAX_PARAMS)
     for i, p in enumerate(effect.params):
         q[i] = values.get(p.name, p.default if p.default is not None else 0.0)
-    way = np.where(signals["u"] >= 0.0, 1, -1) if effect.acts == "command" else signals["d"]
+    way = np.where(signals["u"] >= 0.0, 1, -1) if effect.place.on_command else signals["d"]
     d = way.astype(np.int64, copy=False)
     up = friction.F_cp, friction.F_vp, friction.F_sp
     down = friction.F_cn, friction.F_vn, -friction.F_sn

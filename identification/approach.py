@@ -318,7 +318,7 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
     """Bounds (k,) of each parameter; slow [m/s]: speed from which the log is sure of a motion."""
     p = plant.friction
     # Growing stiction does not bend what sliding tells: that is known closely already.
-    stops = bool(plant.effects) and all(a.effect.acts == "stiction" for a in plant.effects)
+    stops = bool(plant.effects) and all(a.effect.place.in_stops for a in plant.effects)
     five = min(around.five, KNOWN) if stops else around.five
     params = {f"{a.key}.{one.name}": one for a in plant.effects for one in a.effect.params}
     columns = [f"{a.key}.{one}" for a in plant.effects if in_columns(a.effect) for one in a.values]

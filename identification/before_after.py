@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.choice import Step, absorb
-from identification.evidence import ACTUATOR, MECHANICAL, OUT_OF_LOGS, Moving, stacked
+from identification.evidence import ACTUATOR, MECHANICAL, Moving, stacked
 from identification.held_out import left_out, residual
 from identification.outcome import Outcome, rms
 from identification.result import Drive
@@ -72,7 +72,7 @@ def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stag
     """The stage of other logs with the same structure and effects taken out of their signals."""
     own = replace(stage, logs=tuple(logs), chosen=(), taken=(), scales={})
     for step in steps:
-        if step.candidate.effect.acts in OUT_OF_LOGS:
+        if step.candidate.effect.place.on_signals:
             own = absorb(own, step.candidate)
     return replace(own, chosen=stage.chosen)
 

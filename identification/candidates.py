@@ -84,7 +84,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     best = min(starts, key=score)
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
     best = shaped(free, bounds, best, score)
-    half = best | {p.name: 0.5 * best[p.name] for p in free if p.name == "period"}
+    half = best | {p.name: 0.5 * best[p.name] for p in free if p.role == "period"}
     if half != best and score(half) < score(best) + CALLED:
         best = half  # a harmonic had taken the whole of it
     total, found = trial(own, effect, best, told_in)
@@ -138,7 +138,7 @@ def refined(
         return {**shape, **dict(zip((p.name for p in free), inside.tolist(), strict=True))}
 
     first = start / unit
-    step = np.array([0.02 if p.name == "period" else 0.15 for p in free])
+    step = np.array([0.02 if p.role == "period" else 0.15 for p in free])
     step = np.where(first + step > high / unit, -step, step)
     simplex = np.vstack([first, first + np.diag(step)])
     options: Any = {"maxfev": REFINED * len(free), "fatol": 0.1, "xatol": 1e-4}

@@ -7,6 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadLog
+from identification.jumps import Jumps, jumps
 from identification.log import Log, Rig
 
 SHORTEST = 100
@@ -18,6 +19,7 @@ _WRONG_SIGN = -0.3
 # Swapped logs lie below -0.02, with an F less than 0.8 times as rough as y (true ones: 0.9 to 13).
 _SWAPPED = -0.01
 _MUCH_SMOOTHER = 0.7
+_TRUE = 0.1  # share above which force and position go together
 _BLOCKS = 10_000
 _STEADY = 0.01  # of the force, below which its changes move nothing that the rest does not
 _PERIODS = (1e-9, 1e6)  # s between samples; no logger is faster or slower
@@ -25,22 +27,39 @@ _PERIODS = (1e-9, 1e6)  # s between samples; no logger is faster or slower
 _STUCK_RUN = 50  # samples
 _STUCK_ELSEWHERE = 1e-3  # share of repeats outside such runs, below which they are a fault
 _NOISE_LIKE = 0.3  # share of samples at which the second difference of noise changes its sign
+# Times the card's limit that a command may reach: noise and an amplifier's reserve stay within it,
+# a slip of unit (mV for V, % for a share) does not.
+_BEYOND_LIMIT = 1.5
+_ALIKE = 0.3  # spread of jumps that count as of one size, as those of a counter do
 
 
 def check(log: Log, rig: Rig, first_row: int = 1) -> None:
     """Pass a log that can be what its card says.
 
     Raises BadLog, one line each, where the log is too short, time repeats or goes back, a value
-    is not finite, the position is constant, sticks or is beyond the stroke, the force has the
-    wrong sign, or force and position are swapped.
+    is not finite, the position is constant, jumps, wraps, sticks or is beyond the stroke, the
+    command is far beyond its limit, the force has the wrong sign, or is swapped with the position.
     """
     check_time(log, first_row)
     _check_finite(log, first_row)
+    if "u" in log:
+        _check_command(log, rig, first_row)
     if "y" in log:
-        _check_position(log, rig)
-        _check_stuck(log, first_row)
-    if "y" in log and "F" in log:
+        _check_moved(log, rig, first_row)
+
+
+def _check_moved(log: Log, rig: Rig, first_row: int) -> None:
+    """Refuse a position that is no body's, or does not go with its force."""
+    _check_constant(log)
+    found = jumps(log, rig.motion == "rotary")
+    y = found.undone(log["y"]) if found else log["y"]
+    _check_stroke(log.name, y, rig)
+    _check_stuck(log, first_row)
+    # Jumps spoil the work too; where it is right without them, they are what is wrong.
+    if "F" in log and not (found and (work_share(y, log["F"]) or 0.0) > _TRUE):
         _check_work(log)
+    if found:
+        raise BadLog(_jumping(log, rig, found, first_row))
 
 
 def check_driven(log: Log) -> None:
@@ -109,20 +128,59 @@ def _check_finite(log: Log, first_row: int) -> None:
             )
 
 
-def _check_position(log: Log, rig: Rig) -> None:
+def _check_command(log: Log, rig: Rig, first_row: int) -> None:
+    """Refuse a command that the card's own limit rules out."""
+    limit, u = rig.control_limit, log["u"]
+    beyond = np.flatnonzero(np.abs(u) > _BEYOND_LIMIT * limit) if limit else np.array([])
+    if beyond.size:
+        raise BadLog(
+            f"{log.name}: the command u runs from {u.min():g} to {u.max():g}, in {beyond.size} rows"
+            f" beyond {_BEYOND_LIMIT:g} times the card's control_limit_v = {limit:g},"
+            f" first in row {first_row + int(beyond[0])}; check unit, gain and offset of u (mV for"
+            " V?), or correct the limit, which is in the unit of u"
+        )
+
+
+def _jumping(log: Log, rig: Rig, found: Jumps, first_row: int) -> str:
+    """What jumps, where, and what to do."""
+    unit = "rad" if rig.motion == "rotary" else "m"
+    rows, size = first_row + found.at, found.size
+    said = (
+        f"{log.name}: the position jumps by {size[0]:.4g} {unit} from row {rows[0]} to"
+        f" {rows[0] + 1}, which no body does"
+    )
+    if len(rows) > 1:
+        alike = np.ptp(np.abs(size)) < _ALIKE * np.max(np.abs(size))
+        said += f" ({len(rows)} such jumps{', all about as large' if alike else ''})"
+    if found.wraps and len(rows) > 1:
+        return (
+            f"{said}: a counter or an angle that wraps at the end of its range; unwrap the column"
+            f" (numpy.unwrap with its range as period), or, where a counter goes below zero, give y"
+            " its bits and signed = true in the card"
+        )
+    return (
+        f"{said}: a slip of the counter, or one that wraps; cut the log there and give each part a"
+        " file, or unwrap the column (where the body did move there, check the units of y and t)"
+    )
+
+
+def _check_constant(log: Log) -> None:
     y = log["y"]
     if np.ptp(y) == 0.0:
         raise BadLog(
             f"{log.name}: position is constant ({y[0]:g} m in all {len(log)} rows), motion needed; "
             "check the column of y and the sensor"
         )
+
+
+def _check_stroke(name: str, y: Array, rig: Rig) -> None:
     if rig.stroke is None:
         return
     low, high = rig.stroke
     slack = 0.2 * (high - low)
     if y.min() < low - slack or y.max() > high + slack:
         raise BadLog(
-            f"{log.name}: position runs from {y.min():g} to {y.max():g} m, the card's stroke is "
+            f"{name}: position runs from {y.min():g} to {y.max():g} m, the card's stroke is "
             f"{low:g} to {high:g} m; check unit and gain of y, and that y and F are not swapped"
         )
 

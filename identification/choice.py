@@ -14,7 +14,6 @@ from identification.evidence import (
     ACTUATOR,
     BREAKAWAY,
     MECHANICAL,
-    OUT_OF_LOGS,
     REST,
     Moving,
 )
@@ -32,7 +31,6 @@ MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
 CARRIES = 0.95  # of the error on logs left out, that an effect may leave
 MOSTLY = 0.55  # of what is missing, where much is left in the end
 FAR = 25.0  # square in noise units from which much is left
-ANY_SPEED = ("friction", "force", "command", "delay")
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
@@ -251,7 +249,7 @@ def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) 
     In the band the body takes any force, so some effect always fits a few of its rows.
     """
     effect = candidate.effect
-    if effect.acts not in ANY_SPEED or slow_motion(effect):
+    if not effect.place.any_speed or slow_motion(effect):
         return True
     gain = 0.0
     for equation, after in candidate.outcomes.items():
@@ -270,7 +268,7 @@ def gives_way(candidate: Candidate, base: Mapping[str, Outcome]) -> bool:
 
     What creeps from one short stop to the next moves there as well, but not with the force.
     """
-    if candidate.effect.acts != "bristle" or REST not in base or REST not in candidate.outcomes:
+    if not candidate.effect.place.elastic or REST not in base or REST not in candidate.outcomes:
         return True
     at_rest = base[REST].criterion - candidate.outcomes[REST].criterion
     if at_rest < 0.5 * candidate.gain:
@@ -337,7 +335,7 @@ def contribution_rms(
 def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) -> bool:
     """Whether the effect is large enough to matter to the machine, noise apart."""
     level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
-    if candidate.effect.acts == "sensor":
+    if candidate.effect.place.shows:
         return any(shift_rms(candidate, stage, one) > SHIFT * one.noise_y for one in stage.logs)
     for equation in candidate.outcomes:
         size = contribution_rms(candidate, base, equation, stage.band)
@@ -361,16 +359,16 @@ def shift_rms(candidate: Candidate, stage: Stage, one: Moving) -> float:
 def absorb(stage: Stage, candidate: Candidate) -> Stage:
     """The stage with the effect in it: its columns kept, or the logs' signals freed of it."""
     effect, values = candidate.effect, candidate.values
-    if effect.acts not in OUT_OF_LOGS:
+    if not effect.place.on_signals:
         return replace(stage, chosen=(*stage.chosen, (effect, values)))
     logs = []
     for one in stage.logs:
-        if effect.acts == "sensor":
+        if effect.place.shows:
             log = one.log.with_signals(y=shown_to_true(effect, values, one, stage.friction))
         else:
             whole = reached(effect, values, one, stage.friction)
             more = {"F": driven(one, whole)} if one.held else {}
             log = one.log.with_signals(u=command(one, whole), **more)
         logs.append(one.again(log))
-    play = stage.play or (effect.acts == "sensor" and effect.evolve is not None)
+    play = stage.play or (effect.place.shows and effect.evolve is not None)
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

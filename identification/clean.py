@@ -1,4 +1,4 @@
-"""Stages Log -> Log: missing samples, an even clock, F_e (7), filters A/B/C, velocity (5).
+"""Stages Log -> Log: missing samples, spikes, an even clock, F_e (7), filters A/B/C, velocity (5).
 
 `prepare` runs them in order and says in `remarks` what it changed. A run of missing values is
 never invented: it is refused (`check`).
@@ -15,6 +15,7 @@ from identification.arrays import Array
 from identification.check import SHORTEST, check_time
 from identification.check import check as check
 from identification.errors import BadLog, BadSpecification
+from identification.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.log import Log, Rig
 
 LONGEST_REPAIR = 3
@@ -25,6 +26,7 @@ LONGEST_GAP = 5.0
 
 _EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
+_SPIKING = ("y", "F", "p_p", "p_n")  # what sensors measure; a command may do anything
 
 
 class Repaired(NamedTuple):
@@ -47,7 +49,7 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
 
     Raises BadLog as `repair`, `check` and `even_clock` do.
     """
-    log, remarks = repair(log, first_row)
+    log, remarks = repair(log, first_row, rotary=rig.motion == "rotary")
     check(log, rig, first_row)
     runs = even_clock(log)
     if len(runs) == 1 and runs[0] is log:
@@ -59,12 +61,12 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
     return Prepared(runs, (*remarks, text))
 
 
-def repair(log: Log, first_row: int = 1) -> Repaired:
-    """Isolated missing samples (NaN or infinite) filled by linear interpolation in time.
+def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
+    """Isolated missing samples (NaN or infinite) and spikes filled by linear interpolation in time.
 
-    first_row: the file's row of the first sample, for the messages. Raises BadLog where more
-    than `LONGEST_REPAIR` are missing in a row, where they are at an end of the log, or where a
-    column misses more than 1 %.
+    first_row: the file's row of the first sample, for the messages; rotary: positions are angles.
+    Raises BadLog where more than `LONGEST_REPAIR` are missing in a row, where they are at an end of
+    the log, or where a column misses more than 1 % or has spikes in more.
     """
     check_time(log, first_row)
     filled: dict[str, Array] = {}
@@ -77,7 +79,40 @@ def repair(log: Log, first_row: int = 1) -> Repaired:
         _refuse_runs(f"{log.name}: signal {name!r}", missing, first_row)
         filled[name] = np.interp(log["t"], log["t"][~missing], values[~missing])
         remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
-    return Repaired(log.with_signals(**filled) if filled else log, tuple(remarks))
+    log = log.with_signals(**filled) if filled else log
+    for name in _SPIKING:
+        if name in log:
+            log, said = _without_spikes(log, name, first_row, rotary)
+            remarks.extend(said)
+    return Repaired(log, tuple(remarks))
+
+
+def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repaired:
+    """The signal where no sensor's spike is, interpolated where one is."""
+    t, raw = log["t"], log[name]
+    spiking: Mask = np.zeros(len(log), dtype=bool)
+    while np.any(new := spikes(log, name, rotary) & ~spiking):  # one may hide another beside it
+        spiking |= new
+        log = log.with_signals(**{name: np.interp(t, t[~spiking], raw[~spiking])})
+    if not np.any(spiking):
+        return Repaired(log, ())
+    rows, height = np.flatnonzero(spiking), np.abs(raw - log[name])
+    found = (
+        f"{first_row + int(rows[0])}, the largest of {np.max(height):.3g}"
+        f" {_unit(name, rotary)} in row {first_row + int(np.argmax(height))}"
+    )
+    if spiking.mean() > _MANY:
+        raise BadLog(
+            f"{log.name}: signal {name!r} has spikes in {spiking.mean():.1%} of the rows, first in"
+            f" row {found}; at most {_MANY:.0%} are interpolated; check the sensor and its cable"
+        )
+    said = f"{log.name}: isolated spikes of {name!r} in {len(rows)} samples interpolated"
+    return Repaired(log, (f"{said} (at most {LONGEST_SPIKE} in a row), first in row {found}",))
+
+
+def _unit(name: str, rotary: bool) -> str:
+    units = {"y": "rad", "F": "N m"} if rotary else {"y": "m", "F": "N"}
+    return units.get(name, "Pa")
 
 
 def _refuse_runs(what: str, missing: NDArray[np.bool_], first_row: int) -> None:

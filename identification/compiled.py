@@ -1,13 +1,15 @@
 """The one place where numba is called: typed decorators for compiled kernels."""
 
 import hashlib
-from collections.abc import Callable
-from functools import lru_cache
-from importlib.resources import files
+import linecache
+from collections.abc import Callable, Iterator
+from types import CodeType, FunctionType, ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
+import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
+from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
 from identification.errors import BadModel
@@ -36,9 +38,7 @@ def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
 
 def _jit(function: Callable[P, R], **options: Any) -> Callable[P, R]:
     wrapped: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
-    # Numba looks at the kernel's own file only; a kernel it calls may have changed in another.
-    index = wrapped._cache._cache_file
-    index._source_stamp = (index._source_stamp, _sources(function.__module__.partition(".")[0]))
+    _follow_sources(wrapped._cache, function)
     return cast(Callable[P, R], wrapped)
 
 
@@ -53,10 +53,12 @@ def kernel_pointer(function: Callable[..., float], name: str, step: bool) -> Any
     step: the kernel takes dt before its other arguments. Raises BadModel where it does not
     compile; `name` says whose kernel it is.
     """
-    doubles = [numba.types.float64] * (DOUBLES + int(step))
-    signature = numba.types.float64(*doubles, _POINTER, _POINTER)
+    arguments = (*[_TYPES.float64] * (DOUBLES + int(step)), _POINTER, _POINTER)
+    made: Any = CFunc(function, (arguments, _TYPES.float64), {}, {"error_model": "numpy"})
+    made.enable_caching()
+    _follow_sources(made._cache, function)
     try:
-        made: Any = numba.cfunc(signature, cache=True, error_model="numpy")(function)
+        made.compile()
     except numba.core.errors.NumbaError as fault:
         first = next((line.strip() for line in str(fault).splitlines() if line.strip()), "")
         raise BadModel(
@@ -91,16 +93,84 @@ call_value = _call(DOUBLES)
 call_evolve = _call(DOUBLES + 1)
 
 
-@lru_cache
-def _sources(package: str) -> str:
-    """Hash of the sources whose kernels may call each other: this package's and the caller's."""
-    digest = hashlib.sha256()
-    for name in sorted({"identification", package}):
-        try:
-            modules = sorted(files(name).iterdir(), key=lambda entry: entry.name)
-        except (ModuleNotFoundError, TypeError):
-            continue
-        for entry in modules:
-            if entry.name.endswith(".py"):
-                digest.update(entry.read_bytes())
-    return digest.hexdigest()
+def _follow_sources(cache: Any, function: Callable[..., Any]) -> None:
+    """Let a kernel's cache on disk count only while all that the kernel is made of is the same.
+
+    Numba looks at the kernel's own file only; what it calls or names may have changed in another.
+    """
+    index = cache._cache_file
+    index._source_stamp = _Stamp(index._source_stamp, function)
+
+
+class _Stamp:
+    """The sources of a kernel, hashed when its cache is looked at: its module is complete then.
+
+    In the cache's index it is the hash as a text.
+    """
+
+    def __init__(self, own: object, function: Callable[..., Any]) -> None:
+        self._own, self._function, self._text = own, function, ""
+
+    def __str__(self) -> str:
+        if not self._text:
+            parts = list(_made_of(self._function, set()))
+            whole = repr((self._own, _text_of(_jit), parts))
+            self._text = hashlib.sha256(whole.encode()).hexdigest()
+        return self._text
+
+    def __eq__(self, other: object) -> bool:
+        return str(self) == other
+
+    def __hash__(self) -> int:
+        return hash(str(self))
+
+    def __reduce__(self) -> tuple[type[str], tuple[str]]:
+        return str, (str(self),)
+
+
+def _made_of(kernel: Any, seen: set[object]) -> Iterator[str]:
+    """Sources of the kernels, and values of the constants, that a kernel reaches by name."""
+    function = getattr(kernel, "py_func", getattr(kernel, "_defn", kernel))
+    if function in seen:
+        return
+    seen.add(function)
+    yield _text_of(function)
+    names = frozenset(_names_in(function.__code__))
+    held = [cell.cell_contents for cell in function.__closure__ or ()]
+    for value in (*function.__annotations__.values(), *held):
+        yield from _meant_by("", value, names, seen)
+    for name in sorted(names & function.__globals__.keys()):
+        yield from _meant_by(name, function.__globals__[name], names, seen)
+
+
+def _meant_by(name: str, value: Any, names: frozenset[str], seen: set[object]) -> Iterator[str]:
+    """What a name in a kernel stands for; `names`: what may be asked of it where it is a module."""
+    if hasattr(value, "py_func") or hasattr(value, "_defn"):
+        yield from _made_of(value, seen)
+    elif isinstance(value, ModuleType):
+        if (value, names) not in seen:
+            seen.add((value, names))
+            for one in sorted(names & vars(value).keys()):
+                yield from _meant_by(one, vars(value)[one], names, seen)
+    elif isinstance(value, tuple):
+        for one in value:
+            yield from _meant_by(name, one, names, seen)
+    elif isinstance(value, type):
+        yield f"{value.__qualname__} {getattr(value, '_fields', ())}"
+    elif isinstance(value, np.ndarray):
+        yield f"{name} = {value.dtype} {value.shape} {value.tobytes().hex()}"
+    elif isinstance(value, int | float | complex | str | bytes | np.generic):
+        yield f"{name} = {value!r}"
+
+
+def _names_in(code: CodeType) -> Iterator[str]:
+    """Names that a function and the functions inside it use."""
+    yield from code.co_names
+    for one in code.co_consts:
+        if isinstance(one, CodeType):
+            yield from _names_in(one)
+
+
+def _text_of(function: FunctionType | Callable[..., Any]) -> str:
+    """The text of the file in which a function stands."""
+    return "".join(linecache.getlines(function.__code__.co_filename, function.__globals__))

@@ -11,7 +11,7 @@ from identification.effect_step import (
     shown_position,
     start_states,
 )
-from identification.effect_table import ACTUATOR, BRISTLE, DELAY, VALUE
+from identification.effect_table import ACTUATOR, BRISTLE, COMMAND, DELAY, INITIAL, VALUE
 from identification.stepping import (
     K1,
     K2,
@@ -38,15 +38,23 @@ def effective_commands(
     codes: IntArray, addresses: IntArray, q: Array, s: Array, z: Array, t: Array, u: Array,
     h: float,
 ) -> Array:  # fmt: skip
-    """Command that reaches the actuator [V], (n,): through dead zones, then delayed."""
+    """Command that reaches the actuator [V], (n,): through dead zones, then delayed.
+
+    z (k,): states of what acts on the command, where they are to begin; they go on.
+    """
     late, out = 0.0, np.empty(len(u))
     i = place_of(codes, DELAY)
     if i >= 0:
         x = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         late = call_value(addresses[i, VALUE], x, s[i, 0].ctypes.data, q[i].ctypes.data) / h
     acting = np.empty(len(u))
+    for i in range(len(codes)):
+        if codes[i] == COMMAND and addresses[i, INITIAL] != 0 and len(u) > 0:
+            d = 1.0 if u[0] >= 0.0 else -1.0
+            x = (0.0, 0.0, 0.0, 0.0, u[0], d, 0.0, 0.0, 0.0)
+            z[i] = call_value(addresses[i, INITIAL], x, s[i, 0].ctypes.data, q[i].ctypes.data)
     for k in range(len(u)):
-        acting[k] = acting_command(codes, addresses, q, s[:, k], z, t[k] - t[0], u[k])
+        acting[k] = acting_command(codes, addresses, q, s[:, k], z, t[k] - t[0], u[k], h)
     for k in range(len(u)):
         out[k] = delayed(acting, k, late)
     return out

@@ -109,7 +109,8 @@ def at_hand(codes: IntArray, addresses: IntArray) -> int:
     for i in range(len(codes)):
         if codes[i] >= 0:
             out |= (1 << SLIP) | (1 << STICTION) if codes[i] == FRICTION else 1 << codes[i]
-            out |= STATES if addresses[i, EVOLVE] != 0 and codes[i] != SENSOR else 0
+            outside = codes[i] == SENSOR or codes[i] == COMMAND
+            out |= STATES if addresses[i, EVOLVE] != 0 and not outside else 0
     return out
 
 
@@ -146,6 +147,8 @@ def evolve_states(
 ) -> None:
     """States z after dt, those of the sensors or all others; d is 0 at rest."""
     for i in range(len(codes)):
+        if codes[i] == COMMAND:
+            continue  # its state goes on with the command (`acting_command`)
         if addresses[i, EVOLVE] != 0 and (codes[i] == SENSOR) == sensor:
             way = direction(v, F)
             d = 0.0 if rest else way
@@ -350,14 +353,17 @@ def effect_step(
 
 @compiled
 def acting_command(
-    codes: IntArray, addresses: IntArray, q: Array, s: Array, z: Array, t: float, u: float
+    codes: IntArray, addresses: IntArray, q: Array, s: Array, z: Array, t: float, u: float, h: float
 ) -> float:
-    """Command that reaches the actuator in place of `u` [V]."""
+    """Command that reaches the actuator in place of `u` [V], held for h [s]; z (k,) goes on."""
     for i in range(len(codes)):
         if codes[i] == COMMAND:
-            d = 1.0 if u >= 0.0 else -1.0
-            x = (t, 0.0, 0.0, 0.0, u, d, z[i], 0.0, 0.0)
+            d, given = 1.0 if u >= 0.0 else -1.0, u
+            x = (t, 0.0, 0.0, 0.0, given, d, z[i], 0.0, 0.0)
             u = float(call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i)))
+            if addresses[i, EVOLVE] != 0:
+                step = (h, t, 0.0, 0.0, 0.0, given, d, z[i], 0.0, 0.0)
+                z[i] = call_evolve(addresses[i, EVOLVE], step, row_at(s, i), row_at(q, i))
     return u
 
 

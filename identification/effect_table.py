@@ -37,7 +37,7 @@ class EffectTable:
         """Longest sub-step [s]; bristle: of a plant with one."""
         if np.any(self.codes == BRISTLE):
             return bristle
-        states = (self.addresses[:, EVOLVE] != 0) & (self.codes != SENSOR)
+        states = (self.addresses[:, EVOLVE] != 0) & ~np.isin(self.codes, OUTSIDE)
         return LONGEST_STATE if np.any(states) else LONGEST
 
 
@@ -84,7 +84,7 @@ def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> i
     """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
     if np.all(np.isin(table.codes, (STICTION, *OUTSIDE))):
         return 1  # it slides as the plain plant does
-    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (SENSOR, STICTION))
+    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (STICTION, *OUTSIDE))
     longest = LONGEST_STATE if np.any(states) else LONGEST
     short = min(table.longest(bristle) / longest, 1.0)
     return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))

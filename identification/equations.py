@@ -4,7 +4,7 @@ import re
 from collections.abc import Mapping
 
 from identification.effects._base import AT_REST, Effect, Param
-from identification.evidence import ACTUATOR, BREAKAWAY, FRICTIONAL, IN_ACTUATOR, MECHANICAL, REST
+from identification.evidence import ACTUATOR, BREAKAWAY, MECHANICAL, REST
 
 Values = Mapping[str, float]
 SLIDING = "f > c"  # as an equation says it
@@ -13,15 +13,15 @@ TRIFLE = 0.05  # of an effect's largest size, by which another may lie out of bo
 
 def equations_of(effect: Effect, by_command: bool, held: bool = False) -> tuple[str, ...]:
     """The equations in which an effect shows. held: the command gives the force itself (a motor)"""
-    if held and effect.acts in ("command", "delay"):
+    if held and effect.place.on_command:
         return (MECHANICAL,)
-    if effect.acts in (*FRICTIONAL, "force"):
+    if effect.place.rubs or effect.place.drives:
         return (MECHANICAL,)
-    if effect.acts == "bristle":
+    if effect.place.elastic:
         return (MECHANICAL, REST)
-    if effect.acts == "stiction":
+    if effect.place.in_stops:
         return (BREAKAWAY,)
-    if effect.acts in IN_ACTUATOR:
+    if effect.place.in_actuator:
         return (ACTUATOR,) if by_command else ()
     if "F" in effect.depends_on:
         # In the actuator equation it is another k1 and k2 only.
@@ -31,12 +31,12 @@ def equations_of(effect: Effect, by_command: bool, held: bool = False) -> tuple[
 
 def in_columns(effect: Effect) -> bool:
     """Whether its linear parameters are columns of a regression."""
-    return effect.acts in (*FRICTIONAL, "force", "actuator", "stiction") and not by_load(effect)
+    return effect.place.adds and not by_load(effect)
 
 
 def by_load(effect: Effect) -> bool:
     """Whether it is friction that depends on the applied force, which is the regression's b."""
-    return effect.acts in FRICTIONAL and "F" in effect.depends_on
+    return effect.place.rubs and "F" in effect.depends_on
 
 
 def slow_motion(effect: Effect) -> bool:
@@ -63,7 +63,7 @@ def shape_params(effect: Effect) -> list[Param]:
 def needs_rounds(effect: Effect) -> bool:
     """Whether the contribution depends on the friction parameters that are fitted with it."""
     sizes = symbols_of(effect.equation.replace(SLIDING, ""))
-    return effect.acts in FRICTIONAL and bool({"c", "f"} & sizes)
+    return effect.place.rubs and bool({"c", "f"} & sizes)
 
 
 def symbols_of(equation: str) -> set[str]:

@@ -206,7 +206,7 @@ def contest(
     done, winner = best
     rivals = [one for one in screened if one.effect.key != winner.effect.key]
     bound = decisive(model.misfit, rivals)
-    if winner.effect.acts == "bristle" and loose(done.plant, setting.drive):
+    if winner.effect.place.elastic and loose(done.plant, setting.drive):
         bound = 1.0 + OF_STEPS * (bound - 1.0)
     if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
         return None
@@ -300,10 +300,10 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
         at = int(np.argmin(costs))
         first = _first(plants[at], trial.effect, setting)
         others: tuple[Plant, ...] = ()
-        if free and (by_load(trial.effect) or trial.effect.acts == "stiction"):
+        if free and (by_load(trial.effect) or trial.effect.place.in_stops):
             # What hardly shows by itself is small at its best start: another from the middle.
             others = (plants[len(plants) // 2],)
-        elif trial.effect.acts == "sensor" and len(trial.effect.params) == 1:
+        elif trial.effect.place.shows and len(trial.effect.params) == 1:
             # The plain parameters are bent to do without it: a larger size may be the better start.
             others = tuple(plants[at + 1 : at + LARGER])
         left_by = misfit(first, setting.short, setting.drive)
@@ -334,12 +334,12 @@ def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
     """The plant after a first search on the short logs."""
     if loose(plant, setting.drive):
-        if effect.acts != "stiction" and not on_bristle(plant):
+        if not effect.place.in_stops and not on_bristle(plant):
             return briefly(plant, setting.short, setting.drive).plant
         # Growth shows in stops alone, of which brief windows see little.
         # Where the plain run is nearly followed, its band and limits are nearly right.
         around = MIDWAY if setting.plain.misfit <= NEAR else SLIDING
-        around = BREAKS if effect.acts == "stiction" else around
+        around = BREAKS if effect.place.in_stops else around
         stage = (0.0, around) if known(setting) else (1.0, FAR)
         return approach(plant, setting.short, setting.drive, setting.rng, (stage,))
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
@@ -358,7 +358,7 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
 
 def _whole(one: Contender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    growth = one.effect.acts == "stiction" and loose(one.plant, setting.drive)
+    growth = one.effect.place.in_stops and loose(one.plant, setting.drive)
     found = _grown(one, setting) if growth else refined(one.plant, setting)
     if COMPLETE < found.misfit < UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")

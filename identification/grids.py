@@ -33,11 +33,11 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
     speed = float(np.quantile(np.abs(one.signals["v"]), 0.95))
     if p.default is not None and not p.linear:
         return np.array([p.default])
-    if p.name == "period":
+    if p.role == "period":
         found = _periods(effect, one, travel)
-    elif p.name == "y_0":
+    elif p.role == "place":
         found = middle + travel * np.linspace(-0.5, 0.5, SPOTS)
-    elif p.name == "width" and effect.acts == "friction":
+    elif p.role == "width":
         found = travel * np.array(WIDTHS)
     elif p.unit in ("m/s", "rad/s"):
         found = speed * np.array(SPEEDS)
@@ -45,7 +45,7 @@ def shape_grid(effect: Effect, p: Param, logs: Sequence[Moving]) -> Array:
         found = middle + np.sign(p.typical) * 0.5 * travel * np.array(PLACES)
     elif p.unit in ("m", "rad"):
         found = travel * np.array(PLAYS)
-    elif p.unit == "s" and effect.acts == "stiction":
+    elif p.unit == "s" and effect.place.in_stops:
         found = median_rest(logs, p.typical) * np.array(RESTS)
     elif p.unit == "s":
         found = one.log.duration * np.array(SHARES) if p.typical >= LONG else _short_times(h)
@@ -80,14 +80,14 @@ def fewest_periods(effect: Effect, one: Moving) -> float:
     """Periods that the travel has to hold: of a force, such that it is seen to repeat; of a turning
     machine (a pendulum swings no full turn) and of what friction does along the stroke, a good part
     of one."""
-    return (PENDULUM if one.rotary else REPEATS) if effect.acts == "force" else ALONG
+    return (PENDULUM if one.rotary else REPEATS) if effect.place.drives else ALONG
 
 
 def _periods(effect: Effect, one: Moving, travel: float) -> Array:
     """Periods [m] to try."""
     slow = float(np.quantile(np.abs(one.signals["v"]), 0.5))
     shortest = max(SHARPEST * slow, 1e-3 * travel)
-    force, fewest = effect.acts == "force", fewest_periods(effect, one)
+    force, fewest = effect.place.drives, fewest_periods(effect, one)
     most = max(travel / shortest, 2.0 * fewest)
     most = min(most, 200.0 if force else 12.0)
     return travel / np.arange(fewest, most + 0.25, 0.4)

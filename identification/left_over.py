@@ -102,7 +102,7 @@ def _in_equation(
             every.pop("u", None)
     if equation == REST:  # as it is told there, it is the position's own noise
         every.pop("v")
-    if any(effect.acts == "bristle" for effect, _ in choice.end.chosen):
+    if any(effect.place.elastic for effect, _ in choice.end.chosen):
         every.pop("reversal", None)  # its rise is judged in the free run
     signals = {k: v[keep] for k, v in every.items()}
     r = o.fit.residual[keep]
@@ -205,9 +205,9 @@ def unrepeated(after: Model) -> bool:
     one = max(after.stage.logs, key=lambda each: float(np.ptp(each.log["y"])))
     travel = float(np.ptp(one.log["y"]))
     return any(
-        acting.values["period"] * fewest_periods(acting.effect, one) > OF_PERIOD * travel
+        acting.values[period] * fewest_periods(acting.effect, one) > OF_PERIOD * travel
         for acting in after.plant.effects
-        if acting.effect.acts == "force" and "period" in acting.values
+        if acting.effect.place.drives and (period := acting.effect.named("period"))
     )
 
 

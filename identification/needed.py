@@ -159,7 +159,7 @@ def followed(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
         return min(enough(setting, choice.steps), NEAR)
-    bristle = any(step.candidate.effect.acts == "bristle" for step in choice.steps)
+    bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
     if bristle and loose(setting.plain.plant, setting.drive):  # minima are many and narrow
         return BENT
     return DECISIVE if bristle or setting.drive == "force" else COMPLETE
@@ -198,7 +198,7 @@ def without_growth(choice: Choice) -> Choice:
     Its breakaways are few and tell its size at one time of rest; the run tells both. Where sliding
     lacks nothing, an effect of slow motion that was chosen too is its shadow, or the run's to find.
     """
-    kept = [step for step in choice.steps if step.candidate.effect.acts != "stiction"]
+    kept = [step for step in choice.steps if not step.candidate.effect.place.in_stops]
     if len(kept) == len(choice.steps):
         return choice
     slides = explained(choice.first)
@@ -209,7 +209,7 @@ def without_growth(choice: Choice) -> Choice:
 def _slow(step: Step) -> bool:
     """Whether the effect of a step is one of slow or micro-motion."""
     effect = step.candidate.effect
-    return slow_motion(effect) or effect.acts == "bristle"
+    return slow_motion(effect) or effect.place.elastic
 
 
 def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:

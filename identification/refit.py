@@ -117,7 +117,7 @@ def wide(p: Param) -> float:
 
     The equations tell a period closely, and one far beyond the travel is another effect.
     """
-    return OF_PERIOD if p.name == "period" else WIDE
+    return OF_PERIOD if p.role == "period" else WIDE
 
 
 def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
@@ -422,7 +422,7 @@ def plant_is_motor(plant: Plant) -> bool:
 
 def on_bristle(plant: Plant) -> bool:
     """Whether a bristle stands for sticking: its sub-steps make runs long, and err."""
-    return any(acting.effect.acts == "bristle" for acting in plant.effects)
+    return any(acting.effect.place.elastic for acting in plant.effects)
 
 
 def loose(plant: Plant, drive: Drive) -> bool:

@@ -155,7 +155,7 @@ def one_way(one: Moving) -> BoolArray:
 def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, rows: Rows) -> Rows:
     """`rows` of log `i` with the effect in them: columns, or transformed signals."""
     one = stage.logs[i]
-    if effect.acts == "bristle":
+    if effect.place.elastic:
         if equation == REST:
             bent = elastic_displacement(effect, shape, one.signals, one.log.h, stage.friction)
             return replace(
@@ -163,22 +163,22 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
                 b=rows.b - (plain(stage, REST, i).b - rest_rows(one, stage.at_rest[i], bent).b),
             )
         return _elastic(effect, shape, one, stage, rows)
-    if effect.acts == "sensor":
+    if effect.place.shows:
         return _beside(
             plain(stage, equation, i, y=shown_to_true(effect, shape, one, stage.friction)), rows
         )
-    if effect.acts in ("command", "delay"):
+    if effect.place.on_command:
         behind = _beside(
             plain(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
         )
-        if one.held and equation == MECHANICAL and effect.acts == "command":
+        if one.held and equation == MECHANICAL and not effect.place.delays:
             return _flattened(effect, shape, one, stage, behind)
         return behind
     if split(effect):
         shape = {**shape, "asymmetry": 0.0}
     if by_load(effect):
         return _implicit(effect, shape, one, stage, rows)
-    if effect.acts == "stiction":
+    if effect.place.in_stops:
         own, fixed = _stiction(effect, shape, i, stage)
     else:
         own, fixed = columns(effect, shape, one, stage)
@@ -229,13 +229,13 @@ def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[l
     ] or [dict(shape)]
     out = []
     for values in trials:
-        if effect.acts == "actuator":
+        if effect.place.feeds:
             assert one.whole is not None
             raw = contribution(effect, values, one.signals, one.log.h, stage.friction)
             out.append(one.whole.mean @ raw)
             continue
         raw = _in_sliding(effect, values, one, stage.friction)
-        if effect.acts == "force":
+        if effect.place.drives:
             out.append(-(one.sliding.mean @ raw))
         else:
             out.append(np.where(one.up, 1.0, -1.0) * (one.sliding.mean @ raw))

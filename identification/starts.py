@@ -120,7 +120,7 @@ def window_run(
             bristle_step=begun.step,
         )
 
-    sensors = [acting.effect for acting in plant.effects if acting.effect.acts == "sensor"]
+    sensors = [acting.effect for acting in plant.effects if acting.effect.place.shows]
     # A play is as wide open as the motion before has left it.
     at = begun.at - (1 if any(one.evolve is not None for one in sensors) else 0)
     try:
@@ -162,7 +162,7 @@ def _calm(one: Moving, wanted: int, step: int, speed: Array, enough: float) -> i
 
     Near the band a state within its noise may stop or not: what is sure of itself is fast.
     """
-    reach, last = int(REACH * step), len(one.log) - 1
+    reach, last = max(1, int(REACH * step)), len(one.log) - 1
     span = np.arange(wanted - reach, min(wanted + reach, last))
     if np.max(speed[span]) < enough:
         span = np.arange(wanted - reach, min(wanted + round(LATER * step), last))

@@ -115,7 +115,7 @@ def model_of(
         return Model(stage, outcomes, plant, prior | silent, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
     # follows the velocity as the log tells it, so even of the right effect more than noise is left.
-    remembers = any(s.candidate.effect.evolve and s.candidate.effect.acts == "slip" for s in steps)
+    remembers = any(s.candidate.effect.evolve and s.candidate.effect.place.rubs for s in steps)
     left = [spread(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
     missing = max(left) > MUCH**2 and not remembers
     free = loose(plant, drive)
@@ -188,7 +188,7 @@ def left_open(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, f
     Nothing is known so well of a plant without effects, or where one is told by more than sliding.
     """
     if not effects or not all(
-        in_columns(a.effect) and a.effect.acts != "stiction" for a in effects
+        in_columns(a.effect) and not a.effect.place.in_stops for a in effects
     ):
         return {}
     sizes = (f"{a.key}.{name}" for a in effects for name in a.effect.linear)

@@ -27,7 +27,6 @@ from identification.drift import drift
 from identification.errors import NotIdentifiable, UserError
 from identification.evidence import (
     ACTUATOR,
-    IN_ACTUATOR,
     MECHANICAL,
     Fitted,
     Moving,
@@ -314,7 +313,7 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
     left = left_by(found)
     if left > LINEAR_ACTUATOR:
         stage, first = first_stage(logs, True)
-        own = [e for e in library.values() if e.acts in IN_ACTUATOR]
+        own = [e for e in library.values() if e.place.in_actuator]
         tried = [best_of(stage, effect, first) for effect in own if ACTUATOR in first]
         fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
         left = min([left, *(left_by(fit) for fit in fits)])

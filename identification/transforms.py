@@ -49,7 +49,7 @@ def reached(effect: Effect, values: Values, one: Moving, friction: Karnopp) -> A
     """Integral of the command that reaches the actuator [V s], (n,)."""
     h, u = one.log.h, np.asarray(one.log["u"])
     given = contribution(effect, values, one.signals, h, friction)
-    if effect.acts == "command":
+    if not effect.place.delays:
         return integral(given, h)
     t = h * np.arange(len(u))
     return np.asarray(np.interp(t - float(given[0]), t, integral(u, h)))

@@ -11,7 +11,7 @@ from identification.candidates import Candidate, best_of
 from identification.choice import ABSORBED, Choice, Step, gives_way
 from identification.effects._base import Effect, Param
 from identification.equations import by_load, slow_motion
-from identification.evidence import BREAKAWAY, FIVE, IN_ACTUATOR, REST, Moving
+from identification.evidence import BREAKAWAY, FIVE, REST, Moving
 from identification.grids import median_rest, shape_grid
 from identification.needed import Setting, without
 from identification.outcome import Outcome, base_outcomes, spread
@@ -27,7 +27,6 @@ LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
 GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
 REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
-IN_RUN = ("sensor", "command", "delay", "bristle", "stiction")  # seen in the run above all
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,9 +64,9 @@ def _beside(
     for key, effect in setting.library.items():
         if key in keys or key in ABSORBED:
             continue
-        if setting.drive == "force" and effect.acts in IN_ACTUATOR:
+        if setting.drive == "force" and effect.place.in_actuator:
             continue
-        if effect.acts == "bristle" and rigid(setting.first):
+        if effect.place.elastic and rigid(setting.first):
             continue
         if not all(gives_way(one, setting.first) for one in tried if one.effect.key == key):
             continue
@@ -75,7 +74,7 @@ def _beside(
         if key in shown or (seen_in_run(effect) and not (instead and free)):
             own = base
             values = [inside(effect, regressed[key].values)] if key in regressed else []
-            if values and effect.acts == "stiction":
+            if values and effect.place.in_stops:
                 own, values = grown(regressed[key], base, setting.start)
             values += grid(effect, base, setting.short)
             if values:
@@ -126,7 +125,9 @@ def seen_in_run(effect: Effect) -> bool:
     One with a speed of its own shows in slow motion, most of which the equations leave out: a
     wider band stands for it there.
     """
-    return effect.acts in IN_RUN or by_load(effect) or slow_motion(effect)
+    place = effect.place  # on signals, in place of sticking, at breakaway: in the run above all
+    in_run = place.on_signals or place.elastic or place.in_stops
+    return in_run or by_load(effect) or slow_motion(effect)
 
 
 def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
@@ -145,6 +146,6 @@ def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) ->
     """Values of one parameter to begin from."""
     if p.unit in ("N", "N m"):
         return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(LEVELS)
-    if effect.acts == "stiction" and p.unit == "s":
+    if effect.place.in_stops and p.unit == "s":
         return median_rest(logs, p.typical) * np.array(REST_SHARES)
     return shape_grid(effect, p, logs)

@@ -4,11 +4,14 @@ import errno
 import importlib
 import json
 import os
+import signal
 import sys
+import threading
 import traceback
 import warnings
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from types import FrameType
 
 import click
 
@@ -23,12 +26,14 @@ COMMANDS = {
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",
     "simulate": "Make the log of a recipe, its truth beside it.",
+    "effects": "List the effects that 'trace' knows; check your own.",
     "paper": "Run the paper in simulation, its figures beside ours.",
     "registry": "Show and change what is in force on each machine.",
     "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",
     "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
 }
+ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
 LONGEST_WORD = 200  # characters of a name, and of a whole message
@@ -41,6 +46,14 @@ ADVICE = {
     errno.EPERM: "; check its rights, or choose another folder with --out",
     errno.EROFS: "; choose another folder with --out",
 }
+
+
+class Terminated(KeyboardInterrupt):
+    """The process was told to end, which it does as on Ctrl-C: what is half written is cleared."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__()
+        self.number = number
 
 
 class LazyGroup(click.Group):
@@ -90,6 +103,8 @@ def verdict(error: BaseException) -> tuple[int, str]:
     match error:
         case BrokenPipeError():
             return BROKEN_PIPE, ""
+        case Terminated(number=number):
+            return 128 + number, "terminated"
         case KeyboardInterrupt() | click.Abort():
             return 130, "interrupted"
         case NotIdentifiable():
@@ -112,7 +127,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Exit status of the command line `argv`, by default the arguments of this process."""
     arguments = tuple(sys.argv[1:] if argv is None else argv)
     try:
-        with warnings.catch_warnings():
+        with _cleared_on_a_signal(), warnings.catch_warnings():
             if not _debug(arguments):  # "error" filters, as in the tests, still act
                 warnings.showwarning = _drop_warning
             return _run(arguments)
@@ -124,8 +139,29 @@ def main(argv: Sequence[str] | None = None) -> int:
             _echo_refusal(str(error))
     _flush_or_drop()
     if message:
-        click.echo(one_line(message), err=True)
+        with suppress(OSError):  # of a terminal that is gone
+            click.echo(one_line(message), err=True)
     return status
+
+
+@contextmanager
+def _cleared_on_a_signal() -> Iterator[None]:
+    """Within the block, SIGTERM and SIGHUP raise Terminated, where nobody else handles them."""
+    mine = threading.current_thread() is threading.main_thread()
+    taken = [one for one in ENDING if mine and signal.getsignal(one) is signal.SIG_DFL]
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        for one in taken:
+            signal.signal(one, signal.SIG_IGN)  # a second one must not stop the clearing up
+        raise Terminated(number)
+
+    for one in taken:
+        signal.signal(one, end)
+    try:
+        yield
+    finally:
+        for one in taken:
+            signal.signal(one, signal.SIG_DFL)
 
 
 def _run(arguments: Sequence[str]) -> int:

@@ -3,8 +3,8 @@
 Here values are plain SI numbers; in the file every parameter has its unit.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,8 +17,9 @@ from design.rst import RST
 from identification.errors import BadModel
 from identification.karnopp import NAMES, Karnopp
 from identification.result import Estimate
+from workbench.contradictions import refuse_apart, refuse_unequal
 from workbench.model import as_number, used
-from workbench.parameter_units import friction_units, in_unit, shown
+from workbench.parameter_units import converted, friction_units, in_unit, shown
 from workbench.reading import read_result
 from workbench.units import Motion
 
@@ -128,7 +129,8 @@ class CompensatorValues:
 class Design:
     """Controllers of one machine; one may be None with its reason in `refused`.
 
-    recommended: the controller that keeps every goal, "none" where none does.
+    recommended: the controller that keeps every goal, "none" where none does. read: what to say of
+    its file, a line for each value in another unit than ours.
     """
 
     card: str
@@ -142,6 +144,7 @@ class Design:
     compensator: CompensatorValues
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
+    read: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def controllers(self) -> dict[str, Controller]:
@@ -266,13 +269,50 @@ def design_document(found: Design) -> dict[str, Any]:
 def read_design(path: Path) -> Design:
     """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
     written = read_result(path, _DesignFile, SCHEMA)
+    units = _Units.of(written.motion)
     try:
-        found = _from_file(written, _Units.of(written.motion))
+        found = _from_file(written, units)
+        pairs = tuple(_pairs(written, _as_file(found, units), ""))
+        _refuse_changed_units(pairs, found)
     except BadModel as error:
         raise BadModel(f"{path}: {error}") from None
     if not found.controllers:
         raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
-    return found
+    said = (converted(one, ours, f"[{where}]") for where, one, ours in pairs)
+    return replace(found, read=tuple(line for line in said if line))
+
+
+def _pairs(written: object, ours: object, where: str) -> Iterator[tuple[str, Estimate, Estimate]]:
+    """Every parameter of a file as it is written and in our units, with its place."""
+    if isinstance(written, Estimate) and isinstance(ours, Estimate):
+        yield where, written, ours
+    elif isinstance(written, Mapping) and isinstance(ours, Mapping):
+        for key, one in written.items():
+            yield from _pairs(one, ours[key], f"{where}.{key}")
+    elif is_dataclass(written):
+        for each in fields(written):
+            place = f"{where}.{each.name}" if where else each.name
+            yield from _pairs(getattr(written, each.name), getattr(ours, each.name), place)
+
+
+def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], found: Design) -> None:
+    """Raises BadModel where a value in another unit is not what the file says in other places."""
+    at = {where: (one, ours) for where, one, ours in pairs}
+    start = "compensator.friction."
+    nine = {w.removeprefix(start): both for w, both in at.items() if w.startswith(start)}
+    refuse_apart(
+        {name: both[0] for name, both in nine.items()},
+        {name: both[1] for name, both in nine.items()},
+        f"[{start}",
+    )
+    if "plant.m" in at:
+        (one, ours), (other, same) = at["plant.m"], nine["m"]
+        refuse_unequal("[plant.m]", one, ours, used(same), f"[{start}m]")
+        refuse_unequal(f"[{start}m]", other, same, used(ours), "[plant.m]")
+    for name in found.controllers:
+        (one, ours), (other, same) = at[f"{name}.h"], at["plant.h"]
+        refuse_unequal(f"[{name}.h]", one, ours, used(same), "[plant.h]")
+        refuse_unequal("[plant.h]", other, same, used(ours), f"[{name}.h]")
 
 
 def _plain(value: object) -> Any:

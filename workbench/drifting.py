@@ -132,7 +132,7 @@ def drift_of(
     settings = settings or Settings()
     _same_machine(model, sources)
     in_force = replace(model_in_force(model, key), rig=sources.rig)
-    remarks = list(sources.remarks)
+    remarks = [*model.read, *sources.remarks]
     if sources.card.name != model.card:
         remarks.append(f"the model is of {model.card}, the logs of {sources.card.name}")
     if stream is not None and stream.state.model != key:

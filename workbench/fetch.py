@@ -7,6 +7,7 @@ from pathlib import Path
 from identification.errors import BadCard, BadLog
 from workbench.card import Card, FileEntry, nearest
 from workbench.files import refuse_special
+from workbench.links import broken_link
 
 VARIABLE = "WORKBENCH_DATA"
 """Environment variable naming the folder that holds `<card name>/<file>`."""
@@ -32,6 +33,9 @@ def card_path(name: str | Path) -> Path:
         return path / "card.toml"
     if path.is_file():
         return path
+    broken = broken_link(path)
+    if broken:
+        raise BadCard(f"{path}: {broken}")
     shipped = shipped_cards()
     if str(name) in shipped:
         return shipped[str(name)]
@@ -48,6 +52,9 @@ def find_data(name: str | Path, card: Card) -> Path:
     the bytes differ, or where the source cannot be reached.
     """
     path = Path(name)
+    broken = broken_link(path)
+    if broken:
+        raise BadLog(f"{path}: {broken}")
     if path.exists() or path.is_absolute():
         return path
     entry = next((entry for entry in card.files if entry.name == str(name)), None)

@@ -1,6 +1,7 @@
 """Log files read by their card: canonical signals in SI, the applied force F_e among them."""
 
 import hashlib
+import os
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
@@ -11,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array, frozen
-from identification.clean import Prepared, applied_force, check, prepare, repair
+from identification.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.thin import LARGEST, thinned
@@ -39,12 +40,12 @@ class Fingerprint:
 def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
-    Isolated missing samples are interpolated. A `kind = "force"` rig with pressures keeps the
-    force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or its
-    content is not what the card says.
+    Isolated missing samples and spikes are interpolated. A `kind = "force"` rig with pressures
+    keeps the force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or
+    its content is not what the card says.
     """
     raw, first_row = _read_signals(path, card)
-    log = _with_force(repair(raw, first_row).log, path, card)
+    log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
     check(log, card.rig(path.name), first_row)
     return log
 
@@ -52,7 +53,7 @@ def read_log(path: Path, card: Card) -> Log:
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
     raw, first_row = _read_signals(path, card)
-    repaired = repair(raw, first_row)
+    repaired = _repaired(raw, first_row, path, card)
     del raw  # of a long log a gigabyte
     rig = card.rig(path.name)
     if len(repaired.log) > LARGEST:  # here, where rows still count as in the file
@@ -62,11 +63,20 @@ def read_runs(path: Path, card: Card) -> Prepared:
     return Prepared(prepared.runs, (*repaired.remarks, *thin.remarks, *prepared.remarks))
 
 
+def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:
+    return repair(raw, first_row, rotary=card.rig(path.name).motion == "rotary")
+
+
 def fingerprint(path: Path, log: Log) -> Fingerprint:
     """Name, sha256 and rows of the file from which `log` was read."""
     with path.open("rb") as file:
         digest = hashlib.file_digest(file, "sha256")
-    return Fingerprint(path.name, digest.hexdigest(), len(log))
+    return Fingerprint(shown_name(path), digest.hexdigest(), len(log))
+
+
+def shown_name(path: Path) -> str:
+    """The file's name as text; bytes that are not UTF-8 as "\\xff"."""
+    return os.fsencode(path.name).decode("utf-8", "backslashreplace")
 
 
 def _with_force(log: Log, path: Path, card: Card) -> Log:
@@ -98,7 +108,7 @@ def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
             signals[name] = _to_si(numbers, name, spec, card, path)
         _refuse_absurd(signals[name], name, path, table.first_row)
         signals[name] = frozen(signals[name])
-    return Log(path.name, _same_length(signals, path)), table.first_row
+    return Log(shown_name(path), _same_length(signals, path)), table.first_row
 
 
 def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:

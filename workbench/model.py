@@ -13,8 +13,9 @@ from identification.library import Library, built_in
 from identification.log import Rig
 from identification.plant import Actuator, Motor, Plant
 from identification.result import Drive, Estimate
+from workbench.contradictions import refuse_changed_units
 from workbench.effect_values import estimates_in_si, known_effect
-from workbench.parameter_units import actuator_units, friction_units, in_unit
+from workbench.parameter_units import actuator_units, all_converted, friction_units, in_unit
 from workbench.reading import read_result
 
 SCHEMA = "model/1"
@@ -180,10 +181,12 @@ class Model(ModelFile):
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
     posterior: what `--posterior` found; correlation: of the parameters' errors. library: where
-    the effects' equations are.
+    the effects' equations are. read: what to say of its file, a line for each value in another
+    unit than ours.
     """
 
     library: Library = field(default_factory=built_in, compare=False, repr=False)
+    read: tuple[str, ...] = field(default=(), compare=False, repr=False)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -309,8 +312,11 @@ def _installed() -> Library:
 
 
 def in_si(found: ModelFile, library: Library) -> Model:
-    """The model with every parameter in its SI unit; raises BadModel where a unit is of no such
-    kind, or an effect is not in the library."""
+    """The model with every parameter in its SI unit.
+
+    Raises BadModel where a unit is of no such kind, an effect is not in the library, or a value in
+    another unit than ours contradicts the rest.
+    """
     motion = found.rig.motion
     friction, actuator = friction_units(motion), actuator_units(motion)
     drive = found.actuator
@@ -328,8 +334,49 @@ def in_si(found: ModelFile, library: Library) -> Model:
         actuator=drive
         and {n: in_unit(e, actuator[n], f"[actuator.{n}]") for n, e in drive.items()},
         effects=effects,
+        posterior=_posterior_in_si(found.posterior, {**friction, **actuator}),
     )
-    return Model(**_fields_of(in_units), library=library)
+    refuse_changed_units(found, in_units)
+    return Model(**_fields_of(in_units), library=library, read=tuple(_read(found, in_units)))
+
+
+def _read(written: ModelFile, found: ModelFile) -> list[str]:
+    """A line for each value that was written in another unit."""
+    said = all_converted(written.friction, found.friction, "friction")
+    said += all_converted(written.actuator or {}, found.actuator or {}, "actuator")
+    for key, values in found.effects.items():
+        said += all_converted(written.effects[key], values, f"effects.{key}")
+    raw, values = (_intervals(e.posterior) for e in (written, found))
+    return said + all_converted(raw, values, "posterior.parameters")
+
+
+def _posterior_in_si(
+    posterior: Mapping[str, Any] | None, units: Mapping[str, str]
+) -> Mapping[str, Any] | None:
+    """The posterior with its parameters in SI; raises BadModel where a unit is of another kind."""
+    if posterior is None:
+        return None
+    found = {}
+    for name, one in _intervals(posterior).items():
+        if name not in units:
+            raise BadModel(f"[posterior.parameters] unknown parameter {name!r}")
+        found[name] = asdict(in_unit(one, units[name], f"[posterior.parameters.{name}]"))
+    kept = ("value", "unit", "sd", "low", "high")
+    return {
+        **posterior,
+        "parameters": {name: {key: one[key] for key in kept} for name, one in found.items()},
+    }
+
+
+def _intervals(posterior: Mapping[str, Any] | None) -> dict[str, Estimate]:
+    """The parameters of a posterior; raises BadModel where one is no value with its unit."""
+    try:
+        return {n: Estimate(**one) for n, one in (posterior or {}).get("parameters", {}).items()}
+    except (TypeError, AttributeError):
+        raise BadModel(
+            "[posterior.parameters] a table of value, unit, sd, low, high each needed; run"
+            " 'workbench identify --posterior' again"
+        ) from None
 
 
 def versions() -> dict[str, str]:

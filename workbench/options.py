@@ -50,7 +50,8 @@ def effects_option(command: Command) -> Command:
         multiple=True,
         metavar="FOLDER",
         type=click.Path(path_type=Path),
-        help="Folder of your own effects, one a file; may be given several times.",
+        help="Folder of your own effects, one a file; may be given several times. Its Python is"
+        " run: give only folders that you trust.",
     )(command)
 
 

@@ -4,6 +4,7 @@ import errno
 import itertools
 import json
 import math
+import os
 import secrets
 import shutil
 import sys
@@ -46,8 +47,9 @@ class OutputFolder:
         self._made: list[Path] = []
 
     def __enter__(self) -> Self:
-        if not self._default and self.final.exists() and not self._inside:
-            raise BadOutput(f"--out {self.final} is a file; name a folder, new or existing")
+        if not self._default and os.path.lexists(self.final) and not self._inside:
+            what = "a link that leads nowhere" if self.final.is_symlink() else "a file"
+            raise BadOutput(f"--out {self.final} is {what}; name a folder, new or existing")
         home = self.path.parent
         self._made = [p for p in (home, *home.parents) if not p.exists()]
         try:

@@ -1,7 +1,8 @@
 '''Effects that do not ship: a user's own files, and those of installed packages.
 
 A file of a folder given by `--effects FOLDER` holds one effect, declared as EFFECT; a file whose
-name begins with "_" is left alone. All that the shipped effects can do it can too:
+name begins with "_" is left alone. Its Python is run, so only folders that one trusts are given.
+All that the shipped effects can do it can too:
 
     """A magnet at the end of the stroke."""
 
@@ -56,6 +57,7 @@ import numba
 from identification.effects._base import Effect
 from identification.errors import BadModel, UserError
 from identification.library import Library, built_in, declared, joined
+from workbench.links import broken_link
 
 GROUP = "workbench.effects"
 _LINE = re.compile(r'File "[^"]*", line (\d+)')
@@ -128,7 +130,11 @@ def _files(folders: Iterable[Path]) -> Sequence[Path]:
         paths = sorted(path for path in folder.glob("*.py") if not path.name.startswith("_"))
         if not paths:
             raise BadModel(f"{folder}: no effect in it; put files into it that declare EFFECT")
-        out |= dict.fromkeys(path.resolve() for path in paths)
+        for path in paths:
+            broken = broken_link(path)
+            if broken:
+                raise BadModel(f"{path}: {broken}")
+            out[path.resolve()] = None
     return list(out)
 
 

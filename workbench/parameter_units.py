@@ -64,3 +64,28 @@ def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:
         high=si(estimate.high),
         assumed=si(estimate.assumed),
     )
+
+
+def converted(written: Estimate, found: Estimate, where: str) -> str | None:
+    """What to say of an estimate that was written in another unit and is `found` in ours.
+
+    None where both units are one, however they are spelt.
+    """
+    raw, value = (e.assumed if e.value is None else e.value for e in (written, found))
+    if raw is None or value is None or abs(raw - value) <= 1e-9 * abs(value):
+        return None
+    factor = abs(value / raw) if raw else 0.0
+    times = f"{factor:.4g}" if factor >= 1 or not factor else f"1/{1 / factor:.4g}"
+    return (
+        f"{where} is written in {written.unit!r}, where our commands write {found.unit!r}: read as"
+        f" {value:.4g} {found.unit}, {times} of the number that stands there; if only the unit was"
+        f" changed, write {found.unit!r} again"
+    )
+
+
+def all_converted(
+    written: Mapping[str, Estimate], found: Mapping[str, Estimate], table: str
+) -> list[str]:
+    """`converted` of each estimate in a table."""
+    said = (converted(written[name], found[name], f"[{table}.{name}]") for name in found)
+    return [line for line in said if line]

@@ -8,6 +8,7 @@ import numpy as np
 from identification.result import KarnoppFit
 from workbench.identifying import Options, Progress, Source, identify
 from workbench.model import Model
+from workbench.plausible import model_remarks
 from workbench.sources import Sources
 
 __all__ = ["Identified", "Options", "identify_sources"]
@@ -45,7 +46,7 @@ def identify_sources(
     )
     if posterior:
         model = replace(model, posterior=_posterior(sources, fit, seed, on_progress))
-    return Identified(model, fit, sources.runs, sources.remarks)
+    return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)))
 
 
 def _posterior(

@@ -1,6 +1,6 @@
 """Force that a plant with effects needs for a measured motion: the inverse model with effects."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
@@ -9,7 +9,8 @@ from identification.arrays import Array
 from identification.differentiate import differentiate
 from identification.effect_run import effective_commands
 from identification.effect_table import effect_table, signal_table
-from identification.effects._base import Acting, Acts
+from identification.effects._base import Acting
+from identification.effects._places import Place
 from identification.errors import BadLog
 from identification.inverse_model import Smoothing, force_predicted
 from identification.log import Log
@@ -32,9 +33,9 @@ def force_needed(log: Log, plant: Plant, how: Smoothing) -> Array:
     d = np.where(v >= p.dv_p, 1.0, np.where(v <= p.dv_n, -1.0, 0.0))
     blank = np.zeros(len(log))
     signals = {"F": log["F"], "u": blank, **log.signals, "y": motion.y, "v": v, "d": d}
-    pushed = _sum(plant, ("force",), signals, log.h)
-    slip = _sum(plant, ("slip", "friction"), signals, log.h)
-    stick = _sum(plant, ("stiction", "friction"), signals, log.h)
+    pushed = _sum(plant, lambda place: place.drives, signals, log.h)
+    slip = _sum(plant, lambda place: place.rubs, signals, log.h)
+    stick = _sum(plant, lambda place: place.holds, signals, log.h)
     coulomb = _coulomb(plant, signals, log.h)
     viscous = np.where(d > 0, p.F_vp, p.F_vn) * np.abs(v)
     # Friction never drives, but a bent bristle does.
@@ -49,7 +50,7 @@ def of_body(log: Log, plant: Plant) -> Log:
 
     A transducer with play is left as it is: the body's motion is the same while it moves.
     """
-    sensors = [a for a in plant.effects if a.effect.acts == "sensor" and a.effect.evolve is None]
+    sensors = [a for a in plant.effects if a.effect.place.shows and a.effect.evolve is None]
     blank = np.zeros(len(log))
     for one in reversed(sensors):
         true = shown = log["y"]
@@ -62,7 +63,7 @@ def of_body(log: Log, plant: Plant) -> Log:
 
 def with_motor_force(log: Log, plant: Plant) -> Log:
     """The log with a motor's force by the command that reaches it, where effects change that."""
-    late = any(one.effect.acts in ("command", "delay") for one in plant.effects)
+    late = any(one.effect.place.on_command for one in plant.effects)
     if not late or not isinstance(plant.actuator, Motor) or "u" not in log:
         return log
     table, s = effect_table(plant.effects), signal_table(plant.effects, log)
@@ -85,9 +86,11 @@ def refuse_missing(log: Log, effects: Iterable[Acting]) -> None:
             )
 
 
-def _sum(plant: Plant, acts: tuple[Acts, ...], signals: Mapping[str, Array], h: float) -> Array:
+def _sum(
+    plant: Plant, acts: Callable[[Place], bool], signals: Mapping[str, Array], h: float
+) -> Array:
     """What the effects that act so add along the motion [N], (n,)."""
-    parts = [_along(a, plant, signals, h) for a in plant.effects if a.effect.acts in acts]
+    parts = [_along(a, plant, signals, h) for a in plant.effects if acts(a.effect.place)]
     return np.sum(parts, axis=0) if parts else np.zeros(len(signals["t"]))
 
 
@@ -104,7 +107,7 @@ def _coulomb(plant: Plant, signals: Mapping[str, Array], h: float) -> Array:
     p, v, d = plant.friction, signals["v"], signals["d"]
     coulomb = np.where(d > 0, p.F_cp, p.F_cn)
     for one in plant.effects:
-        if one.effect.acts == "bristle":
+        if one.effect.place.elastic:
             share = d * elastic_share(one.effect, one.values, signals, h, p)
             edge = np.where(d > 0, p.dv_p, p.dv_n)
             limit = np.where(d > 0, p.F_sp, -p.F_sn)

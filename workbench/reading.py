@@ -11,6 +11,7 @@ from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 from identification.errors import BadModel
 from workbench.card import nearest
 from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
+from workbench.links import broken_link
 
 Value = TypeVar("Value")
 DIGITS = 30  # of a whole number in a result
@@ -58,13 +59,15 @@ def _read_json(path: Path) -> object:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError:
-        raise BadModel(f"{path}: no such file; give the path of a result") from None
+        wrong = broken_link(path) or "no such file; give the path of a result"
+        raise BadModel(f"{path}: {wrong}") from None
     except IsADirectoryError:
         raise BadModel(f"{path}: is a directory; give the JSON file in it") from None
     except UnicodeDecodeError:
         raise BadModel(f"{path}: is not UTF-8 text, so no JSON; give a result file") from None
     except OSError as error:
-        raise BadModel(f"{path}: cannot be read ({error.strerror}); check its rights") from None
+        wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
+        raise BadModel(f"{path}: {wrong}") from None
     try:
         return json.loads(
             text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole

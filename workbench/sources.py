@@ -11,6 +11,7 @@ from workbench.card import Card, load_card
 from workbench.fetch import card_path, find_data
 from workbench.identifying import Source
 from workbench.logs import fingerprint, read_runs
+from workbench.plausible import log_remarks
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
                 f"{path.name}: the card gives it another rig than {first.name}; identify machines"
                 " one by one"
             )
+    remarks.extend(log_remarks([run.log for run in runs], rigs[first], card.signals))
     return Sources(card, rigs[first], tuple(runs), tuple(remarks))
 
 

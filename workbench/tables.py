@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from identification.errors import BadLog
 from workbench.card import FileSpec, Format, nearest
 from workbench.files import refuse_larger, refuse_special
+from workbench.links import broken_link
 from workbench.mat import tags_are_sound
 from workbench.text import read_text_table
 
@@ -127,13 +128,17 @@ def _head(path: Path) -> bytes:
         with path.open("rb") as file:
             head = file.read(1024)
     except FileNotFoundError:
+        broken = broken_link(path)
+        if broken:
+            raise BadLog(f"{path}: {broken}") from None
         folder = path.parent
         around = sorted(p.name for p in folder.iterdir()) if folder.is_dir() else []
         raise BadLog(f"{path}: no such file{nearest(path.name, around)}") from None
     except IsADirectoryError:
         raise BadLog(f"{path}: is a directory; name the log files in it") from None
     except OSError as error:
-        raise BadLog(f"{path}: cannot be read ({error.strerror}); check its rights") from None
+        wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
+        raise BadLog(f"{path}: {wrong}") from None
     if not head:
         raise BadLog(f"{path}: is empty (0 bytes); copy it again")
     return head

@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from identification.chance import DRAWS
-from identification.effects._base import GIVES
 from identification.findings import listed
 from identification.result import Estimate
 from identification.trace_result import Change, Errors, FoundEffect, Rival, Trace
@@ -229,7 +228,7 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
 def effect_lines(found: Trace) -> list[str]:
     """Equation, source and worth of every effect."""
     return [
-        f"{words(e.effect.key)}: {e.effect.equation}; {GIVES[e.effect.acts]}. {_worth(e)}."
+        f"{words(e.effect.key)}: {e.effect.equation}; {e.effect.place.gives}. {_worth(e)}."
         f" Source: {e.effect.source}."
         for e in found.effects
     ]

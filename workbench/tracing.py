@@ -17,6 +17,7 @@ from workbench.effect_values import relabelled
 from workbench.fetch import card_path
 from workbench.identifying import Source, arx_plant, speed_of
 from workbench.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
+from workbench.plausible import model_remarks
 from workbench.sources import Sources
 from workbench.units import Motion
 
@@ -84,7 +85,7 @@ def trace_sources(
     )
     remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
     model = model_of(found, train, library)
-    return Traced(found, model, train.runs, seen, remarks)
+    return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)))
 
 
 def _held_out(train: Sources) -> list[str]:

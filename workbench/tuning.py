@@ -25,6 +25,7 @@ from workbench.design_values import (
 from workbench.identifying import check_period
 from workbench.model import Model, used, versions
 from workbench.parameter_units import Shown, shown
+from workbench.plausible import bandwidth_remarks, stored_remarks
 
 NORMAL_95 = 1.96  # standard deviations to either side that hold 95 %
 DEFAULT_PERIOD = 10e-3  # s, the paper's rig
@@ -86,7 +87,12 @@ def design(
         refused=refused,
         recommended=recommended,
         compensator=_compensator(model),
-        remarks=tuple(_remarks(model, plant, found)),
+        remarks=(
+            *model.read,
+            *stored_remarks(model),
+            *bandwidth_remarks([one.dominant[0] for one in found.values()], model.rig),
+            *_remarks(model, plant, found),
+        ),
         versions=versions(),
     )
 

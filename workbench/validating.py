@@ -149,9 +149,20 @@ def validate(
         passed=all(one.passed for one in figures[judged].values()),
         limits=limits,
         figures=figures,
-        remarks=tuple(_remarks(figures, judged, found, (model, plant))),
+        remarks=(
+            *_as_read(model, found, plant),
+            *_remarks(figures, judged, found, (model, plant)),
+        ),
         versions=versions(),
     ), traces
+
+
+def _as_read(model: Model, found: Design, plant: Model | None) -> Iterator[str]:
+    """What to say of the files, with the name of the one that is meant."""
+    for name, lines in (("model", model.read), ("design", found.read)):
+        yield from (f"{name}: {line}" for line in lines)
+    if plant is not None:
+        yield from (f"plant: {line}" for line in plant.read)
 
 
 def references(machine: Model, found: Design) -> tuple[Array, Array, Array]:

@@ -15,32 +15,20 @@ Rotary rigs use rad, N m and kg m^2 in the same places.
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.compiled import kernel_pointer
+from identification.effects._places import PLACES, Acts, Place
 from identification.errors import BadModel
 
-Acts = Literal["slip", "stiction", "friction", "bristle", "force", "actuator", "command", "delay",
-               "sensor"]  # fmt: skip
-# What `value` returns, by where the effect acts.
-GIVES: Mapping[Acts, str] = {
-    "slip": "friction added while sliding [N], positive against the motion",
-    "stiction": "force added to the stick limit in direction d [N]",
-    "friction": "friction added while sliding and to the stick limit [N]",
-    "bristle": "slope dF/dy of the elastic friction force z [N/m]; it replaces sticking",
-    "force": "driving force added [N], positive towards +y",
-    "actuator": "rate added to dF/dt [N/s]",
-    "command": "command that reaches the actuator in place of u [V]",
-    "delay": "time by which the command is late [s]",
-    "sensor": "position that the transducer shows in place of y [m]",
-}
 Kernel = Callable[..., float]
 # A number and numbers, as the kernels' eleven arguments are annotated.
 R = float
 Rs = Sequence[float]
+Role = Literal["period", "place", "width"]
 MAX_PARAMS = 8
 MAX_SIGNALS = 4
 AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
@@ -50,7 +38,8 @@ AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
 class Param:
     """One parameter: unit, bounds, a typical value, and whether the effect is linear in it.
 
-    `default` is what a recipe may leave out. Bounds in SI.
+    `default` is what a recipe may leave out. Bounds in SI. role: what it is along the stroke, where
+    a search has to know: a length over which it repeats, a place, or the width of a place.
     """
 
     name: str
@@ -61,6 +50,7 @@ class Param:
     meaning: str
     linear: bool = False
     default: float | None = None
+    role: Role | None = None
 
     @property
     def optional(self) -> bool:
@@ -86,7 +76,9 @@ class Effect:
     and the names of `params` and `signals`. evolve: the state after dt, `evolve(dt, t, ..., p)`;
     initial: the state at the start, as `value` (0 where None). signals: names of the log's signals
     that it uses, of which those in `needs` must be there (others read as 0). depends_on: signals
-    with which its contribution varies. Raises BadModel where the declaration contradicts itself.
+    with which its contribution varies, at once or by its state ("rest", "reversal": by what the
+    motion before has left). state_unit: unit of z, which may be any. Raises BadModel where the
+    declaration contradicts itself.
     """
 
     key: str
@@ -101,14 +93,14 @@ class Effect:
     initial: Kernel | None = None
     signals: tuple[str, ...] = ()
     needs: tuple[str, ...] = ()
-    separate: str = ""
+    state_unit: str | None = None
 
     def __post_init__(self) -> None:
         problem = None
         if not self.key.isidentifier():
             problem = "its key must be a word of letters, digits and underscores"
-        elif self.acts not in get_args(Acts):
-            problem = f"acts = {self.acts!r}, must be one of {', '.join(get_args(Acts))}"
+        elif self.acts not in PLACES:
+            problem = f"acts = {self.acts!r}, must be one of {', '.join(PLACES)}"
         elif len(self.params) > MAX_PARAMS or len(self.signals) > MAX_SIGNALS:
             problem = f"at most {MAX_PARAMS} parameters and {MAX_SIGNALS} signals"
         elif not set(self.needs) <= set(self.signals):
@@ -119,6 +111,15 @@ class Effect:
                 problem = f"{p.name}: typical and default must lie in [{p.low:g}, {p.high:g}]"
         if problem:
             raise BadModel(f"effect {self.key!r}: {problem}")
+
+    @property
+    def place(self) -> Place:
+        """What it means to act where it acts."""
+        return PLACES[self.acts]
+
+    def named(self, role: Role) -> str | None:
+        """Name of the parameter in this role, None where it has none."""
+        return next((p.name for p in self.params if p.role == role), None)
 
     @property
     def names(self) -> tuple[str, ...]:

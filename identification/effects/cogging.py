@@ -24,7 +24,7 @@ EFFECT = Effect(
     params=(
         Param("a", "N", -1e6, 1e6, 2.0, "size of the sine", True),
         Param("b", "N", -1e6, 1e6, 2.0, "size of the cosine", True, 0.0),
-        Param("period", "m", 1e-5, 1e2, 0.02, "length over which it repeats"),
+        Param("period", "m", 1e-5, 1e2, 0.02, "length over which it repeats", role="period"),
         Param("a_2", "N", -1e6, 1e6, 0.5, "size of the sine at half the period", True, 0.0),
         Param("b_2", "N", -1e6, 1e6, 0.5, "size of the cosine at half the period", True, 0.0),
     ),

@@ -26,7 +26,7 @@ EFFECT = Effect(
         Param("c2", "N/m**2", -1e8, 1e8, 100.0, "bend along the stroke", True, 0.0),
         Param("a", "N", -1e6, 1e6, 1.0, "size of the sine", True, 0.0),
         Param("b", "N", -1e6, 1e6, 1.0, "size of the cosine", True, 0.0),
-        Param("period", "m", 1e-5, 1e2, 0.05, "length over which it repeats"),
+        Param("period", "m", 1e-5, 1e2, 0.05, "length over which it repeats", role="period"),
         asymmetry(),
         *at_rest(),
     ),

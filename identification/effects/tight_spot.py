@@ -22,8 +22,8 @@ EFFECT = Effect(
     acts="friction",
     params=(
         Param("size", "N", -1e6, 1e6, 2.0, "friction added at the place", True),
-        Param("y_0", "m", -1e3, 1e3, 0.01, "the place"),
-        Param("width", "m", 1e-6, 1e2, 0.01, "standard width of it"),
+        Param("y_0", "m", -1e3, 1e3, 0.01, "the place", role="place"),
+        Param("width", "m", 1e-6, 1e2, 0.01, "standard width of it", role="width"),
         asymmetry(),
         *at_rest(),
     ),

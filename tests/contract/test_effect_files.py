@@ -15,8 +15,8 @@ from identification.library import built_in, declared, joined
 from identification.log import Log
 from identification.plant import Motor, Plant
 from identification.simulate import free_run
-from tests.contract.effects import check_depends_on, check_equation, check_linear, check_units
 from tests.identification.plants import table
+from workbench.effect_contract import check_depends_on, check_equation, check_linear, check_units
 
 MAGNET = '''"""A magnet at the end of the stroke."""
 

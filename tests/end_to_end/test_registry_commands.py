@@ -10,6 +10,7 @@ import pytest
 
 from identification.plant import Actuator
 from tests.chain import CARD, TABLES, model_of
+from tests.workbench.jobs.listener import listening
 from workbench.cli import main
 from workbench.design_values import design_document
 from workbench.model import model_document
@@ -176,6 +177,29 @@ def test_a_wrong_card_stops_its_machine_only(
     shown = capsys.readouterr()
     assert "error: a: " in shown.err.splitlines()[-1] and "is not TOML" in shown.err
     assert "set_aside" in shown.out
+
+
+def test_alarms_that_are_not_taken_are_told(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name in ("Pr\u00fcfstand", "b"):
+        logs = here / "machines" / name / "logs"
+        logs.mkdir(parents=True)
+        (logs / "1.csv").write_text("t,y\n0,0\n", encoding="utf-8")
+        (logs.parent / "card.toml").write_text(CARD, encoding="utf-8")
+        done(capsys, "registry", "add", name, "model1.json", "--promote", *WHY)
+    with listening() as listener:
+        listener.by_machine = {"b": 403}
+        address = f"http://me:geheim@127.0.0.1:{listener.server_port}/geheim?token=geheim"
+        pass_ = ["reidentify", "machines", "--settle", "0", "--webhook", address, "--json"]
+        for sent, judged in ((1, 2), (0, 0)):
+            assert main([*pass_, "--debug"]) == 2
+            shown = capsys.readouterr()
+            found = json.loads(shown.out)
+            assert (found["alarms"]["sent"], found["alarms"]["waiting"]) == (sent, 1)
+            assert len(found["outcomes"]) == judged
+            assert shown.err.splitlines()[-1].startswith("error: --webhook: 1 alarm(s) not taken")
+            assert "geheim" not in shown.err + shown.out
+        assert [one["machine"] for one in listener.taken] == ["Pr\u00fcfstand"]
+    assert done(capsys, "reidentify", "machines", "--settle", "0")["alarms"] is None
 
 
 def test_bad_places_and_options_of_jobs(here: Path, capsys: pytest.CaptureFixture[str]) -> None:

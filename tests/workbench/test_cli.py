@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -117,6 +118,7 @@ def test_returned_status_is_the_exit_status(outcome: Fail, status: int | None) -
         (BadLog("run 3:\n  t goes\r\nback\x1b[1m"), 2, "error: run 3: t goes back\ufffd[1m"),
         (NotIdentifiable("F_sn"), 1, "refused: F_sn"),
         (KeyboardInterrupt(), 130, "interrupted"),
+        (cli.Terminated(15), 143, "terminated"),
         (click.Abort(), 130, "interrupted"),
         (click.FileError("a.csv", "gone"), 2, "error: Could not open file 'a.csv': gone"),
         (IsADirectoryError(errno.EISDIR, "Is a directory", "x"), 2, "error: x: Is a directory"),
@@ -278,3 +280,20 @@ def test_reader_that_goes_away_is_no_error() -> None:
         process.stdout.close()
         assert process.stderr.read() == b""
     assert process.returncode == cli.BROKEN_PIPE
+
+
+def test_signals_are_as_before_after_a_command(outcome: Fail) -> None:
+    before = [signal.getsignal(one) for one in cli.ENDING]
+    outcome(None)
+    cli.main(["probe"])
+    assert [signal.getsignal(one) for one in cli.ENDING] == before
+
+
+def test_a_signal_that_is_ignored_stays_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
+    try:
+        monkeypatch.setattr(cli, "_run", lambda _: signal.raise_signal(signal.SIGHUP))
+        cli.main([])
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+    finally:
+        signal.signal(signal.SIGHUP, before)

@@ -134,6 +134,14 @@ def test_out_that_is_a_file_is_refused() -> None:
     assert Path("old").read_text() == "mine"
 
 
+@pytest.mark.parametrize("target", ["nowhere", "new"])
+def test_out_that_is_a_link_to_nothing_is_refused(tmp_path: Path, target: str) -> None:
+    Path("new").symlink_to(target)
+    with pytest.raises(BadOutput, match="--out new is a link that leads nowhere"):
+        OutputFolder("identify", Path("new"), now=NOW).__enter__()
+    assert [path.name for path in tmp_path.iterdir()] == ["new"]
+
+
 def test_name_too_long_leaves_no_trace(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="too long"):
         OutputFolder("identify", Path("new") / ("x" * 250), now=NOW).__enter__()

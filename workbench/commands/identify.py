@@ -76,9 +76,9 @@ def command(
         folder.write_json("model.json", model_document(found.model))
         folder.write_text("report.html", identification_report(found))
     emit(
-        {**model_document(found.model), "out": folder.final},
+        {**model_document(found.model), "remarks": found.remarks, "out": folder.final},
         as_json,
-        lambda: model_view(found.model, sources.remarks, folder.final),
+        lambda: model_view(found.model, found.remarks, folder.final),
     )
 
 

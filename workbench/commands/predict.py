@@ -60,7 +60,7 @@ def command(
         with progress("predicting", as_json=as_json):
             found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
         folder.write_text("prediction.csv", prediction_csv(found))
-    remarks = (*sources.remarks, *_other_card(model.card, sources.card.name))
+    remarks = (*model.read, *sources.remarks, *_other_card(model.card, sources.card.name))
     summary = {
         "drive": found[0].drive,
         "window": window,

@@ -3,6 +3,7 @@
 import getpass
 import json
 from collections.abc import Callable
+from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -164,9 +165,9 @@ def add(
     from workbench.reading import read_document
     from workbench.registry.values import Candidate
 
-    read_model(model_file, library(effects))
+    remarks = list(read_model(model_file, library(effects)).read)
     if design_file is not None:
-        read_design(design_file)
+        remarks += read_design(design_file).read
     candidate = Candidate(
         read_document(model_file),
         None if design_file is None else read_document(design_file),
@@ -179,7 +180,8 @@ def add(
         if promote and (current is None or current.number != version.number):
             found.promote(machine, version.number, reason=reason, by=who, now=now)
     state = "in force" if promote else "not in force yet: 'workbench registry promote'"
-    emit(version, as_json, lambda: f"{machine}: version {version.number}, {state}")
+    said = [f"{machine}: version {version.number}, {state}", *(f"note: {r}" for r in remarks)]
+    emit({**asdict(version), "remarks": remarks}, as_json, lambda: "\n".join(said))
 
 
 @command.command(epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'")

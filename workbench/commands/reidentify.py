@@ -11,6 +11,7 @@ from workbench.output import emit
 if TYPE_CHECKING:
     from rich.console import Group
 
+    from workbench.jobs.alarms import Delivery
     from workbench.jobs.passes import PassReport
 
 
@@ -24,20 +25,37 @@ def command(as_json: bool, **given: Any) -> int:
     tested against the model in force ('workbench registry add' puts the first there); on drift a
     new model and design are made, on another structure the log is traced; what is new replaces the
     old only if it wins on held-out data and in simulation. Safe to run at any time and many at
-    once; what a killed run left, the next does. Progress is told as JSON lines on standard error.
-    Exit status 1: an alarm (drift, a log set aside); 2: a machine could not be handled, or the
-    registry is away.
+    once; what a killed run left, the next does. A log older than one behind the model in force is
+    judged and recorded, and changes nothing. Progress is told as JSON lines on standard error.
+    Exit status 1: an alarm (drift, a log set aside); 2: a machine could not be handled, the
+    registry is away, or the webhook has not taken an alarm. Such an alarm is tried again by later
+    passes, less and less often, and given up after a day.
     """
     from workbench.jobs.alarms import ALARMING
 
     with worker(JobOptions(**given)) as found:
         done = found.once()
-    emit(done, as_json, lambda: pass_view(done))
-    if done.failed:
-        for name, line in done.failed.items():
-            click.echo(f"error: {name}: {line}", err=True)
+    judged, alarms = done.judged, done.alarms
+    emit({**vars(judged), "alarms": alarms}, as_json, lambda: pass_view(judged))
+    errors = [f"{name}: {line}" for name, line in judged.failed.items()]
+    if alarms is not None and (alarms.waiting or alarms.given_up):
+        errors.append(undelivered(alarms))
+    for line in errors:
+        click.echo(f"error: {line}", err=True)
+    if errors:
         return 2
-    return 1 if any(one.verdict in ALARMING for one in done.outcomes) else 0
+    return 1 if any(one.verdict in ALARMING for one in judged.outcomes) else 0
+
+
+def undelivered(alarms: "Delivery") -> str:
+    """What the webhook has not taken, in one line."""
+    parts = []
+    if alarms.waiting:
+        parts.append(f"{alarms.waiting} alarm(s) not taken yet, tried again by later passes")
+    if alarms.given_up:
+        parts.append(f"{alarms.given_up} alarm(s) given up after a day")
+    why = f" ({alarms.reason})" if alarms.reason else ""
+    return f"--webhook: {', '.join(parts)}{why}; look after the receiver"
 
 
 def pass_view(done: "PassReport") -> "Group":

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import traceback
 from contextlib import ExitStack
 from datetime import timedelta
 from typing import TYPE_CHECKING, Any
@@ -46,6 +47,8 @@ def command(cron: str, port: int | None, address: str, as_json: bool, **given: A
             settle=timedelta(seconds=options.settle),
             clock=clock,
             stop=stop,
+            report=found.report,
+            marker=options.marker,
         )
         found.report("stopped")
 
@@ -59,9 +62,14 @@ def _once(found: "Worker") -> bool:
     except (UserError, OSError, MemoryError) as error:
         found.report("pass_failed", reason=" ".join(str(error).split()))
         return False
-    found.report("pass_done", judged=len(done.outcomes), growing=done.growing, busy=done.busy,
-                 failed=dict(done.failed))  # fmt: skip
-    return done.growing > 0
+    except Exception:  # a fault of ours in one pass must not end those to come
+        found.report("fault_of_ours", traceback=traceback.format_exc())
+        return False
+    judged, alarms = done.judged, done.alarms
+    found.report("pass_done", judged=len(judged.outcomes), growing=judged.growing,
+                 busy=judged.busy, failed=dict(judged.failed),
+                 alarms_waiting=alarms.waiting if alarms else 0)  # fmt: skip
+    return judged.growing > 0
 
 
 def _served(found: "Worker", address: str, port: int) -> ExitStack:

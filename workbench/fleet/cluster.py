@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from workbench.addresses import shown
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
 from workbench.model import versions
@@ -125,6 +126,7 @@ def cluster_at(address: str, timeout: float) -> Iterator[Cluster]:
     _dask()
     from distributed import Client
 
+    _check_address(address)
     try:
         client = Client(address, timeout=timeout, set_as_default=False)
     except Exception as error:  # addresses of many kinds, each with errors of its own
@@ -142,6 +144,23 @@ def cluster_at(address: str, timeout: float) -> Iterator[Cluster]:
             ) from None
         _check_workers(client, address)
         yield Cluster(client, 0.1)
+
+
+def _check_address(address: str) -> None:
+    """Raises BadCluster where it is none; a client of Dask's would leave a traceback behind."""
+    from distributed.comm.addressing import get_address_host_port, parse_address
+    from distributed.comm.registry import get_backend
+
+    try:
+        get_backend(parse_address(address)[0])
+        host, port = get_address_host_port(address)
+        sound = bool(host.encode("idna")) and 0 < port < 65536 and "@" not in host
+    except ValueError:
+        sound = False
+    if not sound:
+        raise BadCluster(
+            f"--cluster {shown(address)}: no address of a scheduler; one as tcp://host:8786 needed"
+        )
 
 
 def _check_workers(client: Any, address: str) -> None:

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 from typing import Any
 
+from workbench.addresses import shown, without_secrets
 from workbench.fleet.values import NEEDED, BadLogs, LogFile
 
 SUFFIX = ".parquet"
@@ -20,11 +21,15 @@ def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
     A log's machine is the first folder below the URL ("machine=a" is "a"), or else the file's
     name. leave_out: a local folder that holds no logs. Raises BadLogs.
     """
+    if not url.strip():
+        raise BadLogs("LOGS is empty; give a folder, a file or an fsspec URL of Parquet logs")
     system, root = file_system(url)
     try:
         found = _listed(system, root)
     except Exception as error:  # every file system has errors of its own
-        raise BadLogs(f"{url}: cannot be listed ({said(error)}); check the address") from error
+        raise BadLogs(
+            f"{shown(url)}: cannot be listed ({said(error, url)}); check the address"
+        ) from error
     base = PurePosixPath(_base(root, found))
     logs = []
     for path, info in found.items():
@@ -36,8 +41,8 @@ def find_logs(url: str, leave_out: Path | None = None) -> tuple[LogFile, ...]:
         logs.append(LogFile(_machine(name), str(name), path, size, time))
     if not logs:
         raise BadLogs(
-            f"{url}: no logs (*{SUFFIX}) there; give a folder, a file or an fsspec URL with logs as"
-            f" <machine>/*{SUFFIX} or <machine>{SUFFIX}"
+            f"{shown(url)}: no logs (*{SUFFIX}) there; give a folder, a file or an fsspec URL with"
+            f" logs as <machine>/*{SUFFIX} or <machine>{SUFFIX}"
         )
     return tuple(sorted(logs, key=lambda log: (log.machine, log.mtime_ns, log.name)))
 
@@ -51,7 +56,9 @@ def file_system(url: str) -> tuple[Any, str]:
     try:
         system, root = url_to_fs(url)
     except Exception as error:  # a protocol without its package, an archive that is none
-        raise BadLogs(f"{url}: cannot be opened ({said(error)}); check the address") from error
+        raise BadLogs(
+            f"{shown(url)}: cannot be opened ({said(error, url)}); check the address"
+        ) from error
     return system, str(root)
 
 
@@ -65,7 +72,7 @@ def card_text(url: str, log: LogFile) -> str | None:
             if system.isfile(path):
                 return str(system.cat_file(path).decode("utf-8-sig"))
         except Exception as error:
-            raise BadLogs(f"{path}: cannot be read ({said(error)})") from error
+            raise BadLogs(f"{shown(path)}: cannot be read ({said(error, url)})") from error
         folder = folder.parent
     return None
 
@@ -85,13 +92,13 @@ def local_copy(url: str, log: LogFile) -> Iterator[Path]:
         try:
             system.get_file(log.path, str(target))
         except Exception as error:
-            raise BadLogs(f"{log.name}: cannot be fetched ({said(error)})") from error
+            raise BadLogs(f"{shown(log.name)}: cannot be fetched ({said(error, url)})") from error
         yield target
 
 
-def said(error: BaseException) -> str:
-    """What an error says, in one line of bounded length."""
-    text = " ".join(str(error).split()) or type(error).__name__
+def said(error: BaseException, address: str = "") -> str:
+    """What an error says, in one line of bounded length, without the secrets of the address."""
+    text = without_secrets(" ".join(str(error).split()), address) or type(error).__name__
     return text if len(text) <= 200 else f"{text[:200]}..."
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
 
+from workbench.addresses import shown
 from workbench.fleet.cluster import Cluster, Work
 from workbench.fleet.finding import card_text
 from workbench.fleet.recording import Recorder
@@ -183,8 +184,8 @@ class Run:
         looked = logs[:LOOKED]
         if looked and not any(card_text(url, log) for log in looked):
             raise BadLogs(
-                f"{url}: no card.toml beside or above {looked[0].name!r} and the logs after it;"
-                " put one there, or give --card for all"
+                f"{shown(url)}: no card.toml beside or above {looked[0].name!r} and the logs after"
+                " it; put one there, or give --card for all"
             )
 
     def _refuse_empty(self, time: timedelta) -> None:

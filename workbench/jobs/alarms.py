@@ -1,85 +1,249 @@
-"""Alarms: what a webhook is told, until it has taken it; a dead one stops nothing."""
+"""Alarms: what a webhook is told, until it has taken it; one that is not taken delays itself alone.
 
-from dataclasses import dataclass
-from datetime import datetime, timedelta
-from typing import Any
+A webhook's address holds secrets (user, password, a token in its path or query), and so do the
+texts of errors that quote it: only `Webhook.shown` is ever told.
+"""
+
+import json
+import logging
+import time
+import traceback
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from datetime import timedelta
+from http import HTTPStatus
+from urllib.parse import quote
 
 import httpx
 from tenacity import Retrying, retry_if_exception_type, stop_after_attempt, wait_random_exponential
 
 from identification.errors import UserError
+from workbench.jobs.lease import Clock
 from workbench.jobs.passes import Report
-from workbench.registry.queue import Queue
-from workbench.registry.values import Outcome, Verdict
+from workbench.registry.outbox import Outbox
+from workbench.registry.values import Alarm, Verdict
 
 ALARMING: tuple[Verdict, ...] = ("structure", "promoted", "refused", "set_aside")
-KEPT = timedelta(days=1)  # an alarm older than this is not sent any more
+KEPT = timedelta(days=1)  # an alarm older than this is given up
+IN_HAND = timedelta(minutes=2)  # for so long no other worker sends an alarm that one has taken
+IN_A_ROW = 3  # alarms that do not get through, after which the others are left
+BUSY = (408, 425, 429)  # refusals that are worth another try at once, as those from 500 on
+PLAIN = "".join(map(chr, range(0x21, 0x7F)))
 
 
 class BadWebhook(UserError):
     """An address to which no alarm can be sent."""
 
 
+class Refused(Exception):
+    """The webhook has answered, and not taken the alarm; its text is safe to be shown."""
+
+
+class Busy(Refused):
+    """The same, in a way that another try may change."""
+
+
+class Unreachable(Exception):
+    """No answer has come; its text is safe to be shown."""
+
+
 @dataclass(frozen=True)
 class Webhook:
-    """Where alarms are sent as JSON by POST; timeout [s] of one try."""
+    """Where alarms are sent as JSON by POST; timeout [s] of one try, budget [s] of a pass."""
 
-    url: str
+    url: str = field(repr=False)
     timeout: float = 5.0
     tries: int = 3
     longest_wait: float = 2.0
+    budget: float = 30.0
 
     def __post_init__(self) -> None:
         try:
             found = httpx.URL(self.url)
-        except httpx.InvalidURL:
+            found.host.encode("idna")
+        except (httpx.InvalidURL, ValueError):  # the latter of what cannot be encoded
+            found = httpx.URL("")
+        if not 0 < (found.port or 80) < 65536:
             found = httpx.URL("")
         if found.scheme not in ("http", "https") or not found.host:
-            raise BadWebhook(f"--webhook {self.url}: http://... or https://... needed")
+            raise BadWebhook(
+                "--webhook: not an address (not shown, as it may hold a password); http://... or"
+                " https://... needed"
+            )
 
-    def send(self, outcome: Outcome) -> None:
-        """Send one alarm; raises httpx.HTTPError where it is not taken after all tries.
+    @property
+    def shown(self) -> str:
+        """The address as far as it is no secret."""
+        found = httpx.URL(self.url)
+        return f"{found.scheme}://{found.netloc.decode()}/..."
+
+    def send(self, alarm: Alarm, client: httpx.Client) -> None:
+        """Send one alarm; raises Refused or Unreachable where it is not taken after all tries.
 
         It may arrive twice, where an answer is lost: the key tells one alarm from another.
         """
         again = Retrying(
-            retry=retry_if_exception_type(httpx.HTTPError),
+            retry=retry_if_exception_type((Busy, Unreachable)),
             stop=stop_after_attempt(self.tries),
             wait=wait_random_exponential(multiplier=0.2, max=self.longest_wait),
             reraise=True,
         )
-        headers = {"Idempotency-Key": f"{outcome.machine}:{outcome.log.sha256}"}
-        for attempt in again:
-            with attempt:
-                answer = httpx.post(
-                    self.url, json=alarm(outcome), headers=headers, timeout=self.timeout
-                )
-                answer.raise_for_status()
+        again(self._post, json.dumps(told(alarm)), key(alarm), client)
+
+    def _post(self, content: str, idempotency: str, client: httpx.Client) -> None:
+        headers = {"Content-Type": "application/json", "Idempotency-Key": idempotency}
+        try:
+            # The answer's body is of no use and may be without end, so it is not read.
+            with client.stream("POST", self.url, content=content, headers=headers) as answer:
+                status = answer.status_code
+        except httpx.TimeoutException:
+            raise Unreachable(f"no answer within {self.timeout:g} s") from None
+        except (httpx.NetworkError, httpx.RemoteProtocolError, httpx.ProxyError) as error:
+            raise Unreachable(_cause(error)) from None
+        if not 200 <= status < 300:
+            kind = Busy if status >= 500 or status in BUSY else Refused
+            raise kind(_phrase(status))
 
 
-def alarm(outcome: Outcome) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Delivery:
+    """What became of the alarms: taken by the webhook, still waiting, given up in this pass.
+
+    reason: why the last one that failed was not taken.
+    """
+
+    sent: int = 0
+    waiting: int = 0
+    given_up: int = 0
+    reason: str | None = None
+
+
+def told(alarm: Alarm) -> dict[str, str | int | None]:
     """What a webhook is told."""
     return {
-        "machine": outcome.machine,
-        "log": outcome.log.file,
-        "sha256": outcome.log.sha256,
-        "verdict": outcome.verdict,
-        "reason": outcome.reason,
-        "version": outcome.number,
-        "at": outcome.at.isoformat(),
+        "machine": _readable(alarm.machine),
+        "log": _readable(alarm.log),
+        "sha256": alarm.sha256,
+        "verdict": alarm.verdict,
+        "reason": _readable(alarm.reason),
+        "version": alarm.version,
+        "at": alarm.at.isoformat(),
     }
 
 
-def send_alarms(queue: Queue, webhook: Webhook, *, now: datetime, report: Report) -> int:
-    """How many alarms the webhook has taken; at the first that it does not, the rest wait."""
-    sent = 0
-    for outcome in queue.unsent(ALARMING, since=now - KEPT):
+def key(alarm: Alarm) -> str:
+    """What tells the alarm from every other; in ASCII, as a header has to be."""
+    name = alarm.machine
+    if not (name.isascii() and name.isprintable() and name == name.strip()):
+        name = quote(name.encode("utf-8", "surrogatepass"), safe=PLAIN.replace("%", ""))
+    again = f":{alarm.turn}" if alarm.turn else ""
+    return f"{name}:{alarm.sha256}{again}"
+
+
+def send_alarms(
+    outbox: Outbox,
+    webhook: Webhook,
+    *,
+    clock: Clock,
+    report: Report,
+    stop: Callable[[], bool] = lambda: False,
+) -> Delivery:
+    """Send what is due, and say what became of it.
+
+    An alarm that is refused waits longer each time, and no other waits for it. Where the webhook
+    cannot be reached, or takes too long for all of them, the rest is left for the next pass.
+    """
+    now = clock()
+    outbox.fill(ALARMING, since=now - KEPT, now=now)
+    lost = outbox.give_up(before=now - KEPT, now=now)
+    for alarm in lost:
+        report("alarm_given_up", machine=alarm.machine, file=alarm.log, verdict=alarm.verdict,
+               reason=f"not taken by {webhook.shown} within {KEPT.days} day(s)")  # fmt: skip
+    logging.getLogger("httpx").setLevel(logging.WARNING)  # else it logs whole addresses
+    round_ = _Round(outbox, webhook, clock, report, stop)
+    round_.send(outbox.due(now))
+    waiting = sum(count for count, _ in outbox.counts(clock()).values())
+    if round_.unreached:
+        report("webhook_failed", webhook=webhook.shown, reason=round_.reason, waiting=waiting)
+    return Delivery(round_.sent, waiting, len(lost), round_.reason)
+
+
+@dataclass
+class _Round:
+    """One pass' way through the alarms; missed: how many in a row did not get through."""
+
+    outbox: Outbox
+    webhook: Webhook
+    clock: Clock
+    report: Report
+    stop: Callable[[], bool]
+    sent: int = 0
+    unreached: bool = False
+    missed: int = 0
+    reason: str | None = None
+
+    def send(self, alarms: tuple[Alarm, ...]) -> None:
+        if not alarms:
+            return
+        end = time.monotonic() + self.webhook.budget
         try:
-            webhook.send(outcome)
-        except httpx.HTTPError as error:
-            line = " ".join(str(error).split()) or type(error).__name__
-            report("webhook_failed", reason=line)
-            break
-        queue.sent(outcome, now=now)
-        sent += 1
-    return sent
+            client = httpx.Client(timeout=self.webhook.timeout)
+        except Exception as error:  # of a proxy or certificates that the environment names
+            self.unreached, self.reason = True, f"no connection: {type(error).__name__}"
+            return
+        with client:
+            for alarm in alarms:
+                if self.stop() or self.missed >= IN_A_ROW:
+                    return
+                if time.monotonic() >= end:
+                    self.reason = self.reason or "too slow for all of them in one pass"
+                    return
+                if self.outbox.take(alarm, until=self.clock() + IN_HAND, now=self.clock()):
+                    self._one(alarm, client)
+
+    def _one(self, alarm: Alarm, client: httpx.Client) -> None:
+        try:
+            self.webhook.send(alarm, client)
+        except Unreachable as error:
+            self.unreached, self.missed, self.reason = True, self.missed + 1, str(error)
+            self.outbox.give_back(alarm, now=self.clock())
+        except Refused as error:
+            self._refused(alarm, str(error))
+        except Exception as error:  # one alarm on which we fail must not stop the others
+            # Where it happened, without the error's text, which may quote the address.
+            shown = "".join(traceback.format_tb(error.__traceback__))
+            self.report("fault_of_ours", machine=alarm.machine, file=alarm.log, traceback=shown)
+            self._refused(alarm, f"fault of ours: {type(error).__name__}")
+        else:
+            self.missed = 0
+            self.sent += 1
+            self.outbox.sent(alarm, now=self.clock())
+
+    def _refused(self, alarm: Alarm, reason: str) -> None:
+        self.missed, self.reason = 0, reason
+        next_at = self.outbox.refused(alarm, now=self.clock())
+        self.report("alarm_refused", machine=alarm.machine, file=alarm.log, reason=reason,
+                    webhook=self.webhook.shown, next_at=next_at.isoformat())  # fmt: skip
+
+
+def _phrase(status: int) -> str:
+    """The status in words of ours: those of the answer may be anything."""
+    try:
+        return f"answered {status} {HTTPStatus(status).phrase}"
+    except ValueError:
+        return f"answered {status}"
+
+
+def _cause(error: Exception) -> str:
+    """Why a connection failed: what the system says, never what quotes the address."""
+    found: BaseException | None = error
+    while found is not None:
+        if isinstance(found, OSError) and found.strerror:
+            return f"{type(error).__name__}: {found.strerror}"
+        found = found.__cause__ or found.__context__
+    return type(error).__name__
+
+
+def _readable(text: str) -> str:
+    """The text with what has no form in UTF-8, such as a file name's odd bytes, spelled out."""
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")

@@ -9,6 +9,7 @@ from typing import ParamSpec, TypeVar
 
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
 
+from workbench.registry.database import Database
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.queue import Queue
 from workbench.registry.values import Claim
@@ -35,6 +36,15 @@ class Patience:
             reraise=True,
         )
         return again(call, *args, **kwargs)
+
+
+def shared_clock(database: Database, here: Clock) -> Clock:
+    """The database's clock, which all its workers share, read once and carried on by `here`.
+
+    Raises RegistryAway.
+    """
+    ahead = database.now(here()) - here()
+    return lambda: here() + ahead
 
 
 @contextmanager

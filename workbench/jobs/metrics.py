@@ -1,7 +1,7 @@
 """Metrics in Prometheus' text format, read from the registry: every worker shows the same."""
 
 from collections.abc import Iterator
-from datetime import datetime
+from datetime import UTC, datetime
 from pathlib import Path
 
 from prometheus_client import CollectorRegistry, write_to_textfile
@@ -9,6 +9,7 @@ from prometheus_client.core import GaugeMetricFamily
 from prometheus_client.registry import Collector
 
 from workbench.registry.errors import RegistryAway
+from workbench.registry.outbox import Outbox
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 
@@ -57,14 +58,19 @@ def _of_machines(registry: Registry) -> Iterator[GaugeMetricFamily]:
     machines = registry.machines()
     version = _family("version_in_force", "Number of the version in force.", "machine")
     waiting = _family("logs_waiting", "Logs that wait for a result.", "machine")
+    unsent = _family("alarms_waiting", "Alarms that no webhook has taken yet.", "machine")
+    lost = _family("alarms_failed", "Alarms given up, as no webhook took them.", "machine")
+    alarms = Outbox(registry.database).counts(datetime.now(UTC))
     for one in machines:
         if one.in_force is not None:
             version.add_metric([one.name], one.in_force.number)
         waiting.add_metric([one.name], one.waiting)
+        for family, count in zip((unsent, lost), alarms.get(one.name, (0, 0)), strict=True):
+            family.add_metric([one.name], count)
     judged = _family("logs_judged", "Logs by what they led to.", "machine", "verdict")
     for labels, count in sorted(Queue(registry.database).verdicts().items()):
         judged.add_metric(list(labels), count)
-    yield from (version, waiting, judged)
+    yield from (version, waiting, judged, unsent, lost)
 
 
 def _family(name: str, meaning: str, *labels: str) -> GaugeMetricFamily:

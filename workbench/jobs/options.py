@@ -16,9 +16,11 @@ import click
 from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option
 
 if TYPE_CHECKING:
-    from workbench.jobs.alarms import Webhook
+    from workbench.jobs.alarms import Delivery, Webhook
+    from workbench.jobs.lease import Clock
     from workbench.jobs.metrics import Figures
     from workbench.jobs.passes import PassReport, Report
+    from workbench.registry.order import Order
     from workbench.registry.store import Registry
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -39,6 +41,8 @@ class JobOptions:
     webhook: str | None
     metrics: Path | None
     effects: tuple[Path, ...]
+    order: "Order"
+    marker: str | None
 
 
 def job_options(command: Command) -> Command:
@@ -51,6 +55,13 @@ def job_options(command: Command) -> Command:
                      help="Give a machine without a model its first from its first log."),
         click.option("--settle", type=SECONDS, default=10.0, show_default=True,
                      metavar="S", help="Take a file that has not changed for this long."),
+        click.option("--marker", metavar="SUFFIX", callback=_suffix,
+                     help="Take a file once one named <file>SUFFIX lies beside it, as .done; "
+                     "for writers that pause for longer than --settle."),
+        click.option("--order", type=click.Choice(["time-or-name", "time"]),
+                     default="time-or-name", show_default=True,
+                     help="What tells that a log is older than another, so that it puts no model "
+                     "in force: the file's time, or also the numbers in its name."),
         click.option("--lease", type=SECONDS_ABOVE_0, default=120.0, show_default=True, metavar="S",
                      help="Take a silent worker's machine over after this long."),
         click.option("--patience", type=SECONDS, default=60.0, show_default=True,
@@ -69,6 +80,22 @@ def job_options(command: Command) -> Command:
     return command
 
 
+def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
+    if value is not None and (not value.strip() or "/" in value or "\0" in value):
+        raise click.UsageError(
+            f"--marker {value!r}: the end of a file's name needed, as .done.", ctx
+        )
+    return value
+
+
+@dataclass(frozen=True)
+class Done:
+    """What a pass did, and what became of the alarms; None without a webhook."""
+
+    judged: "PassReport"
+    alarms: "Delivery | None"
+
+
 @dataclass(frozen=True)
 class Worker:
     """One worker: `once` is a pass with its alarms and metrics."""
@@ -81,16 +108,14 @@ class Worker:
     figures: "Figures"
     stop: Callable[[], bool]
 
-    def once(self) -> "PassReport":
+    def once(self) -> Done:
         """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
         from workbench.challenge import Terms
-        from workbench.jobs.alarms import send_alarms
-        from workbench.jobs.lease import Patience
+        from workbench.jobs.lease import Patience, shared_clock
         from workbench.jobs.metrics import write_metrics
         from workbench.jobs.passes import Pass, Settings
         from workbench.judging import Chain
         from workbench.own_effects import library
-        from workbench.registry.queue import Queue
 
         given = self.options
         settings = Settings(
@@ -98,18 +123,29 @@ class Worker:
             lease=timedelta(seconds=given.lease),
             settle=timedelta(seconds=given.settle),
             first=given.first,
+            order=given.order,
+            marker=given.marker,
             patience=Patience(given.patience),
         )
         terms = Terms(held_out=given.margin)
         judge = Chain(terms=terms, seed=given.seed, library=library(given.effects))
-        done = Pass(self.registry, judge, settings, clock, self.report, self.stop).run(given.root)
-        if self.webhook is not None:
-            queue = Queue(self.registry.database)
-            send_alarms(queue, self.webhook, now=clock(), report=self.report)
+        shared = settings.patience(shared_clock, self.registry.database, clock)
+        work = Pass(self.registry, judge, settings, shared, self.report, self.stop, clock)
+        done = work.run(given.root)
+        alarms = self._alarms(shared)
         self.figures.passed(clock(), len(done.failed))
         if given.metrics is not None:
             write_metrics(given.metrics, self.figures)
-        return done
+        return Done(done, alarms)
+
+    def _alarms(self, shared: "Clock") -> "Delivery | None":
+        from workbench.jobs.alarms import send_alarms
+        from workbench.registry.outbox import Outbox
+
+        if self.webhook is None:
+            return None
+        outbox = Outbox(self.registry.database)
+        return send_alarms(outbox, self.webhook, clock=shared, report=self.report, stop=self.stop)
 
 
 @contextmanager

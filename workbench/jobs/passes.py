@@ -15,8 +15,16 @@ from typing import Any, Protocol
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import Clock, Patience, kept_alive
-from workbench.jobs.scan import MachineFolder, Scan, machine_folders, scan, unchanged
+from workbench.jobs.scan import (
+    MachineFolder,
+    Scan,
+    machine_folders,
+    refuse_name,
+    scan,
+    unchanged,
+)
 from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.order import Order
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Version
@@ -60,7 +68,8 @@ class Settings:
 
     lease: time after which a silent worker counts as dead; settle: how long a file must not have
     changed; attempts: after how many starts without a result a log is set aside; first: whether a
-    machine without a model gets its first from its log. owner: name of the worker.
+    machine without a model gets its first from its log. owner: name of the worker. order: how
+    an older log is told from a newer one; marker: ending of the files beside finished logs.
     """
 
     owner: str
@@ -68,6 +77,8 @@ class Settings:
     settle: timedelta = timedelta(seconds=10)
     attempts: int = 20
     first: bool = False
+    order: Order = "time-or-name"
+    marker: str | None = None
     patience: Patience = field(default_factory=Patience)
 
 
@@ -91,7 +102,11 @@ Report = Callable[..., None]  # event, then what belongs to it by name
 
 
 class Pass:
-    """One worker's way through the machines of a folder."""
+    """One worker's way through the machines of a folder.
+
+    clock: the one that all workers share, for claims and records; files: the one by which the ages
+    of files are told, by default the same.
+    """
 
     def __init__(
         self,
@@ -101,12 +116,14 @@ class Pass:
         clock: Clock,
         report: Report,
         stop: Callable[[], bool] = lambda: False,
+        files: Clock | None = None,
     ) -> None:
         self._registry = registry
         self._queue = Queue(registry.database)
         self._judge = judge
         self._settings = settings
         self._clock = clock
+        self._files = files or clock
         self._report = report
         self._stop = stop
 
@@ -126,14 +143,22 @@ class Pass:
                 line = " ".join(str(error).split()) or type(error).__name__
                 self._report("machine_failed", machine=folder.name, reason=line)
                 done = replace(done, failed={**done.failed, folder.name: line})
+            except Exception as error:  # a fault of ours on one machine must not stop the others
+                shown = traceback.format_exc()
+                self._report("fault_of_ours", machine=folder.name, traceback=shown)
+                line = f"fault of ours: {type(error).__name__}: {' '.join(str(error).split())}"
+                done = replace(done, failed={**done.failed, folder.name: line})
         return replace(done, outcomes=tuple(outcomes))
 
     def _machine(
         self, folder: MachineFolder, done: PassReport, outcomes: list[Outcome]
     ) -> PassReport:
         name, settings, retry = folder.name, self._settings, self._settings.patience
+        refuse_name(folder)
         known = retry(self._queue.known, name)
-        found = scan(folder, known, settle=settings.settle, now=self._clock())
+        found = scan(
+            folder, known, settle=settings.settle, now=self._files(), marker=settings.marker
+        )
         done = replace(done, growing=done.growing + found.growing)
         for file in found.later:
             self._report("log_from_the_future", machine=name, file=file)
@@ -204,8 +229,9 @@ class Pass:
             if not unchanged(path, here):
                 return None
         outcome = retry(
-            self._queue.finish, claim, log, judgement, by=settings.owner, now=self._clock()
-        )
+            self._queue.finish, claim, log, judgement,
+            by=settings.owner, now=self._clock(), order=settings.order,
+        )  # fmt: skip
         self._report(
             "log_judged", machine=folder.name, file=log.file, sha256=log.sha256,
             verdict=outcome.verdict, reason=outcome.reason,
@@ -234,13 +260,16 @@ class Pass:
             return Judgement("set_aside", f"{file}: fault of ours: {said}")
 
     def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
-        retry, registry = self._settings.patience, self._registry
+        retry, registry, queue = self._settings.patience, self._registry, self._queue
         version = retry(registry.in_force, folder.name)
         documents = {
             kind: retry(registry.document, version, kind)
             for kind in ("model", "design")
             if version is not None and getattr(version, kind) is not None
         }
+        # What was found of the machine as it is now says nothing of a log from before.
+        newer = retry(queue.newer_behind, folder.name, log, self._settings.order)
+        after = None if version is None or newer else retry(queue.last_evidence, version)
         return Task(
             machine=folder.name,
             card=folder.card,
@@ -249,7 +278,7 @@ class Pass:
             version=version,
             model=documents.get("model"),
             design=documents.get("design"),
-            previous=None if version is None else retry(self._queue.last_evidence, version),
+            previous=after,
         )
 
 

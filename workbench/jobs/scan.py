@@ -1,7 +1,8 @@
 """Machine folders and the log files in them that are complete.
 
 ROOT/<machine>/card.toml says how ROOT/<machine>/logs/* are read. A file counts as complete when
-nobody has it open for writing, as far as the system tells, and it has not changed for a while.
+nobody has it open for writing, as far as the system tells, and it has not changed for a while;
+where the writer leaves a marker beside each finished file ("run1.csv.done"), when that is there.
 """
 
 import hashlib
@@ -12,6 +13,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
+from workbench.logs import shown_name
 from workbench.registry.values import SeenLog
 
 CARD, LOGS = "card.toml", "logs"
@@ -21,6 +23,10 @@ Known = Mapping[tuple[str, int, int], str]
 
 class BadRoot(UserError):
     """A folder of machines that is none."""
+
+
+class BadName(UserError):
+    """A machine whose folder has a name that no registry can hold."""
 
 
 @dataclass(frozen=True)
@@ -45,17 +51,36 @@ class Scan:
 
 
 def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
-    """The folders of `root` that hold a card, by name; raises BadRoot where `root` is no folder."""
+    """The folders of `root` that hold a card, by name; raises BadRoot where `root` is no folder.
+
+    One whose name is not UTF-8 comes by `shown_name`, which says so of itself.
+    """
     if not root.is_dir():
         raise BadRoot(
             f"{root}: no such folder; one with {'<machine>/' + CARD} and <machine>/{LOGS} needed"
         )
     found = sorted(path.parent for path in root.glob(f"*/{CARD}"))
-    return tuple(MachineFolder(p.name, p / CARD, p / LOGS) for p in found if _plain(p.name))
+    return tuple(MachineFolder(shown_name(p), p / CARD, p / LOGS) for p in found if _plain(p.name))
 
 
-def scan(folder: MachineFolder, known: Known, *, settle: timedelta, now: datetime) -> Scan:
-    """The log files of a machine; those in `known` by name, size and time are not read again."""
+def refuse_name(folder: MachineFolder) -> None:
+    """Raises BadName where the folder's name is not UTF-8."""
+    if folder.card.parent.name != folder.name:
+        raise BadName(f"{folder.name}: the folder's name is not UTF-8; rename the folder")
+
+
+def scan(
+    folder: MachineFolder,
+    known: Known,
+    *,
+    settle: timedelta,
+    now: datetime,
+    marker: str | None = None,
+) -> Scan:
+    """The log files of a machine; those in `known` by name, size and time are not read again.
+
+    marker: ending of a file beside each log that its writer has finished; None: none is needed.
+    """
     complete: dict[str, tuple[Path, SeenLog]] = {}
     growing, later = 0, []
     for path in _files(folder.logs):
@@ -65,8 +90,9 @@ def scan(folder: MachineFolder, known: Known, *, settle: timedelta, now: datetim
             continue
         age = now.timestamp() - before.st_mtime
         if age < 0:
-            later.append(path.name)
-        if age < settle.total_seconds() or open_for_writing(path):
+            later.append(shown_name(path))
+        marked = marker is None or path.with_name(path.name + marker).exists()
+        if not marked or age < settle.total_seconds() or open_for_writing(path):
             growing += 1
             continue
         found = _seen(path, before, known)
@@ -136,12 +162,13 @@ def _plain(name: str) -> bool:
 def _seen(path: Path, before: os.stat_result, known: Known) -> SeenLog | None:
     """The file's fingerprint; None where it changes while it is read, or is gone."""
     size, mtime = before.st_size, before.st_mtime_ns
-    digest = known.get((path.name, size, mtime))
+    name = shown_name(path)
+    digest = known.get((name, size, mtime))
     if digest is None:
         try:
             with path.open("rb") as file:
                 digest = hashlib.file_digest(file, "sha256").hexdigest()
         except FileNotFoundError:
             return None
-    found = SeenLog(digest, path.name, size, mtime)
+    found = SeenLog(digest, name, size, mtime)
     return found if unchanged(path, found) else None

@@ -1,7 +1,7 @@
 """Pass after pass: by a cron expression, and soon after a log file has appeared or changed."""
 
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from datetime import timedelta
 from pathlib import Path
 
@@ -13,10 +13,12 @@ from watchfiles import Change, watch
 
 from identification.errors import UserError
 from workbench.jobs.lease import Clock
+from workbench.jobs.passes import Report
 from workbench.jobs.scan import LOGS, SUFFIXES
 
 SOON = "soon"
 PATIENCE = timedelta(hours=1)  # a pass that is late by less is made up for
+AGAIN, LONGEST = 0.5, 60.0  # s until a watcher of files that died is begun anew
 
 
 class BadSchedule(UserError):
@@ -31,11 +33,14 @@ def watch_machines(
     settle: timedelta,
     clock: Clock,
     stop: threading.Event,
+    report: Report,
+    marker: str | None = None,
 ) -> None:
     """Passes until `stop` is set, one at a time, the first at once.
 
     once: one pass; says whether files are still being written, so that it has to come again soon.
-    Raises BadSchedule.
+    marker: ending of the files beside finished logs. What the watcher of files dies of is
+    reported; it is begun anew, and the passes by schedule go on. Raises BadSchedule.
     """
     try:
         trigger = CronTrigger.from_crontab(cron)
@@ -66,11 +71,39 @@ def watch_machines(
     scheduler.add_job(run, DateTrigger(clock()), id="first", misfire_grace_time=None)
     scheduler.start()
     try:
-        for _ in watch(root, watch_filter=of_log, stop_event=stop, raise_interrupt=False):
-            soon()
+        for wait in _longer(AGAIN, LONGEST):
+            try:
+                of_machine = of_log if marker is None else of_log_or(marker)
+                for _ in watch(root, watch_filter=of_machine, stop_event=stop,
+                               raise_interrupt=False):  # fmt: skip
+                    soon()
+                return  # stopped
+            except Exception as error:  # it raises all kinds on names and folders that it dislikes
+                said = " ".join(str(error).split()) or type(error).__name__
+                report("watcher_failed", reason=said, again_in_s=wait)
+            soon()  # for what came meanwhile
+            if stop.wait(wait):
+                return
     finally:
         stop.set()
         scheduler.shutdown(wait=True)
+
+
+def of_log_or(marker: str) -> Callable[[Change, str], bool]:
+    """As `of_log`, or whether a change is one of a marker beside a log."""
+
+    def changed(change: Change, path: str) -> bool:
+        return of_log(change, path.removesuffix(marker))
+
+    return changed
+
+
+def _longer(first: float, longest: float) -> Iterator[float]:
+    """Waits [s] that double from the first to the longest."""
+    wait = first
+    while True:
+        yield wait
+        wait = min(2.0 * wait, longest)
 
 
 def of_log(_change: Change, path: str) -> bool:

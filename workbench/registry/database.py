@@ -1,13 +1,16 @@
 """The registry's database: SQLite by path or PostgreSQL by URL, the same for all that use it."""
 
 import os
+import re
+import secrets
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
-from sqlalchemy import URL, Connection, Engine, create_engine, event, make_url
+from sqlalchemy import URL, Connection, Engine, create_engine, event, func, make_url, select
 from sqlalchemy.exc import (
     ArgumentError,
     DatabaseError,
@@ -17,10 +20,12 @@ from sqlalchemy.exc import (
     InternalError,
     NoSuchModuleError,
     OperationalError,
+    ProgrammingError,
     TimeoutError,
 )
 from sqlalchemy.orm import Session
 
+from workbench.links import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import upgrade
 
@@ -29,6 +34,8 @@ DEFAULT = "registry.db"
 BUSY = 30.0  # s that SQLite waits for another process to end its transaction
 CONNECT = 10  # s that a PostgreSQL server may take to answer
 READING = "registry_reading"
+EXAMPLE = "postgresql://user:password@host:5432/name"
+_LIKE_A_URL = re.compile(r"postgres\w*(\+\w+)?:|.*\bpassword=", re.I)  # mistyped, no file's name
 
 
 class Database:
@@ -40,9 +47,12 @@ class Database:
 
     def __init__(self, where: str, *, create: bool = True) -> None:
         url = _url(where)
-        self.where = url.database if url.drivername == "sqlite" else url.render_as_string()
-        if url.drivername == "sqlite" and not create:
-            _refuse_missing(Path(str(url.database)))
+        self.where = url.database if url.drivername == "sqlite" else _shown(url)
+        if url.drivername == "sqlite":
+            path = Path(str(url.database))
+            _refuse_place(path, create)
+            if not path.exists():
+                _make_whole(path)
         self._engine = _engine(url, str(self.where))
         try:
             with self._guarded(), self._engine.begin() as connection:
@@ -76,21 +86,37 @@ class Database:
         """Give every connection back."""
         self._engine.dispose()
 
-    @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """What the driver says of a database away or full, as RegistryAway in one line."""
-        try:
-            yield
-        except IntegrityError:
-            raise
-        except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
-            raise RegistryAway(_away(str(self.where), error)) from error
-        except DatabaseError as error:
-            if isinstance(error.orig, sqlite3.DatabaseError):
-                raise BadRegistry(
-                    f"registry {self.where}: {error.orig}; name a registry's file, or a new one"
-                ) from None
-            raise
+    def now(self, here: datetime) -> datetime:
+        """The time by the database's clock, `here` where it has none of its own (SQLite)."""
+        if self.dialect == "sqlite":
+            return here
+        with self.reading() as session:
+            found: datetime = session.execute(select(func.clock_timestamp())).scalar_one()
+        return found
+
+    def _guarded(self) -> AbstractContextManager[None]:
+        return _guarded(str(self.where))
+
+
+@contextmanager
+def _guarded(where: str) -> Iterator[None]:
+    """What the driver says of a database away or full, as RegistryAway in one line."""
+    try:
+        yield
+    except IntegrityError:
+        raise
+    except (OperationalError, InterfaceError, InternalError, TimeoutError) as error:
+        raise RegistryAway(_away(where, error)) from error
+    except DatabaseError as error:
+        if isinstance(error.orig, sqlite3.DatabaseError):
+            raise BadRegistry(
+                f"registry {where}: {error.orig}; name a registry's file, or a new one"
+            ) from None
+        # Without a statement it is of an option in the URL that the driver does not know.
+        if isinstance(error, ProgrammingError) and error.statement is None:
+            said = " ".join(str(error.orig).split())
+            raise BadRegistry(f"registry {where}: {said}; correct the URL") from None
+        raise
 
 
 def location(given: str | None) -> str:
@@ -99,39 +125,95 @@ def location(given: str | None) -> str:
 
 
 def _url(where: str) -> URL:
+    if "\0" in where:
+        raise BadRegistry("registry: its name holds a NUL byte; name a file or a URL")
     if "://" not in where:
+        if _LIKE_A_URL.match(where):
+            raise _unreadable("it has no '://'")
         return URL.create("sqlite", database=str(Path(where)))
     try:
         url = make_url(where)
     except ArgumentError:
-        raise BadRegistry(
-            "registry: the URL cannot be read; as in postgresql://user:password@host:5432/name"
-        ) from None
+        raise _unreadable("its parts are not found") from None
+    except ValueError:  # of what stands where the port should be
+        raise _unreadable("its port is no number") from None
+    if "%00" in where:
+        raise _unreadable("it holds a NUL byte")
     backend = url.get_backend_name()
     if backend == "sqlite" and url.database:
         return URL.create("sqlite", database=url.database)
     if backend in ("postgresql", "postgres"):
+        _check_host(url)
         return url.set(drivername="postgresql+psycopg")
-    raise BadRegistry(
-        f"registry: a URL of {backend!r}, a file or postgresql://user:password@host/name needed"
-    )
+    raise BadRegistry(f"registry: a URL of {backend!r}, a file or {EXAMPLE} needed")
 
 
-def _refuse_missing(path: Path) -> None:
-    if not path.exists():
+def _check_host(url: URL) -> None:
+    """Raises BadRegistry where host or port can be none; whether they are there is asked later."""
+    if url.port is not None and not 0 < url.port < 65536:
+        raise _unreadable(f"its port is {url.port}, 1 to 65535 needed")
+    for host in (url.host or "", *url.normalized_query.get("host", ())):
+        if "@" in host or not host.isprintable() or " " in host:
+            raise _unreadable("its host is none; write @ as %40 and / as %2F in a password")
+        try:
+            host.encode("idna")
+        except UnicodeError as error:
+            if host.startswith("/"):
+                continue  # the folder of a socket
+            raise _unreadable(f"its host is none: {error.__cause__ or error}") from None
+
+
+def _unreadable(why: str) -> BadRegistry:
+    """The URL itself is not shown: where it is mistyped, its password may stand anywhere."""
+    return BadRegistry(f"registry: the URL cannot be read ({why}); as in {EXAMPLE}")
+
+
+def _shown(url: URL) -> str:
+    """The URL without its password and what else its query may hold."""
+    kept = {key: value for key, value in url.query.items() if key in ("host", "port")}
+    return url.set(drivername="postgresql", query=kept).render_as_string(hide_password=True)
+
+
+def _refuse_place(path: Path, create: bool) -> None:
+    """Raises BadRegistry where no registry can be at `path`, or none is and none is to be made."""
+    if path.is_dir():
+        raise BadRegistry(f"registry {path}: is a folder; name a file in it")
+    broken = None if create else broken_link(path)
+    if broken:
+        raise BadRegistry(f"registry {path}: {broken}")
+    if not path.exists() and not create:
         raise BadRegistry(
             f"registry {path}: no such file; 'workbench registry add' makes one, or name it by"
             f" --registry or {VARIABLE}"
         )
+    if not path.absolute().parent.is_dir():
+        raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
+    if path.exists() and path.stat().st_size == 0:
+        raise BadRegistry(
+            f"registry {path}: is empty (0 bytes), which no registry ever is; restore it from a"
+            " copy, or remove the file to begin a new one"
+        )
+
+
+def _make_whole(path: Path) -> None:
+    """A new registry's file, laid out before it has its name, so that none is ever empty."""
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        engine = _engine(URL.create("sqlite", database=str(part)), str(path))
+        try:
+            with _guarded(str(path)), engine.begin() as connection:
+                upgrade(connection, str(path))
+        finally:
+            engine.dispose()  # the last connection brings the log of writes into the file
+        with suppress(FileExistsError):  # another process was faster; its file counts
+            os.link(part, path)
+    finally:
+        for rest in ("", "-wal", "-shm", "-journal"):
+            part.with_name(part.name + rest).unlink(missing_ok=True)
 
 
 def _engine(url: URL, where: str) -> Engine:
     if url.drivername == "sqlite":
-        path = Path(str(url.database))
-        if path.is_dir():
-            raise BadRegistry(f"registry {path}: is a folder; name a file in it")
-        if not path.absolute().parent.is_dir():
-            raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
         engine = create_engine(url, connect_args={"timeout": BUSY})
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
@@ -142,6 +224,8 @@ def _engine(url: URL, where: str) -> Engine:
             pool_pre_ping=True,
             connect_args={"connect_timeout": CONNECT, "application_name": "workbench"},
         )
+    except ArgumentError:
+        raise _unreadable("its hosts and ports do not fit") from None
     except (ImportError, NoSuchModuleError):
         raise BadRegistry(
             f"registry {where}: PostgreSQL needs a driver that is not installed; install"

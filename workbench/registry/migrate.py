@@ -6,25 +6,28 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Connection, inspect, text
 
 from workbench.registry.errors import BadRegistry
-from workbench.registry.tables import Base
+from workbench.registry.tables import APPEND_ONLY, Base
 
 if TYPE_CHECKING:
     from alembic.config import Config
 
-HEAD = "0001"  # known without importing Alembic, which most starts do not need
+HEAD = "0003"  # known without importing Alembic, which most starts do not need
+RESTORE = "somebody has changed the database by hand; restore it from a copy"
 LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
 
 
 def upgrade(connection: Connection, where: str) -> None:
     """Bring the layout up to date within the connection's transaction.
 
-    Raises BadRegistry where it is of a newer workbench, or the database holds something else.
+    Raises BadRegistry where it is of a newer workbench or damaged, or the database holds something
+    else.
     """
-    if revision(connection) == HEAD:
+    if revision(connection, where) == HEAD:
+        _refuse_damaged(connection, where)
         return
     if connection.dialect.name == "postgresql":
         connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LOCK})
-    found = revision(connection)
+    found = revision(connection, where)
     if found == HEAD:
         return
     if found is None:
@@ -32,12 +35,39 @@ def upgrade(connection: Connection, where: str) -> None:
     _run(connection, where, found)
 
 
-def revision(connection: Connection) -> str | None:
-    """The layout's revision; None where there is none yet."""
+def revision(connection: Connection, where: str) -> str | None:
+    """The layout's revision; None where there is none yet. Raises BadRegistry where it has two."""
     if not inspect(connection).has_table("alembic_version"):
         return None
-    found = connection.execute(text("SELECT version_num FROM alembic_version")).scalar()
-    return None if found is None else str(found)
+    found = connection.execute(text("SELECT version_num FROM alembic_version")).scalars().all()
+    if len(found) > 1:
+        raise BadRegistry(
+            f"registry {where}: names {len(found)} layouts ({', '.join(sorted(found))}), one"
+            f" needed; {RESTORE}"
+        )
+    return str(found[0]) if found else None
+
+
+def _refuse_damaged(connection: Connection, where: str) -> None:
+    """Raises BadRegistry where a table or one of the triggers that keep them is gone."""
+    tables = set(inspect(connection).get_table_names())
+    lost = sorted(set(Base.metadata.tables) - tables)
+    if lost:
+        raise BadRegistry(f"registry {where}: its table {lost[0]!r} is gone; {RESTORE}")
+    sqlite = connection.dialect.name == "sqlite"
+    query = (
+        "SELECT DISTINCT tbl_name FROM sqlite_master WHERE type = 'trigger'"
+        if sqlite
+        else "SELECT DISTINCT c.relname FROM pg_trigger t JOIN pg_class c ON c.oid = t.tgrelid"
+        " WHERE NOT t.tgisinternal AND pg_table_is_visible(c.oid)"
+    )
+    kept = set(connection.execute(text(query)).scalars())
+    open_to_change = sorted({*APPEND_ONLY, "in_force"} - kept)
+    if open_to_change:
+        raise BadRegistry(
+            f"registry {where}: nothing keeps its table {open_to_change[0]!r} from being changed"
+            f" any more; {RESTORE}"
+        )
 
 
 def config() -> "Config":

@@ -9,6 +9,7 @@ back finds another's token, and its result is dropped.
 import json
 import secrets
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from datetime import datetime, timedelta
 from typing import Any
 
@@ -18,12 +19,16 @@ from sqlalchemy.orm import Session
 from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
     add_version,
     decide,
     judged_now,
     lock_machine,
+    logs_behind,
     need_machine,
+    plain,
+    seen,
     turn,
     version_in_force,
 )
@@ -31,7 +36,6 @@ from workbench.registry.tables import (
     AttemptRow,
     ClaimRow,
     LogRow,
-    NoticeRow,
     OutcomeRow,
     ReopeningRow,
     VersionRow,
@@ -43,11 +47,13 @@ from workbench.registry.values import (
     Judgement,
     Outcome,
     SeenLog,
-    Verdict,
     Version,
 )
 
 OFTEN = 5
+OLDER = "older_than"  # key of the evidence that names the newer log behind the model in force
+APART = timedelta(minutes=1)  # by which the clocks of workers may differ
+SHORTEST = 4  # characters of a fingerprint by which a log may be named
 
 
 class Queue:
@@ -79,23 +85,29 @@ class Queue:
             return len(new)
 
     def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
-        """The machine for this worker until the lease ends; None while another has it."""
+        """The machine for this worker until the lease ends; None while another has it.
+
+        A lease that ends later than any clock about as fast as this one could have set it is
+        not waited for: should its worker live on, its result is dropped and made again.
+        """
         with self._database.writing() as session:
             lock_machine(session, machine, now)
             row = session.get(ClaimRow, machine)
-            if row is not None and row.until > now:
+            if row is not None and row.until > now and not _too_late(row, now):
                 return None
             found = Claim(machine, secrets.token_hex(16), owner, now + lease)
             if row is None:
-                session.add(ClaimRow(**vars(found)))
-            else:
-                row.token, row.owner, row.until = found.token, owner, found.until
+                row = ClaimRow(machine=machine)
+                session.add(row)
+            row.token, row.owner, row.until = found.token, owner, found.until
+            row.lease_ms = _milliseconds(lease)
             return found
 
     def renew(self, claim: Claim, *, lease: timedelta, now: datetime) -> None:
         """Lengthen the lease; raises LostClaim where another has taken over."""
         with self._database.writing() as session:
-            _hold(session, claim, now).until = now + lease
+            row = _hold(session, claim, now)
+            row.until, row.lease_ms = now + lease, _milliseconds(lease)
 
     def release(self, claim: Claim) -> None:
         """Give the machine back; nothing where another has taken over."""
@@ -105,6 +117,13 @@ class Queue:
                     ClaimRow.machine == claim.machine, ClaimRow.token == claim.token
                 )
             )
+
+    def newer_behind(
+        self, machine: str, log: SeenLog, order: Order = "time-or-name"
+    ) -> SeenLog | None:
+        """Of the logs behind the machine's models, the newest that `log` is older than; or None."""
+        with self._database.reading() as session:
+            return _newer(session, machine, log, order)
 
     def waiting(self, machine: str) -> tuple[tuple[SeenLog, int], ...]:
         """Logs without a result and how often each was begun; oldest first.
@@ -123,7 +142,7 @@ class Queue:
             .order_by(LogRow.mtime_ns, LogRow.file, LogRow.id)
         )
         with self._database.reading() as session:
-            found = [(_seen(row), int(count)) for row, count in session.execute(query)]
+            found = [(seen(row), int(count)) for row, count in session.execute(query)]
         return tuple(sorted(found, key=lambda entry: max(entry[1] - OFTEN + 1, 0)))
 
     def begin(self, claim: Claim, log: SeenLog, *, now: datetime) -> None:
@@ -142,12 +161,20 @@ class Queue:
             )
 
     def finish(
-        self, claim: Claim, log: SeenLog, judgement: Judgement, *, by: str, now: datetime
+        self,
+        claim: Claim,
+        log: SeenLog,
+        judgement: Judgement,
+        *,
+        by: str,
+        now: datetime,
+        order: Order = "time-or-name",
     ) -> Outcome:
         """Record a log's result, with its candidate and the decision on it, all or nothing.
 
-        A second call with the same claim gives the first's: a commit may have been kept although
-        its answer was lost. Raises LostClaim where another has taken over.
+        What an older log than one behind the model in force has led to is recorded and not put
+        in force. A second call with the same claim gives the first's: a commit may have been kept
+        although its answer was lost. Raises LostClaim where another has taken over.
         """
         with self._database.writing() as session:
             lock_machine(session, claim.machine, now)
@@ -158,6 +185,9 @@ class Queue:
                 return _outcome(session, row, done)
             _hold(session, claim, now)
             current = version_in_force(session, claim.machine)
+            newer = _newer(session, claim.machine, log, order)
+            if newer is not None:
+                judgement = _of_older(judgement, log, newer)
             for kind, candidate, reason in _decided(judgement):
                 version, _ = add_version(session, claim.machine, candidate, now)
                 decide(
@@ -175,7 +205,7 @@ class Queue:
                 turn=now_turn,
                 version_id=None if current is None else current.id,
                 verdict=judgement.verdict,
-                reason=judgement.reason,
+                reason=plain(judgement.reason),
                 evidence=dumps(judgement.evidence),
                 token=claim.token,
                 at=now,
@@ -199,19 +229,17 @@ class Queue:
             judged = [(row, done.verdict) for row, done in found]
             chosen = [row for row, verdict in judged if not logs and verdict == "set_aside"]
             for name in dict.fromkeys(logs):
-                own = [r for r, _ in judged if r.file == name or r.sha256.startswith(name)]
-                if not own:
-                    raise BadRegistry(
-                        f"{machine}: no log {name!r} with a result; 'workbench registry show"
-                        f" {machine}' names them"
-                    )
+                own = _named(machine, name, [row for row, _ in judged])
                 chosen += [row for row in own if row not in chosen]
             for row in chosen:
                 session.add(ReopeningRow(log_id=row.id, reason=reason, made_by=by, at=now))
             return tuple(row.file for row in chosen)
 
     def last_evidence(self, version: Version) -> dict[str, Any] | None:
-        """Evidence of the latest result against this version; None where there is none yet."""
+        """Evidence of the latest result against this version; None where there is none yet.
+
+        That of a log older than the version's own is left out: it tells of the machine before.
+        """
         query = (
             select(OutcomeRow.evidence)
             .join(VersionRow, VersionRow.id == OutcomeRow.version_id)
@@ -221,14 +249,13 @@ class Queue:
                 OutcomeRow.verdict != "set_aside",
             )
             .order_by(OutcomeRow.at.desc(), OutcomeRow.log_id.desc())
-            .limit(1)
         )
         with self._database.reading() as session:
-            text = session.scalar(query)
-        if text is None:
-            return None
-        found: dict[str, Any] = json.loads(text)
-        return found
+            for text in session.scalars(query):
+                found: dict[str, Any] = json.loads(text)
+                if OLDER not in found:
+                    return found
+        return None
 
     def outcomes(self, machine: str) -> tuple[Outcome, ...]:
         """Results of a machine's logs, in the order of their files."""
@@ -241,31 +268,6 @@ class Queue:
         with self._database.reading() as session:
             return tuple(_outcome(session, row, done) for row, done in session.execute(query))
 
-    def unsent(self, verdicts: Sequence[Verdict], *, since: datetime) -> tuple[Outcome, ...]:
-        """Results of these verdicts from `since` on that no webhook has taken, oldest first."""
-        told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
-        query = (
-            select(LogRow, OutcomeRow)
-            .join(OutcomeRow, OutcomeRow.log_id == LogRow.id)
-            .outerjoin(NoticeRow, told)
-            .where(
-                OutcomeRow.verdict.in_(verdicts),
-                OutcomeRow.at >= since,
-                NoticeRow.log_id.is_(None),
-            )
-            .order_by(OutcomeRow.at, LogRow.id)
-        )
-        with self._database.reading() as session:
-            return tuple(_outcome(session, row, done) for row, done in session.execute(query))
-
-    def sent(self, outcome: Outcome, *, now: datetime) -> None:
-        """Note that a webhook has taken the alarm; nothing where it is noted already."""
-        with self._database.writing() as session:
-            lock_machine(session, outcome.machine, now)
-            row = _log(session, outcome.machine, outcome.log)
-            if session.get(NoticeRow, (row.id, outcome.turn)) is None:
-                session.add(NoticeRow(log_id=row.id, turn=outcome.turn, at=now))
-
     def verdicts(self) -> dict[tuple[str, str], int]:
         """How many logs have each verdict, by machine and verdict."""
         query = (
@@ -277,6 +279,49 @@ class Queue:
             return {(name, verdict): count for name, verdict, count in session.execute(query)}
 
 
+def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLog | None:
+    """As `Queue.newer_behind`; a name that the machine has used before tells no order."""
+    query = select(func.count(LogRow.id)).where(
+        LogRow.machine == machine, LogRow.file == log.file, LogRow.sha256 != log.sha256
+    )
+    used_before = bool(session.scalar(query))
+    behind = logs_behind(session, machine)
+    return newest_of_later(log, behind, "time" if used_before else order)
+
+
+def _of_older(judgement: Judgement, log: SeenLog, newer: SeenLog) -> Judgement:
+    """The judgement of a log older than `newer`, from which a model comes: nothing is promoted."""
+    promoted = judgement.verdict == "promoted"
+    so = "not put in force: " if promoted else ""
+    said = f"{so}{log.file} is older than {newer.file}, from which a later model comes"
+    return replace(
+        judgement,
+        verdict="refused" if promoted else judgement.verdict,
+        reason=f"{judgement.reason}; {said}",
+        evidence={**judgement.evidence, OLDER: {"file": newer.file, "sha256": newer.sha256}},
+    )
+
+
+def _named(machine: str, name: str, rows: Sequence[LogRow]) -> list[LogRow]:
+    """The logs of that file name, or the one whose fingerprint begins so; raises BadRegistry."""
+    own = [row for row in rows if row.file == name]
+    if own or len(name) < SHORTEST:
+        found = own
+    else:
+        found = [row for row in rows if row.sha256.startswith(name)]
+        if len(found) > 1:
+            raise BadRegistry(
+                f"{machine}: {len(found)} logs have a fingerprint that begins with {name!r}; give"
+                " more of it, or the file's name"
+            )
+    if not found:
+        raise BadRegistry(
+            f"{machine}: no log {name!r} with a result; give a file's name or at least {SHORTEST}"
+            f" characters of a fingerprint, as 'workbench registry show {machine}' has them"
+        )
+    return found
+
+
 def _decided(judgement: Judgement) -> Iterator[tuple[DecisionKind, Candidate, str]]:
     """The decisions that a judgement means, the one that may move the pointer last."""
     if judgement.rival is not None:
@@ -284,6 +329,17 @@ def _decided(judgement: Judgement) -> Iterator[tuple[DecisionKind, Candidate, st
     if judgement.candidate is not None:
         kind: DecisionKind = "promoted" if judgement.verdict == "promoted" else "refused"
         yield kind, judgement.candidate, judgement.reason
+
+
+def _too_late(row: ClaimRow, now: datetime) -> bool:
+    """Whether the claim was made by a clock that is ahead of this one by more than they may be."""
+    if row.lease_ms is None:
+        return False
+    return row.until > now + timedelta(milliseconds=row.lease_ms) + APART
+
+
+def _milliseconds(lease: timedelta) -> int:
+    return round(lease.total_seconds() * 1e3)
 
 
 def _hold(session: Session, claim: Claim, now: datetime) -> ClaimRow:
@@ -323,16 +379,12 @@ def _log_row(machine: str, log: SeenLog, now: datetime) -> LogRow:
     )
 
 
-def _seen(row: LogRow) -> SeenLog:
-    return SeenLog(row.sha256, row.file, row.size, row.mtime_ns)
-
-
 def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> Outcome:
     number = select(VersionRow.number).where(VersionRow.id == row.version_id)
     verdict: Any = row.verdict
     return Outcome(
         machine=log.machine,
-        log=_seen(log),
+        log=seen(log),
         verdict=verdict,
         reason=row.reason,
         number=None if row.version_id is None else session.scalar(number),

@@ -5,7 +5,7 @@ import json
 from datetime import datetime
 from typing import Any
 
-from sqlalchemy import ColumnElement, and_, func, select
+from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session, aliased
 
@@ -21,7 +21,15 @@ from workbench.registry.tables import (
     ReopeningRow,
     VersionRow,
 )
-from workbench.registry.values import Candidate, Decision, DecisionKind, Document, Kind, Version
+from workbench.registry.values import (
+    Candidate,
+    Decision,
+    DecisionKind,
+    Document,
+    Kind,
+    SeenLog,
+    Version,
+)
 
 
 def lock_machine(session: Session, name: str, now: datetime) -> None:
@@ -118,7 +126,7 @@ def decide(
         kind=kind,
         version_id=version.id,
         log_id=log_id,
-        reason=reason,
+        reason=plain(reason),
         evidence=dumps(evidence or {}),
         made_by=by,
         at=now,
@@ -171,6 +179,39 @@ def version_in_force(session: Session, machine: str) -> VersionRow | None:
     """The row of the version in force."""
     pointer = session.get(InForceRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
+
+
+def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
+    """The logs from which the version in force comes, and those that have put another in force.
+
+    The latter count after a rollback too: what a person took back was still seen on a later log.
+    """
+    promoted = (
+        select(DecisionRow.log_id)
+        .where(DecisionRow.machine == machine, DecisionRow.kind == "promoted")
+        .where(DecisionRow.log_id.is_not(None))
+    )
+    fitted: list[str] = []
+    current = version_in_force(session, machine)
+    if current is not None:
+        model = json.loads(session.get_one(RecordRow, current.model_id).document)
+        fitted = [str(entry.get("sha256")) for entry in model.get("log", ())]
+    rows = session.scalars(
+        select(LogRow).where(
+            LogRow.machine == machine, or_(LogRow.id.in_(promoted), LogRow.sha256.in_(fitted))
+        )
+    )
+    return tuple(seen(row) for row in rows)
+
+
+def seen(row: LogRow) -> SeenLog:
+    """The log file as it was found."""
+    return SeenLog(row.sha256, row.file, row.size, row.mtime_ns)
+
+
+def plain(text: str) -> str:
+    """The text as every database takes it: no lone surrogates of odd file names, and no NUL."""
+    return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode("utf-8")
 
 
 def version_values(session: Session, *where: ColumnElement[bool]) -> dict[int, Version]:

@@ -1,4 +1,4 @@
-"""Tables of the registry. All but `in_force` and `claim` are append-only, held by triggers."""
+"""Tables of the registry. All but `in_force`, `claim` and `outbox` are append-only, by triggers."""
 
 from datetime import UTC, datetime
 
@@ -162,6 +162,7 @@ class ClaimRow(Base):
     token: Mapped[str]
     owner: Mapped[str]
     until: Mapped[datetime]
+    lease_ms: Mapped[int | None] = mapped_column(BigInteger)
 
 
 class ReopeningRow(Base):
@@ -214,4 +215,20 @@ class NoticeRow(Base):
     log_id: Mapped[int] = mapped_column(primary_key=True)
     turn: Mapped[int] = mapped_column(primary_key=True)
     at: Mapped[datetime]
+    __table_args__ = (ForeignKeyConstraint(["log_id", "turn"], ["outcome.log_id", "outcome.turn"]),)
+
+
+class OutboxRow(Base):
+    """An alarm that the webhook has not taken yet: refused how often, and when it is tried next.
+
+    next_at lies ahead too while a worker has it in hand; given_up_at: it is not tried any more.
+    """
+
+    __tablename__ = "outbox"
+    log_id: Mapped[int] = mapped_column(primary_key=True)
+    turn: Mapped[int] = mapped_column(primary_key=True)
+    refusals: Mapped[int]
+    next_at: Mapped[datetime]
+    tried_at: Mapped[datetime | None]
+    given_up_at: Mapped[datetime | None]
     __table_args__ = (ForeignKeyConstraint(["log_id", "turn"], ["outcome.log_id", "outcome.turn"]),)

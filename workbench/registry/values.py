@@ -85,6 +85,24 @@ class Outcome:
 
 
 @dataclass(frozen=True)
+class Alarm:
+    """What a webhook is told of one log; version: the number in force against which it was judged.
+
+    log_id, turn: its place in the registry; turn is how often the log had been reopened before.
+    """
+
+    log_id: int
+    turn: int
+    machine: str
+    log: str
+    sha256: str
+    verdict: str
+    reason: str
+    version: int | None
+    at: datetime
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A model with its design and validation, as documents, that a log has led to."""
 

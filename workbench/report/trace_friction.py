@@ -41,7 +41,7 @@ def friction_before_after(traced: Traced) -> Section:
     """
     found, model = traced.trace, traced.model
     units, after = shown(model.rotary), model.karnopp
-    speeds = [a for a in model.acting if a.effect.acts == "slip" and a.effect.depends_on == ("v",)]
+    speeds = [a for a in model.acting if a.effect.place.rubs and a.effect.depends_on == ("v",)]
     curves = _curves(found, after, speeds)
     source = traced.test[0] if _drifted(found) and traced.test else traced.train[0]
     data = friction_data(model, source.log)

@@ -48,7 +48,6 @@ SIGNALS = {
     "du": "rate of the command [V/s]",
 }
 # Sign with which an effect enters the residual; 0: that of the motion.
-SIGNED = {"slip": 0.0, "friction": 0.0, "force": -1.0, "actuator": 1.0}
 GAP = 0.2  # of a signal's range, over which a running median is not drawn
 EQUATIONS = {
     "mechanical": "equation of motion",
@@ -77,9 +76,9 @@ class Picture:
 
 def in_equation(effect: Effect) -> Equation | None:
     """The equation in whose residual an effect shows; None where in neither while sliding."""
-    if effect.acts in ("actuator", "command", "delay"):
+    if effect.place.in_actuator:
         return "actuator"
-    return None if effect.acts == "stiction" else "mechanical"
+    return None if effect.place.in_stops else "mechanical"
 
 
 def pictures(found: Trace) -> list[Picture]:
@@ -122,14 +121,14 @@ def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> P
 def along_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | None:
     """What an effect contributes at each row, (r,); None where it is no function of the signals."""
     effect = acting.effect
-    if effect.acts not in SIGNED or effect.evolve is not None or "v" not in residual.signals:
+    if effect.place.sign is None or effect.evolve is not None or "v" not in residual.signals:
         return None
     blank = np.zeros(len(residual.t) + 1)  # a first row at t = 0, from which kernels count
     rows = {k: np.concatenate([[0.0], x]) for k, x in residual.signals.items()}
     signals = {"t": blank, "y": blank, "F": blank, "u": blank, **rows}
     signals["d"] = np.sign(signals["v"])
     value = contribution(effect, acting.values, signals, 1e-3, p)[1:]
-    sign = SIGNED[effect.acts]
+    sign = effect.place.sign
     return np.asarray(value * (signals["d"][1:] if sign == 0.0 else sign))
 
 
@@ -178,7 +177,7 @@ def _in_noise(residual: Residual) -> float:
 def signal_of(effect: Effect, residual: Residual) -> str:
     """The signal against which an effect shows."""
     wanted = [*effect.depends_on, "v", "y"]
-    for name in ["du", *wanted] if effect.acts == "delay" else wanted:
+    for name in ["du", *wanted] if effect.place.delays else wanted:
         if name in residual.signals:
             return name
     return next(iter(residual.signals))

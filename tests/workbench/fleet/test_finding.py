@@ -91,6 +91,15 @@ def test_a_place_without_logs_is_refused(folder: Path, url: str, line: str) -> N
     assert "\n" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "url", ["ftp://me:geheim@127.0.0.1:9/x", "nonsense://me:geheim@h/x?token=geheim", "  "]
+)
+def test_what_is_secret_in_a_url_is_not_shown(url: str) -> None:
+    with pytest.raises(BadLogs, match=r"cannot be opened|is empty") as caught:
+        find_logs(url)
+    assert "geheim" not in str(caught.value)
+
+
 def test_a_log_that_has_gone_is_told(folder: Path) -> None:
     memory = fsspec.filesystem("memory")
     memory.pipe("/gone/a/1.parquet", b"x")

@@ -235,3 +235,14 @@ def test_a_scheduler_without_workers_is_refused() -> None:
         cluster_at(empty.scheduler_address, 0.5),
     ):
         pass
+
+
+@pytest.mark.parametrize(
+    "address",
+    ["", "tcp://", "tcp://host:port", "tcp://[::1", "nonsense://h:1", "tcp://h:99999",
+     f"tcp://{'a' * 300}:1", "tls://me:geheim@127.0.0.1:9", "http://me:geheim@h:9/?token=geheim"],
+)  # fmt: skip
+def test_an_address_that_is_none(address: str) -> None:
+    with pytest.raises(BadCluster, match="no address of a scheduler") as caught:
+        cluster_at(address, 0.1).__enter__()
+    assert "geheim" not in str(caught.value)

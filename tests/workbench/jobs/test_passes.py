@@ -13,7 +13,7 @@ from identification.errors import BadCard, BadLog, NotIdentifiable
 from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from tests.workbench.registry.postgres import Server
-from workbench.jobs.lease import Patience
+from workbench.jobs.lease import Patience, shared_clock
 from workbench.jobs.passes import Judge, Pass, PassReport, Task
 from workbench.jobs.scan import BadRoot, open_for_writing
 from workbench.registry.errors import RegistryAway
@@ -181,6 +181,96 @@ def test_one_machine_that_fails_does_not_stop_others(
     }
     assert [o.machine for o in done.outcomes] == ["c"]
     assert [o.machine for o in run().outcomes] == ["a", "b"]  # nothing was lost
+
+
+def test_a_fault_of_ours_on_one_machine_does_not_stop_others(
+    run: Run, registry: Registry, root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    in_force(registry, "a", "b")
+    for name in "ab":
+        machine(root, name, {"1.csv": f"quiet {name}"})
+    announce = Queue.announce
+
+    def failing(queue: Queue, name: str, *given: Any, **more: Any) -> int:
+        if name == "a":
+            raise ZeroDivisionError("of ours")
+        return announce(queue, name, *given, **more)
+
+    monkeypatch.setattr(Queue, "announce", failing)
+    told: list[tuple[str, Any]] = []
+    done = run(report=lambda event, **more: told.append((event, more.get("traceback"))))
+    assert dict(done.failed) == {"a": "fault of ours: ZeroDivisionError: of ours"}
+    assert [o.machine for o in done.outcomes] == ["b"]
+    (trace,) = (shown for event, shown in told if event == "fault_of_ours")
+    assert "Traceback" in trace and "of ours" in trace
+
+
+def odd(folder: Path) -> Path:
+    """A file name in the folder that is not UTF-8."""
+    return Path(os.fsdecode(os.fsencode(folder) + b"/caf\xe9.csv"))
+
+
+def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a", "z")
+    logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "quiet 2"})
+    odd(logs).write_text("bad", encoding="utf-8")
+    machine(root, os.fsdecode(b"caf\xe9"), {"1.csv": "drift"})
+    machine(root, "z", {"1.csv": "drift"})
+    done = run()
+    assert [(o.machine, o.log.file, o.verdict) for o in done.outcomes] == [
+        ("a", "1.csv", "none"),
+        ("a", "2.csv", "none"),
+        ("a", "caf\\xe9.csv", "set_aside"),
+        ("z", "1.csv", "promoted"),
+    ]
+    assert dict(done.failed) == {
+        "caf\\xe9": "caf\\xe9: the folder's name is not UTF-8; rename the folder"
+    }
+    assert run().outcomes == ()
+
+
+def test_a_marker_tells_that_a_writer_has_finished(
+    run: Run, registry: Registry, root: Path
+) -> None:
+    in_force(registry, "a")
+    logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "quiet 2"})
+    (logs / "2.csv.done").touch()
+    done = run(marker=".done")
+    assert (verdicts(done), done.growing) == ({"2.csv": "none"}, 1)
+    (logs / "1.csv").write_text("quiet, and all of it", encoding="utf-8")
+    (logs / "1.csv.done").touch()
+    assert verdicts(run(marker=".done")) == {"1.csv": "none"}
+
+
+def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, root: Path) -> None:
+    in_force(registry, "a")
+    machine(root, "a", {"log5.csv": "drift 5"})
+    assert verdicts(run()) == {"log5.csv": "promoted"}
+    machine(root, "a", {"log0.csv": "drift 0"})
+    seen: list[Any] = []
+
+    def judging(task: Task) -> Judgement:
+        seen.append(task.previous)
+        return judge(task)
+
+    (outcome,) = run(judging).outcomes
+    assert (outcome.verdict, seen) == ("refused", [None])
+    assert "not put in force: log0.csv is older than log5.csv" in outcome.reason
+    current = registry.in_force("a")
+    assert current is not None and current.number == 2
+    machine(root, "a", {"log6.csv": "drift 6"})
+    assert verdicts(run()) == {"log6.csv": "promoted"}
+
+
+def test_the_clock_is_the_databases_where_it_has_one(registry: Registry) -> None:
+    def fast() -> datetime:
+        return clock() + timedelta(hours=3)
+
+    ahead = shared_clock(registry.database, fast)() - clock()
+    if registry.database.dialect == "postgresql":
+        assert abs(ahead) < timedelta(minutes=5)
+    else:
+        assert ahead > timedelta(hours=2)
 
 
 def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Path) -> None:

@@ -1,6 +1,7 @@
 """Watching: a first pass at once, then by schedule and by files, one at a time, until stopped."""
 
 import json
+import os
 import signal
 import subprocess
 import sys
@@ -17,7 +18,8 @@ import pytest
 from watchfiles import Change
 
 from tests.workbench.jobs.machines import in_force, machine
-from tests.workbench.jobs.worker import clock
+from tests.workbench.jobs.worker import clock, ignore
+from workbench.jobs.passes import Report
 from workbench.jobs.watching import BadSchedule, of_log, watch_machines
 from workbench.registry.store import Registry
 
@@ -34,10 +36,13 @@ def until(reached: Callable[[], bool]) -> None:
 
 
 @contextmanager
-def watching(root: Path, once: Callable[[], bool], cron: str = NEVER) -> Iterator[None]:
+def watching(
+    root: Path, once: Callable[[], bool], report: Report = ignore, **changes: object
+) -> Iterator[None]:
     """Watching in a thread; the block may change files."""
     stop = threading.Event()
-    how = {"cron": cron, "settle": timedelta(0), "clock": clock, "stop": stop}
+    how = {"cron": NEVER, "settle": timedelta(0), "clock": clock, "stop": stop, "report": report}
+    how |= changes
     thread = threading.Thread(target=watch_machines, args=(root, once), kwargs=how)
     thread.start()
     try:
@@ -113,11 +118,55 @@ def test_passes_never_overlap(tmp_path: Path) -> None:
     assert most == 1
 
 
+def test_what_the_watcher_dies_of_is_told_and_it_goes_on(tmp_path: Path) -> None:
+    logs = machine(tmp_path, "a", {})
+    passes: list[int] = []
+    told: list[str] = []
+
+    def once() -> bool:
+        passes.append(len(list(logs.iterdir())))
+        return False
+
+    def one_more() -> bool:
+        (logs / f"{time.monotonic_ns()}.csv").write_text("quiet", encoding="utf-8")
+        return len(passes) >= 4
+
+    with watching(tmp_path, once, lambda event, **_: told.append(event)):
+        until(lambda: len(passes) == 1)
+        until(lambda: "watcher_failed" in told or not write_odd(logs))
+        until(one_more)
+    assert set(told) == {"watcher_failed"}
+
+
+def write_odd(logs: Path) -> bool:
+    """Writes files whose names are not UTF-8, on which the watcher's library fails."""
+    odd = os.fsencode(logs) + b"/%d\xe9.csv" % time.monotonic_ns()
+    Path(os.fsdecode(odd)).write_text("quiet", encoding="utf-8")
+    return True
+
+
+def test_a_marker_brings_a_pass(tmp_path: Path) -> None:
+    logs = machine(tmp_path, "a", {"1.csv": "quiet"})
+    passes: list[int] = []
+
+    def once() -> bool:
+        passes.append(1)
+        return False
+
+    def marked() -> bool:
+        (logs / f"{time.monotonic_ns()}.csv.done").touch()
+        return len(passes) >= 2
+
+    with watching(tmp_path, once, marker=".done"):
+        until(lambda: len(passes) == 1)
+        until(marked)
+
+
 def test_a_schedule_that_is_none(tmp_path: Path) -> None:
     with pytest.raises(BadSchedule, match="five fields needed"):
         watch_machines(
             tmp_path, lambda: False, cron="every day", settle=timedelta(0),
-            clock=lambda: datetime.now(UTC), stop=threading.Event(),
+            clock=lambda: datetime.now(UTC), stop=threading.Event(), report=ignore,
         )  # fmt: skip
 
 

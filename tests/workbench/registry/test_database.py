@@ -35,6 +35,17 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
     assert ScriptDirectory.from_config(config()).get_current_head() == HEAD
 
 
+def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> None:
+    with Registry(where) as registry:
+        registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
+        with registry.database.writing() as session:
+            session.execute(text("DROP TABLE outbox"))
+            session.execute(text("UPDATE alembic_version SET version_num = '0002'"))
+    with Registry(where) as registry:
+        test_steps_and_tables_agree(registry)
+        assert [v.number for v in registry.versions("a")] == [1]
+
+
 def test_a_newer_layout_is_refused(where: str) -> None:
     with Registry(where) as registry, registry.database.writing() as session:
         session.execute(text("UPDATE alembic_version SET version_num = '9999'"))
@@ -49,6 +60,39 @@ def test_a_table_of_something_else_is_left_alone(tmp_path: Path) -> None:
     other.close()
     with pytest.raises(BadRegistry, match="holds a table 'log' of something else"):
         Registry(str(path))
+
+
+def test_an_empty_file_is_no_new_registry(tmp_path: Path) -> None:
+    path = tmp_path / "r.db"
+    path.touch()
+    for create in (True, False):
+        with pytest.raises(BadRegistry, match=r"is empty \(0 bytes\).*restore it"):
+            Registry(str(path), create=create)
+    assert path.stat().st_size == 0
+    path.unlink()
+    Registry(str(path)).close()
+    assert [one.name for one in tmp_path.iterdir()] == ["r.db"]
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("INSERT INTO alembic_version VALUES ('0001')", "names 2 layouts"),
+        ("DROP TABLE notice", "its table 'notice' is gone"),
+        ("DROP TRIGGER {outcome}", "nothing keeps its table 'outcome'"),
+    ],
+)
+def test_a_database_changed_by_hand_is_refused(where: str, change: str, said: str) -> None:
+    with Registry(where) as registry, registry.database.writing() as session:
+        if "TRIGGER" not in change:
+            session.execute(text(change))
+        elif registry.database.dialect == "sqlite":
+            for event in ("update", "delete", "replace"):
+                session.execute(text(change.format(outcome=f"outcome_{event}")))
+        else:
+            session.execute(text(change.format(outcome="outcome_append_only ON outcome")))
+    with pytest.raises(BadRegistry, match=said):
+        Registry(where)
 
 
 def many(where: str, who: int) -> None:
@@ -97,9 +141,38 @@ def test_a_server_that_is_away_says_so_and_is_used_when_back(postgres: Server) -
 
 def test_passwords_are_not_shown() -> None:
     with pytest.raises(RegistryAway) as caught:
-        Registry("postgresql://me:secret@127.0.0.1:9/none")
+        Registry("postgresql://me:secret@127.0.0.1:9/none?password=secret&sslkey=secret")
     assert "secret" not in str(caught.value)
     assert "127.0.0.1" in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    "url",
+    [
+        "postgresql://me:secret@host:port/x",
+        "postgresql://[::1",
+        "postgresql://me:secret@h:99999/x",
+        "postgresql://me:secret@h:-1/x",
+        f"postgresql://me:secret@{300 * 'a'}/x",
+        f"postgresql://me:secret@/x?host={300 * 'a'}",
+        "postgresql://me:secret@a..b/x",
+        "postgresql://me:secret@h\u00f6 st/x",
+        "postgresql://me:secret@h\0/x",
+        "postgresql://me:secret%00@h/x",
+        "postgresql://me:p@secret@127.0.0.1:9/x",
+        "postgresql://me:secret@h/x?port=abc",
+        "postgresql://me:secret@h/x?host=a&host=b&port=1",
+        "postgresql://me:a@127.0.0.1:9/x?nonsense=secret",
+        "postgresql:/me:secret@h/x",
+        "host=h password=secret",
+        "mysql://me:secret@h/x",
+    ],
+)
+def test_a_url_that_is_none_is_one_line_without_its_password(url: str) -> None:
+    with pytest.raises(BadRegistry, match="registry") as caught:
+        Registry(url)
+    said = str(caught.value)
+    assert "secret" not in said and "\n" not in said and len(said) < 200
 
 
 def test_places_that_cannot_be_are_refused(tmp_path: Path) -> None:

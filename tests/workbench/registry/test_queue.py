@@ -1,11 +1,12 @@
 """One result a log: claims, leases that end, results that come twice or too late."""
 
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 
 import pytest
 
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.queue import OFTEN, Queue
+from workbench.registry.queue import OFTEN, OLDER, Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Claim, Judgement, SeenLog
 
@@ -139,13 +140,100 @@ def test_a_log_reopened_is_judged_once_more(queue: Queue, registry: Registry) ->
         queue.reopen("m", ["b.csv"], reason="r", by="t", now=NOW)
 
 
-def test_alarms_are_kept_until_they_are_taken(queue: Queue) -> None:
+NEWER = SeenLog("c" * 64, "run7.csv", 30, 500)
+LATE = SeenLog("d" * 64, "run3.csv", 40, 400)
+COPIED = SeenLog("e" * 64, "run4.csv", 40, 900)
+
+
+def test_an_older_log_changes_nothing_in_force(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
-    done = queue.finish(claim, LOG, Judgement("set_aside", "bad"), by="w", now=NOW)
+    queue.announce("m", [NEWER, LATE, COPIED], now=NOW)
+    assert queue.finish(claim, NEWER, DRIFT, by="w", now=NOW).verdict == "promoted"
+    for number, late in enumerate((LATE, COPIED), 3):
+        assert queue.newer_behind("m", late) == NEWER
+        other = Candidate({"m": float(number)})
+        done = queue.finish(claim, late, replace(DRIFT, candidate=other), by="w", now=NOW)
+        assert done.verdict == "refused"
+        assert f"{late.file} is older than run7.csv" in done.reason
+        assert done.evidence == {"p": 0.01, OLDER: {"file": "run7.csv", "sha256": NEWER.sha256}}
+        last = registry.decisions("m")[-1]
+        assert (last.kind, last.number) == ("refused", number)
+    assert registry.machine("m").in_force == registry.version("m", 2)
+    quiet = queue.finish(claim, LOG, Judgement("none", "quiet"), by="w", now=NOW)
+    assert (quiet.verdict, quiet.number) == ("none", 2)
+    assert quiet.reason.startswith("quiet; a.csv is older than run7.csv")
+    assert queue.last_evidence(registry.version("m", 2)) is None  # they tell of another machine
+
+
+def test_by_time_alone_where_numbers_begin_again(queue: Queue, registry: Registry) -> None:
+    claim = claimed(queue)
+    queue.announce("m", [NEWER, COPIED], now=NOW)
+    queue.finish(claim, NEWER, DRIFT, by="w", now=NOW)
+    assert queue.newer_behind("m", COPIED, "time") is None
+    done = queue.finish(claim, COPIED, DRIFT, by="w", now=NOW, order="time")
+    assert done.verdict == "promoted"
+
+
+def test_a_name_used_again_tells_no_order(queue: Queue) -> None:
+    claim = claimed(queue)
+    before = SeenLog("f" * 64, "run4.csv", 1, 10)
+    queue.announce("m", [before, NEWER, COPIED], now=NOW)
+    queue.finish(claim, NEWER, DRIFT, by="w", now=NOW)
+    assert queue.newer_behind("m", COPIED) is None
+    assert queue.finish(claim, COPIED, DRIFT, by="w", now=NOW).verdict == "promoted"
+
+
+def test_a_log_older_than_those_of_a_model_added_by_hand(queue: Queue, registry: Registry) -> None:
+    queue.announce("m", [NEWER, LATE], now=NOW)
+    made = Candidate({"m": 3.0, "log": [{"sha256": NEWER.sha256}]})
+    number = registry.add("m", made, reason="by hand", by="t", now=NOW).number
+    assert queue.finish(claimed(queue), LATE, DRIFT, by="w", now=NOW).verdict == "promoted"
+    registry.promote("m", number, reason="by hand", by="t", now=NOW)
+    claim = claimed(queue, "x", NOW + 2 * LEASE)
+    assert queue.finish(claim, LOG, DRIFT, by="w", now=NOW).verdict == "refused"
+    assert queue.newer_behind("m", LATE) == NEWER
+
+
+def test_what_was_promoted_counts_after_a_rollback_too(queue: Queue, registry: Registry) -> None:
+    claim = claimed(queue)
+    queue.announce("m", [NEWER, LATE], now=NOW)
+    queue.finish(claim, NEWER, DRIFT, by="w", now=NOW)
+    registry.rollback("m", reason="it hunts", by="t", now=NOW)
+    assert queue.finish(claim, LATE, DRIFT, by="w", now=NOW).verdict == "refused"
+    current = registry.in_force("m")
+    assert current is not None and current.number == 1
+
+
+def test_a_claim_by_a_fast_clock_locks_nothing(queue: Queue) -> None:
+    fast = claimed(queue, "fast", NOW + timedelta(hours=3))
+    assert queue.claim("m", owner="x", lease=3 * LEASE, now=NOW + timedelta(hours=3)) is None
+    assert claimed(queue, "x", NOW).owner == "x"
+    with pytest.raises(LostClaim):
+        queue.finish(fast, LOG, DRIFT, by="fast", now=NOW)
+
+
+def test_reasons_with_characters_that_no_database_takes(queue: Queue) -> None:
+    odd = Judgement("set_aside", "caf\udce9.csv: \0 found")
+    assert queue.finish(claimed(queue), LOG, odd, by="w", now=NOW).reason == (
+        "caf\\udce9.csv: \\0 found"
+    )
+
+
+def test_logs_to_be_judged_again_are_named_one_by_one(queue: Queue) -> None:
+    claim = claimed(queue)
+    twin = SeenLog("aaaa" + "b" * 60, "twin.csv", 1, 1)
+    queue.announce("m", [twin], now=NOW)
+    for log in (LOG, OTHER, twin):
+        queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW)
+    for name, said in (("", "no log ''"), ("b", "no log 'b'"), ("aaaa", "2 logs have")):
+        with pytest.raises(BadRegistry, match=said):
+            queue.reopen("m", [name], reason="r", by="t", now=NOW)
+    assert queue.waiting("m") == ()
+    assert queue.reopen("m", ["aaaab"], reason="r", by="t", now=NOW) == ("twin.csv",)
+
+
+def test_verdicts_are_counted(queue: Queue) -> None:
+    claim = claimed(queue)
+    queue.finish(claim, LOG, Judgement("set_aside", "bad"), by="w", now=NOW)
     queue.finish(claim, OTHER, Judgement("none", "quiet"), by="w", now=NOW)
-    assert queue.unsent(["set_aside", "promoted"], since=NOW) == (done,)
-    assert queue.unsent(["set_aside"], since=NOW + LEASE) == ()
-    queue.sent(done, now=NOW)
-    queue.sent(done, now=NOW)
-    assert queue.unsent(["set_aside", "promoted"], since=NOW) == ()
     assert queue.verdicts() == {("m", "set_aside"): 1, ("m", "none"): 1}

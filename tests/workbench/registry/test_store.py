@@ -7,6 +7,7 @@ from sqlalchemy import text
 from sqlalchemy.exc import DBAPIError
 
 from workbench.registry.errors import BadRegistry
+from workbench.registry.outbox import Outbox
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import APPEND_ONLY, Base
@@ -103,7 +104,11 @@ def filled(registry: Registry) -> None:
     claim = queue.claim("a", owner="w", lease=timedelta(minutes=1), now=NOW)
     assert claim is not None
     queue.begin(claim, log, now=NOW)
-    queue.sent(queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW), now=NOW)
+    queue.finish(claim, log, Judgement("none", "quiet"), by="w", now=NOW)
+    outbox = Outbox(registry.database)
+    outbox.fill(["none"], since=NOW, now=NOW)
+    (alarm,) = outbox.due(NOW)
+    outbox.sent(alarm, now=NOW)
     queue.reopen("a", [log.file], reason="again", by="w", now=NOW)
 
 

@@ -1,0 +1,119 @@
+"""`workbench effects`: the library of effects, and a user's own file checked as they are."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from workbench.options import effects_option
+from workbench.output import emit, progress
+
+if TYPE_CHECKING:
+    from rich.console import RenderableType
+
+    from identification.effects._base import Effect
+
+
+@click.group(epilog="Example: workbench effects list")
+def command() -> None:
+    """Show the effects that 'workbench trace' knows, and check files of your own."""
+
+
+@command.command("list", epilog="Example: workbench effects list stribeck")
+@click.argument("keys", nargs=-1, metavar="[KEY]...")
+@effects_option
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool) -> None:
+    """List the effects: equation, what it gives, parameters with units, source.
+
+    KEY: those to be shown, by default all.
+    """
+    from workbench.effect_values import known_effect
+    from workbench.own_effects import library
+
+    known = library(effects)
+    found = [known_effect(key, known) for key in keys] if keys else list(known.values())
+    emit([described(one) for one in found], as_json, lambda: _lines(found))
+
+
+@command.command(epilog="Example: workbench effects check my_effects")
+@click.argument("folder", type=click.Path(path_type=Path))
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+def check(folder: Path, as_json: bool) -> int:
+    """Check your own effects by the rules that the shipped ones are held to.
+
+    FOLDER holds one effect a file, declared as EFFECT ('python -c "import workbench.own_effects as
+    o; print(o.__doc__)"' shows one). Its Python is run: check only files that you trust. Exit
+    status 1: an effect breaks a rule.
+    """
+    from identification.library import built_in
+    from workbench.effect_runs import CHECKS, failures
+    from workbench.own_effects import library
+
+    own = {key: one for key, one in library([folder]).items() if key not in built_in()}
+    broken: dict[str, Mapping[str, str]] = {}
+    with progress("checking", float(len(own)), as_json=as_json) as advance:
+        for key, one in own.items():
+            broken[key] = failures(one)
+            advance(1.0)
+    result = {
+        "effects": {
+            key: {"holds": not found, "broken": dict(found)} for key, found in broken.items()
+        },
+        "checks": list(CHECKS),
+    }
+    emit(result, as_json, lambda: _checked(broken, len(CHECKS)))
+    return 1 if any(broken.values()) else 0
+
+
+def described(effect: "Effect") -> dict[str, Any]:
+    """An effect as JSON has it."""
+    return {
+        "key": effect.key,
+        "meaning": effect.meaning,
+        "equation": effect.equation,
+        "acts": effect.acts,
+        "gives": effect.place.gives,
+        "depends_on": effect.depends_on,
+        "signals": effect.signals,
+        "state_unit": effect.state_unit,
+        "parameters": [
+            {
+                "name": p.name, "unit": p.unit, "low": p.low, "high": p.high,
+                "typical": p.typical, "default": p.default, "meaning": p.meaning,
+            }
+            for p in effect.params
+        ],
+        "source": effect.source,
+    }  # fmt: skip
+
+
+def _lines(found: "list[Effect]") -> "RenderableType":
+    """Each effect as a paragraph."""
+    from rich.console import Group
+    from rich.padding import Padding
+    from rich.text import Text
+
+    parts: list[RenderableType] = []
+    for one in found:
+        parts.append(Text(f"{one.key}: {one.meaning}"))
+        lines = [f"{one.equation}", f"gives the {one.place.gives}"]
+        for p in one.params:
+            usual = f"{p.typical:g}" if p.default is None else f"{p.default:g} unless given"
+            lines.append(f"{p.name} [{p.unit}]: {p.meaning} ({usual})")
+        lines.append(f"source: {one.source}")
+        parts += [Padding(Text(line), (0, 0, 0, 4)) for line in lines]
+        parts.append("")
+    return Group(*parts)
+
+
+def _checked(broken: Mapping[str, Mapping[str, str]], count: int) -> str:
+    lines = []
+    for key, found in broken.items():
+        if not found:
+            lines.append(f"{key}: holds to all {count} checks")
+        lines += [f"{key}: not so: {name}: {said}" for name, said in found.items()]
+    return "\n".join(lines)

@@ -1,0 +1,168 @@
+"""Sizes that servo machines have, and the slip of a unit that a size far off suggests.
+
+The ranges are wide on purpose: a remark on a sound machine is worse than none. They hold
+positioners of a milligram and friction bearings under a hundred tonnes, cylinders of 1 mm and of
+1 m, drives logged at 10 Hz and at 50 kHz. A remark changes nothing; it names what to look at.
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.log import Log, Rig
+from workbench.card import SignalSpec
+from workbench.model import LogEntry, Model
+
+Slips = tuple[tuple[float, str], ...]
+_TIME: Slips = ((1e-3, "ms"), (1e-6, "us"), (60.0, "min"))
+_LENGTH: Slips = ((1e-3, "mm"), (1e-6, "um"))
+_ANGLE: Slips = ((np.pi / 180, "deg"), (1e-3, "mrad"))
+_FORCE: Slips = ((1e3, "kN"), (1e-3, "mN"))
+_TORQUE: Slips = ((1e-3, "mN m"), (1e3, "kN m"))
+_PRESSURE: Slips = ((1e5, "bar"), (1e3, "kPa"), (1e6, "MPa"))
+_AREA: Slips = ((1e-6, "mm^2"), (1e-4, "cm^2"))
+
+
+@dataclass(frozen=True)
+class Size:
+    """What a quantity lies between in its SI unit, and the units that are mistaken for it."""
+
+    low: float
+    high: float
+    unit: str
+    slips: Slips = ()
+
+
+LINEAR: Mapping[str, Size] = {
+    "period": Size(1.5e-5, 0.2, "s", _TIME),  # slower than 5 Hz no breakaway shows
+    "travel": Size(1e-6, 20.0, "m", _LENGTH),  # piezo stages to gantries
+    "speed": Size(1e-7, 20.0, "m/s", _LENGTH),  # linear motors reach 10
+    "force": Size(1e-5, 1e7, "N", _FORCE),
+    "pressure": Size(5e3, 1e8, "Pa", _PRESSURE),  # vacuum grippers to 1000 bar
+    "area": Size(1e-7, 1.0, "m^2", _AREA),
+    "mass": Size(1e-7, 1e6, "kg"),
+    "acceleration": Size(0.03, 1e4, "m/s^2", _LENGTH),  # of the peak force; shakers reach 1e3
+    "bandwidth": Size(0.03, 2e4, "rad/s"),  # 5 mHz, which no position loop is for, to 3 kHz
+}
+ROTARY: Mapping[str, Size] = {
+    **LINEAR,
+    "travel": Size(1e-5, 1e6, "rad", _ANGLE),
+    "speed": Size(1e-6, 2e4, "rad/s", _ANGLE),  # spindles reach 2e4
+    "force": Size(1e-7, 1e7, "N m", _TORQUE),
+    "mass": Size(1e-11, 1e6, "kg m^2"),
+    "acceleration": Size(1e-3, 1e7, "rad/s^2", _ANGLE),  # telescopes to galvanometers
+}
+_UNUSED = 1e-3  # share of the command's limit that a log reaches at least
+
+
+def log_remarks(
+    logs: Sequence[Log], rig: Rig, signals: Mapping[str, SignalSpec]
+) -> tuple[str, ...]:
+    """A line for each signal, and each number of the rig, whose size no machine has.
+
+    signals: how the card reads them, for the units in the lines.
+    """
+    named = {name: f"signals.{name}, read in {spec.unit!r}" for name, spec in signals.items()}
+    periods, travels = [log.h for log in logs], [float(np.ptp(log["y"])) for log in logs]
+    where = named.get("t", "signals.t")
+    lines = [_judged("period", x, rig, where, "sampled every") for x in _extremes(periods)]
+    where = named.get("y", "signals.y")
+    lines += [_judged("travel", max(travels), rig, where, "the position covers")]
+    if "F" in signals:
+        peak = max(float(np.max(np.abs(log.signals.get("F_logged", log["F"])))) for log in logs)
+        lines += [_judged("force", peak, rig, named["F"], "the force is at most")]
+    for name in ("p_p", "p_n"):
+        if name in signals:
+            peak = max(float(np.max(np.abs(log[name]))) for log in logs)
+            lines += [_judged("pressure", peak, rig, named[name], "the pressure is at most")]
+    if rig.control_limit and "u" in signals:
+        peak = max(float(np.max(np.abs(log["u"]))) for log in logs)
+        if 0 < peak < _UNUSED * rig.control_limit:
+            lines += [
+                f"{named['u']}: the command reaches {peak:.3g} of a control_limit_v ="
+                f" {rig.control_limit:g}; check both units"
+            ]
+    return tuple(dict.fromkeys(line for line in (*lines, *_of_rig(rig)) if line))
+
+
+def model_remarks(model: Model) -> tuple[str, ...]:
+    """A line where the mass, or what the logs' force makes of it, is of no machine's size."""
+    mass = model.friction["m"].value
+    if mass is None:
+        return ()
+    where = "friction.m, by the units of t, y and the force"
+    line = _judged("mass", mass, model.rig, where, "the moving body has")
+    if line is None and mass > 0:
+        said = f"on {mass:.4g} {model.friction['m'].unit} the logs' largest force makes"
+        reached = model.force_peak / mass
+        line = _judged("acceleration", reached, model.rig, "the unit of y (or t)", said)
+    return (line,) if line else ()
+
+
+def stored_remarks(model: Model) -> tuple[str, ...]:
+    """As `model_remarks`, and what a model file tells of its logs and rig, for who reads it."""
+    logs, rig = model.log, model.rig
+    periods = _extremes([entry.h for entry in logs])
+    lines = [_judged("period", h, rig, "t of its logs", "sampled every") for h in periods]
+    travel = max(_travel(entry) for entry in logs)
+    way = _judged("travel", travel, rig, "y of its logs", "the position covers")
+    speed = max((entry.speed or 0.0 for entry in logs), default=0.0)
+    lines += [
+        way or _judged("speed", speed, rig, "y or t of its logs", "the body moves at"),
+        _judged("force", model.force_peak, rig, "the force of its logs", "at most"),
+    ]
+    every = (*lines, *_of_rig(rig), *model_remarks(model))
+    return tuple(dict.fromkeys(line for line in every if line))
+
+
+def bandwidth_remarks(w_n: Iterable[float], rig: Rig) -> tuple[str, ...]:
+    """A line where the dominant poles [rad/s] of a design lie where no position loop has them."""
+    where = "design (units of the model's logs)"
+    found = (_judged("bandwidth", w, rig, where, "the loop's w_n is") for w in w_n)
+    return tuple(dict.fromkeys(line for line in found if line))
+
+
+def _of_rig(rig: Rig) -> Iterator[str | None]:
+    """Areas, supply pressure and stroke as the card gives them."""
+    for key, area in (("area_p_m2", rig.area_p), ("area_n_m2", rig.area_n)):
+        if area is not None:
+            yield _judged("area", area, rig, f"rig.{key}", "an area of")
+    if rig.supply_pressure:
+        where = "rig.supply_pressure_pa"
+        yield _judged("pressure", abs(rig.supply_pressure), rig, where, "a pressure of")
+    if rig.stroke is not None:
+        yield _judged("travel", rig.stroke[1] - rig.stroke[0], rig, "rig.stroke_m", "a stroke of")
+
+
+def _judged(quantity: str, value: float, rig: Rig, where: str, said: str) -> str | None:
+    """What to say of a value out of its range, with the unit that would bring it there."""
+    size = (ROTARY if rig.motion == "rotary" else LINEAR)[quantity]
+    if value == 0.0 or size.low <= value <= size.high:
+        return None
+    middle = np.sqrt(size.low * size.high)
+    other = min(_slips(size), key=lambda slip: abs(np.log(value * slip[0] / middle)), default=None)
+    hint = "check the units in the card"
+    if other and size.low <= value * other[0] <= size.high:
+        hint = f"{other[1]} would make it {value * other[0]:.4g} {size.unit}; check the unit"
+    return (
+        f"{where}: {said} {value:.4g} {size.unit}, where servo machines have {size.low:g} to"
+        f" {size.high:g}; {hint}"
+    )
+
+
+def _slips(size: Size) -> Iterator[tuple[float, str]]:
+    """Factors that a slip of unit takes out of a value, either way round, and their names."""
+    unit = size.unit.split("/s")[0]
+    for factor, name in size.slips:
+        yield factor, f"{name} in place of {unit}"
+    for factor, name in size.slips:
+        yield 1.0 / factor, f"{unit} in place of {name}"
+
+
+def _extremes(values: Sequence[float]) -> tuple[float, float]:
+    return min(values), max(values)
+
+
+def _travel(entry: LogEntry) -> float:
+    return entry.travel[1] - entry.travel[0]
