@@ -6,7 +6,7 @@ from pathlib import Path
 from identification.errors import UserError
 
 CARD_BYTES = 1_000_000
-"""Size above which a file is no card; the largest that ships has 5 kB."""
+"""Size above which a file is no card; the largest that ships has 8 kB."""
 
 RESULT_BYTES = 50_000_000
 """Size above which a file is no model, design or state; a posterior makes the largest, of 1 MB."""
