@@ -17,7 +17,10 @@ if TYPE_CHECKING:
 
 @click.group(epilog="Example: workbench effects list")
 def command() -> None:
-    """Show the effects that 'workbench trace' knows, and check files of your own."""
+    """Show the effects that 'workbench trace' knows, and check files of your own.
+
+    Every subcommand takes --json.
+    """
 
 
 @command.command("list", epilog="Example: workbench effects list stribeck")
