@@ -4,7 +4,9 @@ import re
 from collections.abc import Mapping
 
 from identification.effects._base import AT_REST, Effect, Param
-from identification.evidence import ACTUATOR, BREAKAWAY, MECHANICAL, REST
+from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, MECHANICAL, REST
+
+LEAST_LEFT_BY_LOAD = 0.1  # of the applied force, at least left to drive
 
 Values = Mapping[str, float]
 SLIDING = "f > c"  # as an equation says it

@@ -14,33 +14,34 @@ from functools import cached_property
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.between import kinks
-from identification.differentiate import Motion, differentiate, resolution
 from identification.errors import BadLog
-from identification.karnopp import Karnopp
 from identification.log import Log
-from identification.weak_form import (
-    Windows,
+from identification.model.karnopp import Karnopp
+from identification.signals.differentiate import Motion, differentiate, resolution
+from identification.signals.intersample import kinks
+from identification.signals.weak_form import (
+    WeakWindows,
     all_windows,
     noise_gain,
     sliding_windows,
     weights,
 )
 
-SECONDS = 0.06  # of a window
-EXACT = 1e-12  # of its range, to which any position is unsure
-FEWEST = 16  # samples in a window
+WINDOW_SECONDS = 0.06  # of a window
+EXACT_SHARE = 1e-12  # of its range, to which any position is unsure
+LEAST_SAMPLES = 16  # samples in a window
 LEAST_PART = 200  # samples in a part of a log
-BEFORE = 0.5  # s before the body moves, with which a part of a log begins
-SURE = 5.0  # times the velocity's noise from which its sign is sure
-LED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)  # Hz; a slow motion needs smoothing to stand out of its noise
-MOSTLY_SURE = 0.9  # of a led body's samples, whose direction is to be sure
+BEFORE_MOTION = 0.5  # s before the body moves, with which a part of a log begins
+SURE_OF_DIRECTION = 5.0  # times the velocity's noise from which its sign is sure
+# Hz; a slow motion needs smoothing to stand out of its noise
+IMPOSED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)
+MOSTLY_SURE = 0.9  # of the samples of imposed motion, whose direction is to be sure
 STILL_UNSURE = 0.8  # of the others, at most, that more smoothing may leave; a body at rest stays so
 BLOCKS = 8  # stretches of a log that are left out in turn
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
-POSITIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
+NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
 OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
@@ -49,34 +50,36 @@ QUIET = 0.2  # share of a log in which its force is taken to be free of fast con
 
 
 @dataclass(frozen=True, eq=False)
-class Moving:
+class MotionLog:
     """One log with its motion, and its windows in the two equations (actuator: None without u).
 
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
-    plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. led: a rig
-    imposes the motion.
+    plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
+    leads the body along a path.
     """
 
     log: Log
     signals: Mapping[str, Array]
-    sliding: Windows
+    sliding: WeakWindows
     up: BoolArray
     speed: Array
-    whole: Windows | None
+    whole: WeakWindows | None
     noise_y: float
     noise_F: float
     held: bool
     v_noise: float
     kinks: Array
     rotary: bool = False
-    led: bool = False
+    imposed: bool = False
     reference: Karnopp | None = None
 
-    def again(self, log: Log) -> "Moving":
+    def again(self, log: Log) -> "MotionLog":
         """The same of another log of this machine."""
         by_command = self.whole is not None
-        return moving(log, held=self.held, by_command=by_command, rotary=self.rotary, led=self.led)
+        return motion_log(
+            log, held=self.held, by_command=by_command, rotary=self.rotary, imposed=self.imposed
+        )
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
@@ -107,7 +110,7 @@ class Rows:
     speed: Array
     names: tuple[str, ...]
     lost: float = 0.0
-    positive: frozenset[str] = POSITIVE
+    positive: frozenset[str] = NEVER_NEGATIVE
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,15 +142,15 @@ def quiet_part(third: Array) -> float:
     return float(np.sqrt(np.mean(power[: max(1, int(QUIET * count))]) / 0.45))
 
 
-def moving(
-    log: Log, *, held: bool, by_command: bool, rotary: bool = False, led: bool = False
-) -> Moving:
+def motion_log(
+    log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False
+) -> MotionLog:
     """A log with its motion and windows. held: the force is a command held over each period;
-    led: a rig imposes the motion, which is smoothed until most of it is sure of its direction."""
+    imposed: by a rig; the motion is then smoothed until most of it is sure of its direction."""
     h = log.h
     motion = differentiate(log["y"], h)
     d = _direction(motion)
-    for cutoff in LED_CUTOFFS if led else ():
+    for cutoff in IMPOSED_CUTOFFS if imposed else ():
         if np.mean(d != 0) >= MOSTLY_SURE:
             break
         smooth = differentiate(log["y"], h, min(cutoff, motion.cutoff))
@@ -156,7 +159,7 @@ def moving(
         if smooth.cutoff < motion.cutoff and np.mean(sure == 0) > STILL_UNSURE * np.mean(d == 0):
             break
         motion, d = smooth, sure
-    length = max(FEWEST, 2 * round(SECONDS / h / 2))
+    length = max(LEAST_SAMPLES, 2 * round(WINDOW_SECONDS / h / 2))
     if len(log) <= length:
         raise BadLog(
             f"{log.name}: {len(log)} samples in {len(log) * h:.3g} s, {length + 1} needed for one"
@@ -174,19 +177,19 @@ def moving(
     quiet = max(local_noise(log["y"]), resolution(log["y"]) / np.sqrt(12.0))
     # A position that stands for a fifth of its log to the last digit hides its noise there.
     noise_y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
-    noise_y = max(noise_y, EXACT * float(np.ptp(log["y"])))
+    noise_y = max(noise_y, EXACT_SHARE * float(np.ptp(log["y"])))
     noise_F = _beside_control(log) if held else local_noise(log["F"])
     beyond = kinks(np.asarray(log["F"]), noise_F)
-    one = Moving(
+    one = MotionLog(
         log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
-        rotary, led,
+        rotary, imposed,
     )  # fmt: skip
     return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
 
 
 def _direction(motion: Motion) -> Array:
     """Direction of the motion (n,), 0 where its velocity's noise leaves it open."""
-    sure = np.abs(motion.v) > SURE * motion.v_noise
+    sure = np.abs(motion.v) > SURE_OF_DIRECTION * motion.v_noise
     return np.where(sure, np.sign(motion.v), 0.0)
 
 
@@ -195,15 +198,17 @@ def _gone(y: Array, motion: Motion, h: float) -> Array:
     half = max(1, round(0.5 / (motion.cutoff * h)))
     padded = np.pad(y, half, mode="edge")
     step = padded[2 * half :] - padded[: -2 * half]
-    return np.where(np.abs(step) > SURE * np.sqrt(2.0) * motion.noise, np.sign(step), 0.0)
+    return np.where(
+        np.abs(step) > SURE_OF_DIRECTION * np.sqrt(2.0) * motion.noise, np.sign(step), 0.0
+    )
 
 
-def shortened(one: Moving, seconds: float, begin: int | None = None) -> Moving:
+def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> MotionLog:
     """So many seconds of a log from a sample on, with its motion; where none is given, from just
     before the body first moves. A part may stand still, so the noise is the whole log's."""
     n = min(len(one.log), max(LEAST_PART, round(seconds / one.log.h)))
     if begin is None:
-        begin = int(np.argmax(one.signals["d"] != 0)) - round(BEFORE / one.log.h)
+        begin = int(np.argmax(one.signals["d"] != 0)) - round(BEFORE_MOTION / one.log.h)
     begin = min(max(begin, 0), len(one.log) - n)
     cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
     part = replace(one.again(cut), noise_y=one.noise_y, noise_F=one.noise_F)
@@ -236,15 +241,15 @@ def _beside_control(log: Log) -> float:
     return noise if noise > least else 0.0
 
 
-def _unexplained(one: Moving) -> float:
+def _unexplained(one: MotionLog) -> float:
     """Noise of the force [N] but for what the command makes of it: a controller passes noise on."""
-    k1, k2, _ = solve(actuator(one, np.array([1.0, 0.0, 0.0]))).theta
+    k1, k2, _ = solve_rows(actuator(one, np.array([1.0, 0.0, 0.0]))).theta
     h = one.log.h
     force = one.log["F"] - k1 * integral(one.log["u"], h) + k2 * one.signals["smooth"]
     return local_noise(force)
 
 
-def mechanical(one: Moving, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
+def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float = 0.0) -> Rows:
     """Rows of the mechanical equation with the five parameters m, F_cp, F_cn, F_vp, F_vn.
 
     theta: a first estimate of them, for the rows' noise; y: position in place of the log's [m];
@@ -268,7 +273,7 @@ def mechanical(one: Moving, theta: Array, y: Array | None = None, k1: float = 0.
     return Rows(b, X, sd, _blocks(w, len(one.log)), one.speed, FIVE)
 
 
-def actuator(one: Moving, theta: Array, y: Array | None = None, u: Array | None = None) -> Rows:
+def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | None = None) -> Rows:
     """Rows of the actuator equation with k1, k2 and an offset; theta: a first estimate of them.
 
     u: integral of the command that reaches the actuator [V s] at every sample.
@@ -287,7 +292,7 @@ def actuator(one: Moving, theta: Array, y: Array | None = None, u: Array | None 
     )  # fmt: skip
 
 
-def column_noise(one: Moving, equation: str) -> Array:
+def column_noise(one: MotionLog, equation: str) -> Array:
     """Variance (r, k) that the position's noise gives each column of an equation's rows.
 
     Noise in a column draws its parameter to 0, the more the calmer the motion: without it a mass
@@ -309,7 +314,7 @@ def integral(u: Array, h: float) -> Array:
     return h * np.concatenate([[0.0], np.cumsum(u)[:-1]])
 
 
-def _blocks(w: Windows, n: int) -> IntArray:
+def _blocks(w: WeakWindows, n: int) -> IntArray:
     return (w.middle * BLOCKS // n).astype(np.int64)
 
 
@@ -321,7 +326,9 @@ def stacked(parts: Sequence[Rows]) -> Rows:
     return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost, parts[0].positive)
 
 
-def solve(rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None) -> Fitted:
+def solve_rows(
+    rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None
+) -> Fitted:
     """Weighted least squares; `keep` (r,) masks rows out of the fit (their residual is kept).
 
     positive: columns whose parameter is 0 where it would come out negative.

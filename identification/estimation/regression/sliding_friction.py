@@ -10,14 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
+from identification.estimation.regression.three_step import FASTEST_QUANTILE, FirstEstimate
 from identification.log import Log
-from identification.three_step import FASTEST, FirstEstimate
-from identification.weak_form import HOP, sliding_windows
+from identification.signals.weak_form import HOP, sliding_windows
 
 LENGTHS = (10, 20, 40, 80, 160)  # samples of a window
-FEWEST = 8  # windows that a direction needs
-ROUNDS = 10
-OUTLIER = 2.0  # robust deviations from which a window counts less
+LEAST_WINDOWS = 8  # windows that a direction needs
+ROBUST_ROUNDS = 10
+OUTLIER_FROM = 2.0  # robust deviations from which a window counts less
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ def fit_sliding(log: Log, first: FirstEstimate, share: float, *, held: bool) -> 
     within it does not follow the equation, so windows that do not fit count less.
     """
     v = first.motion.v
-    threshold = share * float(np.quantile(np.abs(v), FASTEST))
+    threshold = share * float(np.quantile(np.abs(v), FASTEST_QUANTILE))
     direction = np.where(v > threshold, 1.0, np.where(v < -threshold, -1.0, 0.0))
     found = [_fit(log, direction, length, held) for length in LENGTHS if length < len(log) // 4]
     sound = [one for one in found if one is not None]
@@ -52,7 +52,7 @@ def _fit(log: Log, direction: Array, length: int, held: bool) -> Sliding | None:
     w = sliding_windows(direction, length, log.h)
     sign = direction[w.middle]
     up, down = sign > 0, sign < 0
-    enough = [np.count_nonzero(side) >= FEWEST for side in (up, down)]
+    enough = [np.count_nonzero(side) >= LEAST_WINDOWS for side in (up, down)]
     if not any(enough):
         return None
     v = w.first @ log["y"]
@@ -63,11 +63,11 @@ def _fit(log: Log, direction: Array, length: int, held: bool) -> Sliding | None:
     columns, force = columns[rows][:, used], force[rows]
     size = np.maximum(np.linalg.norm(columns, axis=0), 1e-300)
     weight = np.ones(len(force))
-    for _ in range(ROUNDS):
+    for _ in range(ROBUST_ROUNDS):
         theta = np.linalg.lstsq(columns / size * weight[:, None], force * weight)[0] / size
         residual = force - columns @ theta
         scale = 1.4826 * float(np.median(np.abs(residual)))
-        weight = 1.0 / np.sqrt(1.0 + (residual / max(OUTLIER * scale, 1e-300)) ** 2)
+        weight = 1.0 / np.sqrt(1.0 + (residual / max(OUTLIER_FROM * scale, 1e-300)) ** 2)
     scaled = columns / size * weight[:, None]
     inverse = np.linalg.pinv(scaled.T @ scaled)
     # Overlapping windows are not independent.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.errors import NotIdentifiable
-from identification.three_step import first_estimate
+from identification.estimation.regression.three_step import first_estimate
 from tests.identification.plants import made_log, table
 
 

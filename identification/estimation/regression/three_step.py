@@ -13,18 +13,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array
-from identification.differentiate import Motion, differentiate
 from identification.errors import NotIdentifiable
-from identification.inverse_model import InverseModel, Smoothing, fit_inverse
 from identification.log import Log
+from identification.model.inverse_model import InverseModel, Smoothing, fit_inverse
+from identification.signals.differentiate import Motion, differentiate
 
-STILL = 1.5  # times the noise below which a position's own spread is no motion
-SURE = 5.0  # times the noise of the velocity: faster samples move
+NO_MOTION = 1.5  # times the noise below which a position's own spread is no motion
+FASTER_MOVES = 5.0  # times the noise of the velocity: faster samples move
 BEFORE_STOP = 0.02  # s of motion looked at before a stop
 CUTOFFS = (None, 10.0, 3.0)  # Hz; slow motion needs more smoothing to stand out of its noise
 PERIODS = 40.0  # of a cut-off that a log must last
-WIDE = 4.0  # the search goes this factor beyond a first estimate
-FASTEST = 0.995  # quantile of the speed taken as the largest
+SEARCH_FACTOR = 4.0  # the search goes this factor beyond a first estimate
+FASTEST_QUANTILE = 0.995  # quantile of the speed taken as the largest
 
 
 @dataclass(frozen=True)
@@ -50,9 +50,12 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     the log moves.
     """
     motion = differentiate(log["y"], log.h)
-    moving = np.abs(motion.v) > SURE * motion.v_noise
-    fastest = float(np.quantile(np.abs(motion.v), FASTEST))
-    if fastest <= SURE * motion.v_noise or float(np.std(log["y"])) < STILL * motion.noise:
+    moving = np.abs(motion.v) > FASTER_MOVES * motion.v_noise
+    fastest = float(np.quantile(np.abs(motion.v), FASTEST_QUANTILE))
+    if (
+        fastest <= FASTER_MOVES * motion.v_noise
+        or float(np.std(log["y"])) < NO_MOTION * motion.noise
+    ):
         raise NotIdentifiable(
             f"{log.name}: no motion above the noise of the velocity ({motion.v_noise:.3g} m/s);"
             " record a run in which the body moves"
@@ -70,10 +73,10 @@ def first_estimate(log: Log, *, held: bool = False) -> FirstEstimate:
     scale = max(coulomb_p, coulomb_n, stick_p, stick_n)
     # A motor's force has no ramps that would show a narrow band: do not look for one.
     narrow = fastest / (500 if held else 3000)
-    low = np.array([m / WIDE, 0, 0, 0, 0, narrow, narrow, 0, 0])
+    low = np.array([m / SEARCH_FACTOR, 0, 0, 0, 0, narrow, narrow, 0, 0])
     high = np.array(
         [
-            m * WIDE,
+            m * SEARCH_FACTOR,
             2 * scale,
             2 * scale,
             2 * max(viscous_p, viscous_n, 0.1 * scale / fastest),
@@ -105,7 +108,7 @@ def _magnitudes(
     sliding: InverseModel | None, motion: Motion, level: float, fastest: float
 ) -> tuple[float, float, float, float, float]:
     """Step 1, kept positive: mass and friction that could explain forces of this level."""
-    peak = float(np.quantile(np.abs(motion.a), FASTEST))
+    peak = float(np.quantile(np.abs(motion.a), FASTEST_QUANTILE))
     mass = level / max(peak, 1e-12)
     if sliding is None:
         return mass, 0.5 * level, 0.5 * level, 0.5 * level / fastest, 0.5 * level / fastest

@@ -12,14 +12,14 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray
-from identification.evidence import BLOCKS, Moving, Rows
+from identification.estimation.regression.equation_rows import BLOCKS, MotionLog, Rows
+from identification.signals.sampling import samples
 
-LEAST = 0.6  # of the direction's median force, below which an event is none
-USUAL = 2e-3  # s, the clock of which samples are counted here
+LEAST_BREAKAWAY = 0.6  # of the direction's median force, below which an event is none
 RATE = 4  # samples over which the force's rate is taken
 MEAN = 8  # samples in a row of rest
-SURELY = 0.95  # of the Coulomb level, that a force may reach without moving a body at rest
-SHORTEST = 4  # rows in a stretch
+BORNE_SHARE = 0.95  # of the Coulomb level, that a force may reach without moving a body at rest
+LEAST_ROWS = 4  # rows in a stretch
 ONSET = 5.0  # times the noise at which a body has moved
 ONSETS = 30  # samples before it is seen at which a motion may have begun
 RUN = 4.0  # times ONSET that it then goes on to move, or it was no breakaway
@@ -45,12 +45,7 @@ class Breakaways:
     rate: Array
 
 
-def samples(count: int, h: float) -> int:
-    """The samples of h [s] in so many of 2 ms; as many of a slower clock."""
-    return max(count, round(count * USUAL / h))
-
-
-def stretches(one: Moving, shortest: int) -> list[tuple[int, int]]:
+def rest_stretches(one: MotionLog, shortest: int) -> list[tuple[int, int]]:
     """Stretches of samples (low, high) in which the body is not sure to move."""
     still = one.signals["d"] == 0
     edges = np.flatnonzero(np.diff(np.concatenate([[0], still.astype(np.int8), [0]])))
@@ -59,7 +54,7 @@ def stretches(one: Moving, shortest: int) -> list[tuple[int, int]]:
     ]
 
 
-def rests(one: Moving, up: float, down: float) -> Rest:
+def rests(one: MotionLog, up: float, down: float) -> Rest:
     """Rows of rest, without the ends of a stretch, where the body starts or stops.
 
     up, down: Coulomb levels [N]. Beyond them a body may creep in stops too short to be seen; below
@@ -68,11 +63,11 @@ def rests(one: Moving, up: float, down: float) -> Rest:
     mean = samples(MEAN, one.log.h)
     starts, number = [], []
     load = uniform_filter1d(np.asarray(one.log["F"]), mean, origin=-(mean // 2))
-    held = (load < SURELY * up) & (load > -SURELY * down)
-    for i, (low, high) in enumerate(stretches(one, (SHORTEST + 2) * mean)):
+    held = (load < BORNE_SHARE * up) & (load > -BORNE_SHARE * down)
+    for i, (low, high) in enumerate(rest_stretches(one, (LEAST_ROWS + 2) * mean)):
         own = np.arange(low + mean, high - 2 * mean + 1, mean)
         own = own[held[own]]
-        if len(own) >= SHORTEST:
+        if len(own) >= LEAST_ROWS:
             starts.append(own)
             number.append(np.full(len(own), i))
     if not starts:
@@ -81,7 +76,7 @@ def rests(one: Moving, up: float, down: float) -> Rest:
     return Rest(np.concatenate(starts).astype(np.int64), np.concatenate(number).astype(np.int64))
 
 
-def borne(logs: Sequence[Moving]) -> tuple[float, float]:
+def borne(logs: Sequence[MotionLog]) -> tuple[float, float]:
     """Largest forces [N] that a body at rest bore in either direction, 0 where it never rested.
 
     Means over a row, without the ends of a stretch: the stick limits are hardly less.
@@ -90,7 +85,7 @@ def borne(logs: Sequence[Moving]) -> tuple[float, float]:
     for one in logs:
         mean = samples(MEAN, one.log.h)
         load = uniform_filter1d(np.asarray(one.log["F"]), mean)
-        for low, high in stretches(one, 3 * mean):
+        for low, high in rest_stretches(one, 3 * mean):
             own = load[low + mean : high - mean]
             up, down = max(up, float(np.max(own))), max(down, -float(np.min(own)))
     return up, down
@@ -107,7 +102,7 @@ def means(x: Array, rest: Rest, mean: int) -> Array:
     return np.asarray(rows - level[rest.stretch])
 
 
-def rest_rows(one: Moving, rest: Rest, moved: Array | None = None) -> Rows:
+def rest_rows(one: MotionLog, rest: Rest, moved: Array | None = None) -> Rows:
     """Rows of the shown position in rest [m], less what an effect makes of it, `moved` (n,)."""
     y = one.log["y"] if moved is None else one.log["y"] - moved
     mean = samples(MEAN, one.log.h)
@@ -117,7 +112,7 @@ def rest_rows(one: Moving, rest: Rest, moved: Array | None = None) -> Rows:
     return Rows(b, np.zeros((len(b), 0)), sd, block, np.full(len(b), np.inf), ())
 
 
-def breakaways(one: Moving, m: float) -> Breakaways:
+def breakaways(one: MotionLog, m: float) -> Breakaways:
     """Every sure breakaway: a rest of at least 48 ms, then motion in one direction.
 
     m: mass [kg]. The body has let go at the sample from which the rise of the force since then,
@@ -126,7 +121,7 @@ def breakaways(one: Moving, m: float) -> Breakaways:
     y, F, h = one.log["y"], one.log["F"], one.log.h
     mean, of_rate = samples(MEAN, h), samples(RATE, h)
     found: list[tuple[float, float, float, float, float]] = []
-    for low, high in stretches(one, 3 * mean):
+    for low, high in rest_stretches(one, 3 * mean):
         if high + mean >= len(y):
             continue
         level = (
@@ -157,7 +152,7 @@ def breakaways(one: Moving, m: float) -> Breakaways:
         own = k[:, 1] == way
         if np.any(own):
             middle = np.median(way * k[own, 3])
-            k = k[~own | (way * k[:, 3] > LEAST * middle)]
+            k = k[~own | (way * k[:, 3] > LEAST_BREAKAWAY * middle)]
     return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
 
 
@@ -184,7 +179,7 @@ def _onset(seen: Array, F: Array, last: int, h: float, m: float) -> float | None
 
 
 def breakaway_rows(
-    one: Moving, events: Breakaways, columns: Sequence[Array] = (), names: tuple[str, ...] = ()
+    one: MotionLog, events: Breakaways, columns: Sequence[Array] = (), names: tuple[str, ...] = ()
 ) -> Rows:
     """Rows of the breakaway force F_sp or -F_sn [N] with further columns (k,)."""
     up = events.direction > 0
