@@ -11,22 +11,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.arx.residual_tests import effective_samples
 from identification.errors import NotIdentifiable
-from identification.identifiability import Events, estimates
-from identification.inverse_model import NAMES as SLIDING_NAMES
-from identification.inverse_model import Regression, Smoothing, regression
-from identification.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
+from identification.estimation.output_error.identifiability import Events, estimates
+from identification.estimation.output_error.problem import Problem
+from identification.estimation.regression.three_step import FirstEstimate, usable_cutoffs
 from identification.log import Log, Rig
-from identification.problem import Problem
-from identification.residual_tests import effective_samples
-from identification.result import Estimate, KarnoppFit, LogFit
-from identification.start import measured_start
-from identification.three_step import FirstEstimate, usable_cutoffs
+from identification.model.estimates import Estimate, KarnoppFit, LogFit
+from identification.model.inverse_model import SLIDING_NAMES, Regression, Smoothing, regression
+from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
+from identification.signals.initial_state import measured_start
 
-SLOW = 0.1  # share of the force below which inertia says nothing of a free body
-LED = 0.01  # share of the force below which the body is surely led
+INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
+IMPOSED_SHARE = 0.01  # share of the force below which the motion is surely imposed
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
-COLUMNS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
+COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
 WHY_NOT = {
     "m": "inertia explains {share:.1%} of the force, so it is not told apart; log faster motion",
     "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
@@ -50,7 +49,7 @@ class ForceFit:
 
 
 def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -> bool:
-    """Whether the logs show a body led along a path: no command, and inertia of no account."""
+    """Whether the logs show imposed motion: no command, and inertia of no account."""
     if rig.kind == "motor" or any("u" in log for log in logs):
         return False
     shares = []
@@ -60,7 +59,7 @@ def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -
         m = first.sliding.m
         inertia = abs(m) * float(np.std(first.motion.a))
         shares.append(inertia / max(float(np.std(log["F"])), 1e-300))
-    return float(np.median(shares)) < LED
+    return float(np.median(shares)) < IMPOSED_SHARE
 
 
 def fit_imposed(
@@ -137,7 +136,7 @@ def _best(data: Sequence[Regression]) -> ForceFit:
     force = np.concatenate([part.force for part in data])
     inertia = 0.0
     for name in ("all", "no mass", "constant"):
-        used = COLUMNS[name]
+        used = COLUMN_SETS[name]
         chosen = columns[:, used]
         size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
         theta = np.linalg.lstsq(chosen / size, force, rcond=None)[0] / size
@@ -145,7 +144,7 @@ def _best(data: Sequence[Regression]) -> ForceFit:
         if name == "all":
             size_of_force = max(float(np.std(force)), 1e-300)
             inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / size_of_force
-            if theta[0] <= 0 or inertia < SLOW:
+            if theta[0] <= 0 or inertia < INERTIA_SHARE:
                 continue
         if float(np.linalg.cond(chosen / size)) < CONDITION:
             break

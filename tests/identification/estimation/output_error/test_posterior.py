@@ -2,9 +2,9 @@
 
 import numpy as np
 
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.output_error.posterior import sample_posterior
 from identification.log import Rig
-from identification.output_error import fit_karnopp
-from identification.posterior import sample_posterior
 from tests.identification.plants import made_log, table
 
 

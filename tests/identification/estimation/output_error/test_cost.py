@@ -5,18 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.block import WIDTH
-from identification.experiment import Run, prepare_run, rest_windows, total_cost
+from identification.estimation.output_error.cost import cost_of_lanes
+from identification.estimation.output_error.fitted_runs import (
+    FittedRun,
+    prepare_run,
+    rest_windows,
+    total_cost,
+)
+from identification.estimation.regression.three_step import first_estimate
 from identification.log import Log
-from identification.objective import evaluate_block
-from identification.plant import Actuator, Plant
-from identification.simulate import free_run
-from identification.stepping import kernel_parameters
-from identification.three_step import first_estimate
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import free_run
+from identification.simulation.karnopp_lanes import WIDTH
+from identification.simulation.karnopp_step import kernel_parameters
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
 
 
-def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> Run:
+def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> FittedRun:
     run = prepare_run(
         log,
         first_estimate(log),
@@ -26,7 +31,7 @@ def run_of(log: Log, *, by_command: bool = True, window: float = 100.0) -> Run:
         hold=False,
         noise=(NOISE_Y, NOISE_F),
     )
-    return Run(run.name, run.measured, run.windows, np.zeros(3), run.open)
+    return FittedRun(run.name, run.measured, run.windows, np.zeros(3), run.open)
 
 
 def sets(number: int) -> np.ndarray:
@@ -84,8 +89,8 @@ def test_a_bound_keeps_outliers_from_ruling() -> None:
 def test_gram_matrices_add_up_over_stretches() -> None:
     run, rows = run_of(made_log(table(2), seconds=3.0)), sets(2)
     start = np.zeros((WIDTH, 3))
-    _, one = evaluate_block(rows, start, run.measured, run.windows, 0.0, 1)
-    _, ten = evaluate_block(rows, start, run.measured, run.windows, 0.0, 10)
+    _, one = cost_of_lanes(rows, start, run.measured, run.windows, 0.0, 1)
+    _, ten = cost_of_lanes(rows, start, run.measured, run.windows, 0.0, 10)
     assert np.allclose(one[0], ten.sum(axis=0), rtol=1e-9)
     assert np.allclose(one[0][1:, 1:], one[0][1:, 1:].T)
     costs = total_cost([run], rows, 0.0)

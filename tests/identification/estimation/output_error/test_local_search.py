@@ -5,18 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.actuator import fit_actuator
 from identification.arrays import Array
-from identification.experiment import Run, prepare_run, total_cost
-from identification.refine import pack, refine, robust_covariance, sample, unpack
-from identification.stepping import DV_N, F_SN, kernel_parameters
-from identification.three_step import first_estimate
+from identification.estimation.output_error.actuator_fit import fit_actuator
+from identification.estimation.output_error.fitted_runs import FittedRun, prepare_run, total_cost
+from identification.estimation.output_error.local_search import (
+    pack,
+    refine,
+    robust_covariance,
+    sample,
+    unpack,
+)
+from identification.estimation.regression.three_step import first_estimate
+from identification.simulation.karnopp_step import DV_N, F_SN, kernel_parameters
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
 
 FREE = np.arange(11, dtype=np.int64)
 
 
-def posed(number: int, seed: int) -> tuple[Run, Array]:
+def posed(number: int, seed: int) -> tuple[FittedRun, Array]:
     """A log as one whole run, and the true kernel parameters."""
     log = made_log(table(number), seed=seed, seconds=6.0)
     constant = float(fit_actuator([log]).constants[0])

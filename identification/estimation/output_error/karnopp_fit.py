@@ -12,24 +12,25 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.actuator import ActuatorFit
 from identification.arrays import Array
-from identification.climb import ATTEMPTS as CLIMBS
-from identification.climb import Climb, climb
-from identification.experiment import total_cost
-from identification.identifiability import estimates, events_of
-from identification.imposed import fit_imposed, is_imposed
-from identification.karnopp import NAMES
-from identification.log import Log, Rig
-from identification.objective import START_V, START_Y
-from identification.plant import Actuator, Plant
-from identification.problem import ADEQUATE, Problem, plant_of, pose, simulated, start_of
-from identification.refine import Optimum, refine
-from identification.result import Drive, KarnoppFit, LogFit
-from identification.search import evolve
-from identification.simulate import FreeRun
-from identification.stepping import DV_N, DV_P, F_SN, F_SP, K1, K2
-from identification.weighing import (
+from identification.estimation.global_search import evolve
+from identification.estimation.output_error.actuator_fit import ActuatorFit
+from identification.estimation.output_error.cost import START_V, START_Y
+from identification.estimation.output_error.fitted_runs import total_cost
+from identification.estimation.output_error.growing_windows import CLIMB_ATTEMPTS as CLIMBS
+from identification.estimation.output_error.growing_windows import Climb, climb
+from identification.estimation.output_error.identifiability import estimates, events_of
+from identification.estimation.output_error.imposed_motion import fit_imposed, is_imposed
+from identification.estimation.output_error.local_search import Optimum, refine
+from identification.estimation.output_error.problem import (
+    ADEQUATE,
+    Problem,
+    plant_of,
+    pose,
+    simulated,
+    start_of,
+)
+from identification.estimation.output_error.uncertainty import (
     Progress,
     Solution,
     weigh_correlated,
@@ -37,17 +38,23 @@ from identification.weighing import (
     weigh_noise,
     weigh_stretches,
 )
+from identification.log import Log, Rig
+from identification.model.estimates import Drive, KarnoppFit, LogFit
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import FreeRun
+from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP, K1, K2
 
-POPULATION = 64
-GENERATIONS = 150
-ATTEMPTS = 3
+SEARCH_POPULATION = 64
+SEARCH_GENERATIONS = 150
+SEARCH_ATTEMPTS = 3
 FIRST_CLIMBS = 3  # searches over stretches before one over long windows has its turn
-FOLLOWS = 300.0  # chi-square over windows up to which a fit is worth a closer search
-MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
+WORTH_A_SEARCH = 300.0  # chi-square over windows up to which a fit is worth a closer search
+ACTUATOR_MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 RIVAL = 3.0  # cost relative to the best up to which another optimum counts against it
-LED_WHY = "the motion is imposed: inertia is of no account in the force"
-LED = 50.0  # chi-square from which a force-driven run is not the body's own motion
-SAME = 0.02  # relative gain of a new search below which the misfit is the model's
+IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
+NOT_ITS_OWN_MOTION = 50.0  # chi-square from which a force-driven run is not the body's own motion
+NO_BETTER_SEARCH = 0.02  # relative gain of a new search below which the misfit is the model's
 
 
 def fit_karnopp(
@@ -67,8 +74,8 @@ def fit_karnopp(
     report = on_progress or (lambda _stage, _share: None)
     problem = pose(logs, rig, drive)
     if is_imposed(logs, problem.firsts, rig):
-        return fit_imposed(problem, rng, rig, LED_WHY)
-    problem, solution = solve(problem, rng, report)
+        return fit_imposed(problem, rng, rig, IMPOSED_WHY)
+    problem, solution = best_solution(problem, rng, report)
     remarks: list[str] = []
     actuator = problem.actuator
     if (
@@ -77,15 +84,15 @@ def fit_karnopp(
         and not solution.adequate
         and actuator is not None
         and actuator.relative > 0.02
-        and actuator.rms > MISFIT * _sensor_noise(problem, actuator)
+        and actuator.rms > ACTUATOR_MISFIT * _sensor_noise(problem, actuator)
     ):
         remarks.append(
             f"the linear actuator leaves {100 * actuator.relative:.1f} % of the force (chi-square"
             f" {solution.chi_square:.3g}), so the run was driven by the logged force"
         )
         problem = pose(logs, rig, "force")
-        problem, solution = solve(problem, rng, report)
-    if problem.drive == "force" and not problem.hold and solution.chi_square > LED:
+        problem, solution = best_solution(problem, rng, report)
+    if problem.drive == "force" and not problem.hold and solution.chi_square > NOT_ITS_OWN_MOTION:
         why = f"no free run follows this log (chi-square {solution.chi_square:.3g})"
         return fit_imposed(problem, rng, rig, why, remarks)
     return _result(problem, solution, actuator, rig, remarks)
@@ -106,7 +113,7 @@ def searched_plant(
     if problem.hold:
         found = climb(_opened(problem), rng, quiet, CLIMBS[:FIRST_CLIMBS]).optimum
     else:
-        found, _ = _search(problem, rng, POPULATION, 0, quiet)
+        found, _ = _search(problem, rng, SEARCH_POPULATION, 0, quiet)
     return plant_of(problem, found)
 
 
@@ -119,7 +126,9 @@ def _sensor_noise(problem: Problem, actuator: ActuatorFit) -> float:
     return float(np.sqrt(np.mean(squares)))
 
 
-def solve(problem: Problem, rng: np.random.Generator, report: Progress) -> tuple[Problem, Solution]:
+def best_solution(
+    problem: Problem, rng: np.random.Generator, report: Progress
+) -> tuple[Problem, Solution]:
     """Search, refine and weigh until the fit is found or the misfit is the model's own.
 
     The problem comes back with restarts where only stretches of the logs are followed.
@@ -166,9 +175,9 @@ def _attempts(
     optima: list[Optimum] = []
     members: list[Array] = []
     enough = problem.adequate * problem.count
-    attempts = ATTEMPTS if problem.drive == "command" else ATTEMPTS - 1
+    attempts = SEARCH_ATTEMPTS if problem.drive == "command" else SEARCH_ATTEMPTS - 1
     for attempt in range(attempts):
-        size = POPULATION * (2 if attempt == ATTEMPTS - 1 else 1)
+        size = SEARCH_POPULATION * (2 if attempt == SEARCH_ATTEMPTS - 1 else 1)
         found, searched = _search(problem, rng, size, attempt, report)
         members.append(searched)
         before = min((one.cost for one in optima), default=np.inf)
@@ -176,7 +185,7 @@ def _attempts(
         report("refining", attempt / attempts)
         if min(before, found.cost) <= enough:
             break
-        if attempt > 0 and found.cost > before * (1 - SAME):
+        if attempt > 0 and found.cost > before * (1 - NO_BETTER_SEARCH):
             break
     return optima, members
 
@@ -199,7 +208,7 @@ def _closer(opened: Problem, found: Optimum, rng: np.random.Generator) -> Optimu
     near = refine(opened.runs, found.p, opened.free, cap=cap)
     whole = refine(near.runs(opened.long_runs), near.p, opened.free, cap=cap)
     whole = refine(whole.runs(opened.long_runs), whole.p, opened.free)
-    if whole.cost > ADEQUATE * opened.count and near.cost < FOLLOWS * opened.count:
+    if whole.cost > ADEQUATE * opened.count and near.cost < WORTH_A_SEARCH * opened.count:
         rescued = _search_near(opened, near, cap, rng)
         whole = rescued if rescued.cost < whole.cost else whole
     return whole
@@ -217,7 +226,7 @@ def _opened(problem: Problem) -> Problem:
 def _through_force(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
     """A fit by command that starts from one by the measured force, whose landscape is smoother."""
     other = pose(problem.logs, Rig("force"), "force")
-    found, _ = _search(other, rng, POPULATION, 0, report)
+    found, _ = _search(other, rng, SEARCH_POPULATION, 0, report)
     row = np.concatenate([found.p[:9], problem.row[[K1, K2]]])
     cap = problem.cap
     near = refine(problem.runs, row, problem.free, cap=cap)
@@ -238,7 +247,7 @@ def _search(
     population = evolve(
         lambda z: total_cost(runs, box.rows(z), cap),
         box.around(problem.row, size, 0.15, rng),
-        GENERATIONS,
+        SEARCH_GENERATIONS,
         rng,
         lambda share: report("searching", share),
     )
@@ -251,7 +260,7 @@ def _search(
         optimum = refine(whole, optimum.p, problem.free, cap=bound)
     spent = population.evaluations + near.evaluations + optimum.evaluations
     lost = optimum.cost > problem.adequate * problem.count
-    if lost and problem.drive == "command" and near.cost < FOLLOWS * problem.count:
+    if lost and problem.drive == "command" and near.cost < WORTH_A_SEARCH * problem.count:
         report("searching near", 0.0)
         rescued = _search_near(problem, near, cap, rng)
         spent += rescued.evaluations
@@ -274,8 +283,8 @@ def _search_near(problem: Problem, near: Optimum, cap: float, rng: np.random.Gen
     whole = list(near.runs(problem.long_runs))
     found = evolve(
         lambda z: total_cost(whole, box.rows(z), cap),
-        box.around(row, POPULATION, 0.2, rng),
-        GENERATIONS,
+        box.around(row, SEARCH_POPULATION, 0.2, rng),
+        SEARCH_GENERATIONS,
         rng,
     )
     optimum = refine(whole, box.rows(found.members[:1])[0], problem.free, cap=cap)

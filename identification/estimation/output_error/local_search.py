@@ -12,18 +12,18 @@ from itertools import pairwise
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.block import WIDTH
-from identification.experiment import Run, total_cost
-from identification.objective import evaluate_block
-from identification.stepping import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, K1, K2, M
+from identification.estimation.output_error.cost import cost_of_lanes
+from identification.estimation.output_error.fitted_runs import FittedRun, total_cost
+from identification.simulation.karnopp_lanes import WIDTH
+from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, K1, K2, M
 
 TRIALS = WIDTH - 1
 FREEDOM = 8.0  # degrees of freedom of the sampling t-distribution
 CLOUD = 256
-ROUNDS = 12
-MANY = 16  # runs from which their own unknowns are eliminated one by one
-ENOUGH = 0.2  # effective share of a cloud that ends the sampling
-SPREAD = (0.01, 0.1, 1.0, 10.0)  # widths of the last differences, in the usual one
+REFINE_ROUNDS = 12
+MANY_RUNS = 16  # runs from which their own unknowns are eliminated one by one
+SETTLED_SHARE = 0.2  # effective share of a cloud that ends the sampling
+STEP_WIDTHS = (0.01, 0.1, 1.0, 10.0)  # widths of the last differences, in the usual one
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Optimum:
     evaluations: int
     covariance: Array
 
-    def runs(self, runs: Sequence[Run]) -> list[Run]:
+    def runs(self, runs: Sequence[FittedRun]) -> list[FittedRun]:
         """The runs with their refined starts."""
         return [replace(run, start=s) for run, s in zip(runs, self.starts, strict=True)]
 
@@ -56,7 +56,7 @@ class _Form:
 
 
 def refine(
-    runs: Sequence[Run],
+    runs: Sequence[FittedRun],
     p: Array,
     free: IntArray,
     *,
@@ -103,7 +103,7 @@ def refine(
         hessian=form.hessian,
         scale=scale,
         free=free,
-        evaluations=spent + len(SPREAD) * WIDTH,
+        evaluations=spent + len(STEP_WIDTHS) * WIDTH,
         covariance=inverse * np.outer(scale, scale),
     )
 
@@ -123,7 +123,7 @@ class Cloud:
     evaluations: int
 
 
-def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> Cloud:
+def sample(runs: Sequence[FittedRun], optimum: Optimum, rng: np.random.Generator) -> Cloud:
     """Parameter sets around the optimum, weighted by their likelihood.
 
     Adaptive importance sampling: a cloud drawn from a t-distribution is weighted by the likelihood
@@ -132,7 +132,7 @@ def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> C
     theta = pack(runs, optimum.p, optimum.starts, optimum.free)
     covariance = optimum.covariance
     spent = 0
-    for _ in range(ROUNDS):
+    for _ in range(REFINE_ROUNDS):
         spent += CLOUD
         cloud, density = _draw(theta, covariance, rng)
         keep_near(cloud, optimum.free, optimum.p)
@@ -141,17 +141,19 @@ def sample(runs: Sequence[Run], optimum: Optimum, rng: np.random.Generator) -> C
         costs = np.where(np.isfinite(costs), costs, np.inf)
         weight = _weights(costs, density, 1.0)
         effective = 1.0 / float(np.sum(weight**2))
-        if effective > ENOUGH * CLOUD:
+        if effective > SETTLED_SHARE * CLOUD:
             break
         softened = _tempered(costs, density, CLOUD / 6.0)
         theta = softened @ cloud
         off = cloud - theta
         covariance = 0.8 * (softened[:, None] * off).T @ off + 0.2 * covariance
-    settled = effective > ENOUGH * CLOUD
+    settled = effective > SETTLED_SHARE * CLOUD
     return Cloud(cloud, weight, costs, effective, settled, spent)
 
 
-def robust_covariance(runs: Sequence[Run], optimum: Optimum, cap: float, stretches: int) -> Array:
+def robust_covariance(
+    runs: Sequence[FittedRun], optimum: Optimum, cap: float, stretches: int
+) -> Array:
     """Covariance (d, d) of the unknowns where the residual is not white noise.
 
     H^-1 (sum of g g') H^-1 with the gradient g of each stretch of the logs: what correlated
@@ -171,7 +173,7 @@ def robust_covariance(runs: Sequence[Run], optimum: Optimum, cap: float, stretch
         lanes[np.arange(1, len(used) + 1), used] += delta[used]
         sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, lanes)
         begin = np.ascontiguousarray(begun[index])
-        gram = evaluate_block(sets, begin, run.measured, run.windows, cap, each)[1]
+        gram = cost_of_lanes(sets, begin, run.measured, run.windows, cap, each)[1]
         slopes = np.zeros((each, d))
         slopes[:, used] = gram[:, 0, 1 : len(used) + 1] / delta[used] * optimum.scale[used]
         slopes -= slopes.mean(axis=0)
@@ -181,7 +183,9 @@ def robust_covariance(runs: Sequence[Run], optimum: Optimum, cap: float, stretch
     return np.asarray(total * np.outer(optimum.scale, optimum.scale))
 
 
-def moved(runs: Sequence[Run], optimum: Optimum, theta: Array, covariance: Array) -> Optimum:
+def moved_optimum(
+    runs: Sequence[FittedRun], optimum: Optimum, theta: Array, covariance: Array
+) -> Optimum:
     """The optimum with its unknowns at `theta` (d,) and this covariance (d, d)."""
     sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, theta[None])
     cost = float(total_cost(runs, sets, 0.0, begun)[0])
@@ -219,7 +223,7 @@ def _tempered(costs: Array, density: Array, wanted: float) -> Array:
     return _weights(costs, density, low)
 
 
-def _scales(runs: Sequence[Run], p: Array, free: IntArray) -> Array:
+def _scales(runs: Sequence[FittedRun], p: Array, free: IntArray) -> Array:
     """Units in which the unknowns are of order one."""
     shared = np.maximum(np.abs(p[free]), 1e-9)
     forces = np.isin(free, [1, 2, 7, 8])
@@ -232,14 +236,14 @@ def _scales(runs: Sequence[Run], p: Array, free: IntArray) -> Array:
     return np.concatenate([shared, *own])
 
 
-def pack(runs: Sequence[Run], p: Array, starts: Array, free: IntArray) -> Array:
+def pack(runs: Sequence[FittedRun], p: Array, starts: Array, free: IntArray) -> Array:
     """Unknowns (d,): the free shared parameters, then each run's open start entries."""
     own = [starts[index, list(run.open)] for index, run in enumerate(runs)]
     return np.concatenate([p[free], *own])
 
 
 def unpack(
-    runs: Sequence[Run], p: Array, starts: Array, free: IntArray, theta: Array
+    runs: Sequence[FittedRun], p: Array, starts: Array, free: IntArray, theta: Array
 ) -> tuple[Array, Array]:
     """Parameter sets (k, 11) and starts (runs, k, 3) of unknowns (k, d)."""
     sets = np.tile(p, (len(theta), 1))
@@ -267,7 +271,7 @@ def keep_near(theta: Array, free: IntArray, row: Array) -> None:
 
 
 def _quadratic(
-    runs: Sequence[Run],
+    runs: Sequence[FittedRun],
     p: Array,
     starts: Array,
     theta: Array,
@@ -289,7 +293,7 @@ def _quadratic(
             lanes[lane + 1, column] += delta[column] * scale[column]
         sets, begun = unpack(runs, p, starts, free, lanes)
         begin = np.ascontiguousarray(begun[index])
-        gram = evaluate_block(sets, begin, run.measured, run.windows, cap, 1)[1][0]
+        gram = cost_of_lanes(sets, begin, run.measured, run.windows, cap, 1)[1][0]
         inner = slice(1, len(used) + 1)
         cost += float(gram[0, 0]) if np.isfinite(gram[0, 0]) else np.inf
         gram = np.nan_to_num(gram, nan=0.0, posinf=0.0, neginf=0.0)
@@ -299,7 +303,7 @@ def _quadratic(
 
 
 def _gentlest(
-    runs: Sequence[Run],
+    runs: Sequence[FittedRun],
     p: Array,
     starts: Array,
     theta: Array,
@@ -314,11 +318,11 @@ def _gentlest(
     the jump would feign knowledge.
     """
     slopes = []
-    for factor in SPREAD:
+    for factor in STEP_WIDTHS:
         form = _quadratic(runs, p, starts, theta, free, scale, factor * delta, cap)
         slopes.append(np.diag(form.hessian))
     choice = np.argmin(np.where(np.array(slopes) > 0, slopes, np.inf), axis=0)
-    widths = np.array(SPREAD)[choice] * delta
+    widths = np.array(STEP_WIDTHS)[choice] * delta
     return _quadratic(runs, p, starts, theta, free, scale, widths, cap)
 
 
@@ -361,7 +365,7 @@ def _solved(matrix: Array, pull: Array, shared: int, own: Sequence[int]) -> Arra
 
     own: number of each run's unknowns, which meet those of other runs in zeros only.
     """
-    if len(own) < MANY:
+    if len(own) < MANY_RUNS:
         return np.asarray(np.linalg.solve(matrix, pull), dtype=np.float64)
     reduced, right = matrix[:shared, :shared].copy(), pull[:shared].copy()
     bounds = shared + np.concatenate([[0], np.cumsum(own)])

@@ -7,16 +7,16 @@ from types import MappingProxyType
 import numpy as np
 
 from identification.arrays import Array
-from identification.ensemble import ensemble
+from identification.estimation.ensemble import ensemble
+from identification.estimation.output_error.local_search import pack, refine
+from identification.estimation.output_error.problem import pose
+from identification.estimation.output_error.uncertainty import granted_samples, log_cost, reweighed
 from identification.log import Log, Rig
-from identification.problem import pose
-from identification.refine import pack, refine
-from identification.result import KarnoppFit
-from identification.stepping import kernel_parameters
-from identification.weighing import granted_samples, log_cost, reweighed
+from identification.model.estimates import KarnoppFit
+from identification.simulation.karnopp_step import kernel_parameters
 
-WALKERS = 64
-STEPS = 6000
+POSTERIOR_WALKERS = 64
+POSTERIOR_STEPS = 6000
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,8 @@ def sample_posterior(
     rng: np.random.Generator,
     *,
     rig: Rig,
-    walkers: int = WALKERS,
-    steps: int = STEPS,
+    walkers: int = POSTERIOR_WALKERS,
+    steps: int = POSTERIOR_STEPS,
     on_progress: Callable[[float], None] | None = None,
 ) -> Posterior:
     """Posterior of a fit's parameters on the logs it was made from, under flat priors.

@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array, IntArray
-from identification.stepping import DV_N, DV_P, F_SN, K1, K2, PARAMETERS, M
-from identification.three_step import FirstEstimate
+from identification.estimation.regression.three_step import FirstEstimate
+from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, K1, K2, PARAMETERS, M
 
 BoolArray = NDArray[np.bool_]
 SIGN = np.ones(PARAMETERS)

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from identification.arrays import IntArray
-from identification.identifiability import Events, estimates, events_of
-from identification.karnopp import NAMES
-from identification.stepping import BAND_P, SLIP_N, SLIP_P, STUCK
+from identification.estimation.output_error.identifiability import Events, estimates, events_of
+from identification.model.karnopp import NAMES
+from identification.simulation.karnopp_step import BAND_P, SLIP_N, SLIP_P, STUCK
 from tests.identification.plants import table
 
 PLENTY = Events((10, 10), (10, 10), (1000, 1000), (0.5, 0.5))

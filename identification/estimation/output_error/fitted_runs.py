@@ -7,30 +7,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.block import WIDTH
-from identification.differentiate import spectrum
-from identification.log import Log
-from identification.objective import (
+from identification.estimation.output_error.cost import (
     COMMAND,
     HELD_FORCE,
     START_G,
     START_V,
     START_Y,
     Measured,
-    Windows,
-    evaluate_block,
+    RestartWindows,
+    cost_of_lanes,
 )
-from identification.result import Drive
-from identification.simulate import force_slope
-from identification.start import measured_start
-from identification.three_step import FirstEstimate
+from identification.estimation.regression.three_step import FirstEstimate
+from identification.log import Log
+from identification.model.estimates import Drive
+from identification.signals.differentiate import spectrum
+from identification.signals.initial_state import measured_start
+from identification.simulation.free_run import force_slope
+from identification.simulation.karnopp_lanes import WIDTH
 
 REST_SECONDS = 0.04  # that a body must stand still to be restarted from there
 SMALLEST = 1e-7  # of a signal's range: the least noise that is believed
 
 
 @dataclass(frozen=True)
-class Run:
+class FittedRun:
     """One log ready for the kernels, with its restart windows and its own start (3,).
 
     `open` lists the entries of `start` that are fitted: a body that begins at rest has v = 0, a run
@@ -40,17 +40,17 @@ class Run:
 
     name: str
     measured: Measured
-    windows: Windows
+    windows: RestartWindows
     start: Array
     open: tuple[int, ...]
 
-    def whole(self) -> "Run":
+    def whole(self) -> "FittedRun":
         """The same log as one free run."""
-        first = Windows(self.windows.at[:1], self.windows.y[:1], self.windows.v[:1])
+        first = RestartWindows(self.windows.at[:1], self.windows.y[:1], self.windows.v[:1])
         return replace(self, windows=first)
 
 
-def noise_of(x: Array, h: float) -> float:
+def signal_noise(x: Array, h: float) -> float:
     """White noise of a signal (one sigma), never below what its range could resolve."""
     spread = float(np.ptp(x))
     return max(spectrum(x, h).noise, SMALLEST * spread, 1e-300)
@@ -70,7 +70,7 @@ def prepare_run(
     window: float,
     hold: bool,
     noise: tuple[float, float],
-) -> Run:
+) -> FittedRun:
     """A log for the kernels.
 
     constant: F + k2 y - k1 * impulse [N] (command only); window: seconds between restarts; hold:
@@ -99,10 +99,10 @@ def prepare_run(
         unknown.append(START_V)
     if by_command:
         unknown.append(START_G)
-    return Run(log.name, measured, windows, start, tuple(unknown))
+    return FittedRun(log.name, measured, windows, start, tuple(unknown))
 
 
-def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> Windows:
+def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> RestartWindows:
     """Restarts at sure rests only, at least `seconds` apart; the first one starts the log.
 
     y: measured position [m] with noise `sigma` [m]. A restart in motion would carry the error of
@@ -129,10 +129,12 @@ def rest_windows(y: Array, sigma: float, h: float, seconds: float) -> Windows:
                 at.append(middle)
                 level.append(float(mean[k] + y[0]))
     index: IntArray = np.array(at, dtype=np.int64)
-    return Windows(index, np.array(level), np.zeros(len(at)))
+    return RestartWindows(index, np.array(level), np.zeros(len(at)))
 
 
-def total_cost(runs: Sequence[Run], p: Array, cap: float, starts: Array | None = None) -> Array:
+def total_cost(
+    runs: Sequence[FittedRun], p: Array, cap: float, starts: Array | None = None
+) -> Array:
     """Cost of parameter sets `p` (k, 11) over all runs, (k,); starts (runs, k, 3) where they vary.
 
     cap: bound of one sample's squared residual, 0 for none. Works on all cores.
@@ -150,7 +152,7 @@ def total_cost(runs: Sequence[Run], p: Array, cap: float, starts: Array | None =
             own = starts[index, low : low + WIDTH]
             start = np.concatenate([own, np.repeat(own[:1], WIDTH - len(own), axis=0)])
         rows = np.ascontiguousarray(padded[low : low + WIDTH])
-        return low, evaluate_block(rows, start, run.measured, run.windows, cap, 0)[0]
+        return low, cost_of_lanes(rows, start, run.measured, run.windows, cap, 0)[0]
 
     costs = np.zeros(len(padded))
     tasks = [(index, low) for low in range(0, len(padded), WIDTH) for index in range(len(runs))]

@@ -7,11 +7,11 @@ import pytest
 
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
-from identification.karnopp import NAMES, Karnopp
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Actuator, Motor
-from identification.result import KarnoppFit
+from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator, Motor
 from tests.identification.plants import ACTUATOR, made_log, table
 
 FORCE = Rig("force")

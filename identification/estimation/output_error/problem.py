@@ -5,23 +5,28 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.actuator import ActuatorFit, fit_actuator
 from identification.arrays import Array, IntArray
-from identification.box import Box, search_box
-from identification.check import check_driven
 from identification.errors import BadLog
-from identification.experiment import Run, impulse_of, noise_of, prepare_run
-from identification.karnopp import Karnopp
+from identification.estimation.output_error.actuator_fit import ActuatorFit, fit_actuator
+from identification.estimation.output_error.fitted_runs import (
+    FittedRun,
+    impulse_of,
+    prepare_run,
+    signal_noise,
+)
+from identification.estimation.output_error.local_search import Optimum
+from identification.estimation.output_error.search_bounds import Box, search_box
+from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.log import Log, Rig
-from identification.plant import Actuator, Motor, Plant
-from identification.refine import Optimum
-from identification.result import Drive
-from identification.simulate import FreeRun, free_run
-from identification.stepping import K1, K2
-from identification.three_step import FirstEstimate, first_estimate
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.signals.check import check_driven
+from identification.simulation.free_run import FreeRun, free_run
+from identification.simulation.karnopp_step import K1, K2
 
 ADEQUATE = 1.5  # normalised chi-square up to which a fit counts as found
-LONGEST = 40.0  # s; a run without a stiffness that holds it is compared at most this long
+LONGEST_RUN = 40.0  # s; a run without a stiffness that holds it is compared at most this long
 
 
 @dataclass(frozen=True)
@@ -30,7 +35,7 @@ class Problem:
     motor's k_a [N/V], 0 for other rigs; stretched: the runs restart where their windows say."""
 
     logs: tuple[Log, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[FittedRun, ...]
     firsts: tuple[FirstEstimate, ...]
     box: Box
     row: Array
@@ -62,7 +67,7 @@ class Problem:
         return float(max(1e4, noise))
 
     @property
-    def long_runs(self) -> tuple[Run, ...]:
+    def long_runs(self) -> tuple[FittedRun, ...]:
         """Runs as long as the model may be asked to follow without a restart."""
         if self.stretched:
             return self.runs
@@ -73,7 +78,7 @@ class Problem:
         out = []
         for run in self.runs:
             at = run.windows.at * run.measured.h
-            keep = np.concatenate([[True], np.diff(np.floor(at / LONGEST)) > 0])
+            keep = np.concatenate([[True], np.diff(np.floor(at / LONGEST_RUN)) > 0])
             windows = replace(
                 run.windows, at=run.windows.at[keep], y=run.windows.y[keep], v=run.windows.v[keep]
             )
@@ -137,7 +142,7 @@ def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tupl
     force = log["F"]
     if actuator is not None:
         force = force - actuator.k1 * impulse_of(log) + actuator.k2 * first.motion.y
-    return noise_of(log["y"], log.h), noise_of(force, log.h)
+    return signal_noise(log["y"], log.h), signal_noise(force, log.h)
 
 
 def _stiffness_bounds(logs: Sequence[Log], firsts: Sequence[FirstEstimate]) -> tuple[float, float]:

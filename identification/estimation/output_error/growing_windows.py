@@ -14,33 +14,37 @@ from itertools import cycle
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.box import Box
-from identification.experiment import Run, total_cost
-from identification.problem import ADEQUATE, Problem
-from identification.refine import Optimum, refine
-from identification.search import evolve
-from identification.sliding import fit_sliding
-from identification.stepping import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
-from identification.stretches import Stretches, stretches
-from identification.weighing import Progress
+from identification.estimation.global_search import evolve
+from identification.estimation.output_error.fitted_runs import FittedRun, total_cost
+from identification.estimation.output_error.local_search import Optimum, refine
+from identification.estimation.output_error.problem import ADEQUATE, Problem
+from identification.estimation.output_error.search_bounds import Box
+from identification.estimation.output_error.short_windows import Stretches, stretches
+from identification.estimation.output_error.uncertainty import Progress
+from identification.estimation.regression.sliding_friction import fit_sliding
+from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
 
-SECONDS, SAMPLES, PARTS = 0.4, 50, 64  # of the first stretches: length at least, number at most
+# Of the first stretches: length at least, number at most
+FIRST_SECONDS, FIRST_SAMPLES, FIRST_PARTS = 0.4, 50, 64
 JOINED = 3  # stretches made into one at every step
 TIGHT = 25.0  # bound of a squared residual, beside the problem's own
-SHARES = (0.05, 0.3)  # of the largest speed, above which samples are taken to slide
-SURE, CLOSE = 5.0, 0.02  # range around a regression's sliding parameters: its sd, and at least
+SLIDING_SPEEDS = (0.05, 0.3)  # of the largest speed, above which samples are taken to slide
+# Range around a regression's sliding parameters: its sd, and at least
+SLIDING_DEVIATIONS, LEAST_SLIDING_RANGE = 5.0, 0.02
 # Searches in turn: residual bounded tightly or not, sliding close to a regression or anywhere.
-ATTEMPTS = ((False, True), (True, True), (True, False), (False, True), (False, False)) * 2
-ROUNDS = 6
+CLIMB_ATTEMPTS = ((False, True), (True, True), (True, False), (False, True), (False, False)) * 2
+CLIMB_ROUNDS = 6
 WIDER = 3.0  # times the box in which a search over long windows looks
-POPULATION, GENERATIONS, NEAR_GENERATIONS = 64, 150, 60
-SIDES = ((F_CP, F_VP, DV_P, F_SP), (F_CN, F_VN, DV_N, F_SN))
-AGREED = 1.002  # relative cost of two searches that have found the same minimum
-ALIKE, HOPELESS = 1.05, 1e4  # the same where nothing fits, and chi-square from which nothing does
-LOST = 3.0  # times the adequate chi-square from which stretches have lost a stop
+CLIMB_POPULATION, CLIMB_GENERATIONS, NEAR_GENERATIONS = 64, 150, 60
+PARAMETERS_OF_SIDE = ((F_CP, F_VP, DV_P, F_SP), (F_CN, F_VN, DV_N, F_SN))
+SAME_MINIMUM = 1.002  # relative cost of two searches that have found the same minimum
+# The same where nothing fits, and chi-square from which nothing does
+SAME_MINIMUM_OF_MISFIT, NOTHING_FITS = 1.05, 1e4
+LOST_A_STOP = 3.0  # times the adequate chi-square from which stretches have lost a stop
 STRETCH = 1.0  # s; mean length of stretches to be followed for a fit to count
-REACH = 8.0  # standard deviations around shorter stretches' fit that a longer one may need
-SAME = 0.003  # relative gain of a round below which there is no other
+# Standard deviations around shorter stretches' fit that a longer one may need
+REACH_IN_DEVIATIONS = 8.0
+LEAST_GAIN_OF_ROUND = 0.003  # relative gain of a round below which there is no other
 
 
 @dataclass(frozen=True)
@@ -67,7 +71,7 @@ class Climb:
     @property
     def hopeless(self) -> bool:
         """Whether not even the short stretches are followed, by far."""
-        return self.optimum.cost > HOPELESS * self.problem.count
+        return self.optimum.cost > NOTHING_FITS * self.problem.count
 
     @property
     def _adequate(self) -> bool:
@@ -78,7 +82,7 @@ def climb(
     problem: Problem,
     rng: np.random.Generator,
     report: Progress,
-    attempts: Sequence[tuple[bool, bool]] = ATTEMPTS,
+    attempts: Sequence[tuple[bool, bool]] = CLIMB_ATTEMPTS,
 ) -> Climb:
     """The fit over whole runs that short stretches lead to, or over the longest that it follows.
 
@@ -91,16 +95,16 @@ def climb(
     problem = replace(problem, box=box)
     cut = stretches(problem.runs, _length(problem))
     best, sure = _attempted(problem, cut, attempts, rng, report)
-    if best.cost > HOPELESS * problem.count:
+    if best.cost > NOTHING_FITS * problem.count:
         return Climb(problem, cut.begun(best.starts), best, sure)
-    for narrow in range(ROUNDS):
+    for narrow in range(CLIMB_ROUNDS):
         found = _by_side(problem, cut.begun(best.starts), best, 0.3 ** (narrow % 3), rng)
-        same = found.cost > best.cost * (1 - SAME)
+        same = found.cost > best.cost * (1 - LEAST_GAIN_OF_ROUND)
         best = found if found.cost < best.cost else best
-        if same and (best.cost <= ADEQUATE * problem.count or narrow >= ROUNDS // 2):
+        if same and (best.cost <= ADEQUATE * problem.count or narrow >= CLIMB_ROUNDS // 2):
             break
     cut = cut.begun(best.starts)
-    if best.cost <= LOST * ADEQUATE * problem.count:
+    if best.cost <= LOST_A_STOP * ADEQUATE * problem.count:
         cut, best = _joined(problem, cut, best, rng)
     return Climb(problem, cut, best, sure)
 
@@ -126,24 +130,24 @@ def _attempted(
         found.sort(key=lambda one: one.cost)
         best = found[0].cost / problem.count
         second = found[1].cost / found[0].cost if len(found) > 1 else np.inf
-        if best <= ADEQUATE and second < AGREED:
+        if best <= ADEQUATE and second < SAME_MINIMUM:
             return found[0], True
-        if best > HOPELESS and second < ALIKE:
+        if best > NOTHING_FITS and second < SAME_MINIMUM_OF_MISFIT:
             break
     return found[0], False
 
 
 def _length(problem: Problem) -> float:
     """Length of the first stretches [s]."""
-    longest = max(run.measured.h for run in problem.runs) * SAMPLES
+    longest = max(run.measured.h for run in problem.runs) * FIRST_SAMPLES
     total = sum(len(run.measured.y) * run.measured.h for run in problem.runs)
-    return float(max(SECONDS, longest, total / PARTS))
+    return float(max(FIRST_SECONDS, longest, total / FIRST_PARTS))
 
 
 def _regressed(problem: Problem) -> list[tuple[Box, Array]]:
     """Boxes with mass and sliding friction close to what regressions say, and rows within them."""
     out = []
-    for share in SHARES:
+    for share in SLIDING_SPEEDS:
         fits = [
             fit_sliding(log, first, share, held=problem.hold)
             for log, first in zip(problem.logs, problem.firsts, strict=True)
@@ -152,7 +156,10 @@ def _regressed(problem: Problem) -> list[tuple[Box, Array]]:
         if not found:
             continue
         five = np.median([one.five for one in found], axis=0)
-        off = np.maximum(SURE * np.median([one.sd for one in found], axis=0), CLOSE * five)
+        off = np.maximum(
+            SLIDING_DEVIATIONS * np.median([one.sd for one in found], axis=0),
+            LEAST_SLIDING_RANGE * five,
+        )
         told = np.flatnonzero((five > 0) & (off < five))
         low, high, row = problem.box.low.copy(), problem.box.high.copy(), problem.row.copy()
         low[told], high[told], row[told] = (five - off)[told], (five + off)[told], five[told]
@@ -170,8 +177,8 @@ def _searched(
 ) -> Optimum:
     """The best of a global search over the stretches, refined with their starts."""
     runs = cut.restarted()
-    first = box.around(row, POPULATION, 0.15, rng)
-    found = evolve(lambda z: total_cost(runs, box.rows(z), cap), first, GENERATIONS, rng)
+    first = box.around(row, CLIMB_POPULATION, 0.15, rng)
+    found = evolve(lambda z: total_cost(runs, box.rows(z), cap), first, CLIMB_GENERATIONS, rng)
     row = box.rows(found.members[:1])[0]
     near = refine(cut.all, row, problem.free, cap=cap)
     optimum = _refined(problem, cut.begun(near.starts), near.p)
@@ -199,7 +206,7 @@ def _by_side(
     runs, row = cut.restarted(), best.p
     low, high = problem.box.low, problem.box.high
     spent = 0
-    for side in SIDES:
+    for side in PARAMETERS_OF_SIDE:
         free: IntArray = np.array(side, dtype=np.int64)
         sliding = np.abs(row[free[:2]])
         box = Box(
@@ -215,10 +222,10 @@ def _by_side(
 
 
 def _evolved(
-    problem: Problem, box: Box, runs: Sequence[Run], rng: np.random.Generator
+    problem: Problem, box: Box, runs: Sequence[FittedRun], rng: np.random.Generator
 ) -> tuple[Array, int]:
     """Best row (11,) of a search anywhere in a small box, its own row among the first."""
-    first = rng.random((POPULATION, len(box.free)))
+    first = rng.random((CLIMB_POPULATION, len(box.free)))
     first[0] = box.point(box.row)
     found = evolve(
         lambda z: total_cost(runs, box.rows(z), problem.cap), first, NEAR_GENERATIONS, rng
@@ -253,7 +260,7 @@ def _kept(problem: Problem, cut: Stretches, best: Optimum) -> tuple[Stretches, O
     longer = cut.longer(JOINED)
     costs = [float(total_cost([part], best.p[None], 0.0)[0]) for part in longer.all]
     lost = [
-        not cost <= LOST * ADEQUATE * part.measured.count
+        not cost <= LOST_A_STOP * ADEQUATE * part.measured.count
         for cost, part in zip(costs, longer.all, strict=True)
     ]
     kept = cut.longer(JOINED, lost)
@@ -264,6 +271,6 @@ def _close(problem: Problem, best: Optimum) -> Box:
     """The box within reach of what the stretches tell of each of the nine."""
     free = problem.box.free[:9]
     size = np.abs(best.p[free])
-    off = REACH * np.sqrt(np.maximum(np.diag(best.covariance)[:9], 0.0))
+    off = REACH_IN_DEVIATIONS * np.sqrt(np.maximum(np.diag(best.covariance)[:9], 0.0))
     off = np.clip(off, 1e-4 * size, 0.5 * size)
     return Box(free, size - off, size + off, best.p)

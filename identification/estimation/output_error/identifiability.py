@@ -10,15 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.karnopp import NAMES, NEGATIVE
-from identification.plant import units_of
-from identification.result import Estimate
-from identification.stepping import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES, NEGATIVE
+from identification.model.plant import units_of
+from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
 
-NEEDED = 3  # events of a kind that make a parameter identifiable
-SLIDING = 50  # samples of sliding a direction needs
-WIDEST = 0.3  # sd relative to the value beyond which the value says nothing
-SMALL = 0.05  # sd relative to the force beside it at which a term is known to be small
+EVENTS_NEEDED = 3  # events of a kind that make a parameter identifiable
+SLIDING_SAMPLES = 50  # samples of sliding a direction needs
+WIDEST_SD = 0.3  # sd relative to the value beyond which the value says nothing
+SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 
 
 @dataclass(frozen=True)
@@ -94,20 +94,20 @@ def _missing(name: str, events: Events, log: str) -> str | None:
         return None
     side = 1 if name.endswith("n") else 0
     way = ("positive", "negative")[side]
-    if name.startswith("F_s") and events.breakaways[side] < NEEDED:
+    if name.startswith("F_s") and events.breakaways[side] < EVENTS_NEEDED:
         return (
             f"{log}: {events.breakaways[side]} breakaways in the {way} direction, at least"
-            f" {NEEDED} needed; add slow reversals or longer rests"
+            f" {EVENTS_NEEDED} needed; add slow reversals or longer rests"
         )
-    if name.startswith("dv") and events.crossings[side] < NEEDED:
+    if name.startswith("dv") and events.crossings[side] < EVENTS_NEEDED:
         return (
             f"{log}: {events.crossings[side]} crossings of the band's limit in the {way}"
-            f" direction, at least {NEEDED} needed; add starts and stops"
+            f" direction, at least {EVENTS_NEEDED} needed; add starts and stops"
         )
-    if events.sliding[side] < SLIDING:
+    if events.sliding[side] < SLIDING_SAMPLES:
         return (
             f"{log}: {events.sliding[side]} samples of sliding in the {way} direction, at least"
-            f" {SLIDING} needed; add motion that way"
+            f" {SLIDING_SAMPLES} needed; add motion that way"
         )
     return None
 
@@ -129,7 +129,7 @@ def _too_wide(
     if name in ("F_cp", "F_cn"):
         other = abs(value_of.get(("F_vp", "F_vn")[side], 0.0)) * events.fastest[side]
         scale = other
-    if sd <= max(WIDEST * abs(value), SMALL * scale):
+    if sd <= max(WIDEST_SD * abs(value), SMALL_TERM * scale):
         return None
     return (
         f"found {value:.3g} with a standard deviation of {sd:.2g}: the log does not tell it;"

@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from identification.climb import climb
-from identification.experiment import total_cost
-from identification.karnopp import Karnopp
+from identification.estimation.output_error.fitted_runs import total_cost
+from identification.estimation.output_error.growing_windows import climb
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.output_error.local_search import _solved, refine
+from identification.estimation.output_error.problem import pose
+from identification.estimation.output_error.short_windows import stretches
+from identification.estimation.regression.sliding_friction import fit_sliding
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Motor, Plant
-from identification.problem import pose
-from identification.refine import _solved, refine
-from identification.simulate import free_run
-from identification.sliding import fit_sliding
-from identification.stretches import stretches
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
+from identification.simulation.free_run import free_run
 from tests.identification.plants import made_log, table
 
 SERVO = Karnopp(0.62, 4.1, 5.2, 22.0, 17.0, 0.02, -0.015, 6.3, -7.9)

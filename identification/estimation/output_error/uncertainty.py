@@ -10,40 +10,41 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.box import Box
-from identification.ensemble import ensemble
-from identification.experiment import Run, total_cost
-from identification.objective import START_G, START_V, START_Y
-from identification.problem import Problem, simulated
-from identification.refine import (
+from identification.arx.residual_tests import effective_samples
+from identification.estimation.ensemble import ensemble
+from identification.estimation.output_error.cost import START_G, START_V, START_Y
+from identification.estimation.output_error.fitted_runs import FittedRun, total_cost
+from identification.estimation.output_error.local_search import (
     Cloud,
     Optimum,
     keep_near,
-    moved,
+    moved_optimum,
     pack,
     refine,
     robust_covariance,
     sample,
     unpack,
 )
-from identification.residual_tests import effective_samples
-from identification.stepping import F_SN, F_SP, K1, K2
+from identification.estimation.output_error.problem import Problem, simulated
+from identification.estimation.output_error.search_bounds import Box
+from identification.simulation.karnopp_step import F_SN, F_SP, K1, K2
 
 Progress = Callable[[str, float], None]
-FEWEST, MOST = 12.0, 400.0  # independent samples granted to a residual that is not noise
-OUTLIER = 25.0  # bound of a squared residual where stops may be missed
+# Independent samples granted to a residual that is not noise
+LEAST_GRANTED, MOST_GRANTED = 12.0, 400.0
+OUTLIER_BOUND = 25.0  # bound of a squared residual where stops may be missed
 # Relative sd that the force between samples adds where it drives the run: the nine, k1, k2;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
 BETWEEN = np.array([1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3, 0.0, 0.0])
-STRETCHES = 40  # parts of the logs whose scatter gives the spread of correlated residuals
+SCATTER_PARTS = 40  # parts of the logs whose scatter gives the spread of correlated residuals
 # What walls of the likelihood add to the spread of a settled cloud, and of walkers in one that
 # did not settle; chosen for the coverage on seeds 1000 to 3060 of benchmarks/nine_parameters.py.
 ROUGH = (1.1, 1.3)
 TRUST = 1.5  # factor around the force equation's parameters in which a misfit is averaged
 TRUST_STICK = 2.5  # stick limit over Coulomb friction at most
-SLIDING, STICKING = np.arange(0, 5), np.array([F_SP, F_SN])
-WALKERS = 64
-STEPS = 200
+SLIDING_INDICES, STICKING_INDICES = np.arange(0, 5), np.array([F_SP, F_SN])
+FIT_WALKERS = 64
+WALK_STEPS = 200
 LONG_WALK = 1500
 
 
@@ -80,10 +81,10 @@ def weigh_noise(
         rough = ROUGH[0]
     else:
         cost = log_cost(problem, runs, optimum, problem.box.wider(2.0), None)
-        members = walk(cost, _seeds(cloud, rng), STEPS, rng, report)
+        members = walk(cost, _seeds(cloud, rng), WALK_STEPS, rng, report)
         members = _widened(members, optimum.covariance)
         rough = ROUGH[1]
-        spent += WALKERS * STEPS
+        spent += FIT_WALKERS * WALK_STEPS
     members = np.mean(members, axis=0) + rough * (members - np.mean(members, axis=0))
     optimum = _centred(runs, optimum, members)
     # Against the noise seen in the signals themselves, not against that of the residual.
@@ -131,9 +132,9 @@ def weigh_correlated(
             replace(run, measured=replace(run.measured, weight_y=1 / y, weight_force=w))
             for run, (y, w) in zip(optimum.runs(runs), bodies, strict=True)
         ]
-        optimum = refine(runs, optimum.p, problem.free, cap=OUTLIER)
+        optimum = refine(runs, optimum.p, problem.free, cap=OUTLIER_BOUND)
         spent += optimum.evaluations
-    covariance = robust_covariance(runs, optimum, OUTLIER, STRETCHES)
+    covariance = robust_covariance(runs, optimum, OUTLIER_BOUND, SCATTER_PARTS)
     if chi_square <= problem.adequate:
         # One stretch with a missed stop would rule the scatter of a fit that follows the rest.
         residuals = [
@@ -181,18 +182,18 @@ def weigh_misfit(
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
     granted = granted_samples(problem, optimum)
-    rows = searched[: WALKERS // 2].copy()
+    rows = searched[: FIT_WALKERS // 2].copy()
     rows[:, [K1, K2]] = np.where(problem.free[-1] == K2, rows[:, [K1, K2]], optimum.p[[K1, K2]])
     seeds = np.array([pack(runs, row, optimum.starts, problem.free) for row in rows])
-    around = _jitter(runs, optimum, WALKERS - len(seeds), rng)
+    around = _jitter(runs, optimum, FIT_WALKERS - len(seeds), rng)
     seeds = np.concatenate([around, _jittered_starts(seeds, problem, runs, rng)])
     shared = len(box.free)
     seeds[:, :shared] = box.moved_inside(seeds[:, :shared])
     cost = log_cost(problem, runs, optimum, box, granted)
     members = walk(cost, seeds, LONG_WALK, rng, report)
-    spent += WALKERS * LONG_WALK
+    spent += FIT_WALKERS * LONG_WALK
     covariance = np.cov(members.T)
-    optimum = moved(runs, optimum, _central(runs, optimum, members), covariance)
+    optimum = moved_optimum(runs, optimum, _central(runs, optimum, members), covariance)
     adequate = chi_square <= problem.adequate
     return Solution(optimum, members, chi_square, adequate, spent, problem.noise)
 
@@ -208,14 +209,14 @@ def _trusted(problem: Problem) -> Box:
         return box
     nine = np.abs(np.median(found, axis=0))
     low, high = box.low.copy(), box.high.copy()
-    low[SLIDING] = np.maximum(low[SLIDING], nine[SLIDING] / TRUST)
-    high[SLIDING] = np.minimum(high[SLIDING], nine[SLIDING] * TRUST)
+    low[SLIDING_INDICES] = np.maximum(low[SLIDING_INDICES], nine[SLIDING_INDICES] / TRUST)
+    high[SLIDING_INDICES] = np.minimum(high[SLIDING_INDICES], nine[SLIDING_INDICES] * TRUST)
     stick = nine[[1, 2]] * TRUST_STICK
-    high[STICKING] = np.minimum(high[STICKING], stick)
+    high[STICKING_INDICES] = np.minimum(high[STICKING_INDICES], stick)
     return replace(box, low=low, high=high)
 
 
-def _central(runs: Sequence[Run], optimum: Optimum, members: Array) -> Array:
+def _central(runs: Sequence[FittedRun], optimum: Optimum, members: Array) -> Array:
     """Mean (d,) of the members, or the nearest good member where the mean itself fits badly.
 
     The likely sets can lie on a bent ridge, beside which their mean falls.
@@ -223,7 +224,7 @@ def _central(runs: Sequence[Run], optimum: Optimum, members: Array) -> Array:
     sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
     costs = total_cost(runs, sets, 0.0, begun)
     mean: Array = np.mean(members, axis=0)
-    if moved(runs, optimum, mean, optimum.covariance).cost <= float(np.median(costs)):
+    if moved_optimum(runs, optimum, mean, optimum.covariance).cost <= float(np.median(costs)):
         return mean
     good = members[costs <= np.quantile(costs, 0.25)]
     away = np.sum(((good - mean) / np.maximum(np.std(members, axis=0), 1e-300)) ** 2, axis=1)
@@ -249,7 +250,7 @@ def walk(
 
 
 def log_cost(
-    problem: Problem, runs: Sequence[Run], optimum: Optimum, box: Box, granted: float | None
+    problem: Problem, runs: Sequence[FittedRun], optimum: Optimum, box: Box, granted: float | None
 ) -> Callable[[Array], Array]:
     """Minus twice the log likelihood of unknowns (k, d), infinite outside `box`.
 
@@ -273,14 +274,14 @@ def log_cost(
 def granted_samples(problem: Problem, optimum: Optimum) -> float:
     """Independent samples for which a misfit's position residual counts."""
     residuals = [simulated(problem, optimum, i).y - log["y"] for i, log in enumerate(problem.logs)]
-    return float(np.clip(effective_samples(residuals), FEWEST, MOST))
+    return float(np.clip(effective_samples(residuals), LEAST_GRANTED, MOST_GRANTED))
 
 
 def _seeds(cloud: Cloud, rng: np.random.Generator) -> Array:
     """Walkers (WALKERS, d) from the best members of a cloud that did not settle."""
-    order = np.argsort(cloud.costs)[: WALKERS // 2]
+    order = np.argsort(cloud.costs)[: FIT_WALKERS // 2]
     members = cloud.members[order]
-    pairs = rng.integers(0, len(members), (WALKERS - len(members), 2))
+    pairs = rng.integers(0, len(members), (FIT_WALKERS - len(members), 2))
     between = 0.5 * (members[pairs[:, 0]] + members[pairs[:, 1]])
     return np.concatenate([members, between])
 
@@ -296,14 +297,16 @@ def _widened(members: Array, covariance: Array) -> Array:
     return np.asarray(mean + factor * (members - mean))
 
 
-def _jitter(runs: Sequence[Run], optimum: Optimum, count: int, rng: np.random.Generator) -> Array:
+def _jitter(
+    runs: Sequence[FittedRun], optimum: Optimum, count: int, rng: np.random.Generator
+) -> Array:
     """Walkers (count, d) a percent around the optimum."""
     theta = pack(runs, optimum.p, optimum.starts, optimum.free)
     return theta + 0.01 * optimum.scale * rng.standard_normal((count, len(theta)))
 
 
 def _jittered_starts(
-    seeds: Array, problem: Problem, runs: Sequence[Run], rng: np.random.Generator
+    seeds: Array, problem: Problem, runs: Sequence[FittedRun], rng: np.random.Generator
 ) -> Array:
     """Seeds (k, d) with the runs' starts spread by their noise, so that no two agree."""
     low = len(problem.free)
@@ -317,7 +320,7 @@ def _jittered_starts(
     return out
 
 
-def reweighed(run: Run, p: Array) -> Run:
+def reweighed(run: FittedRun, p: Array) -> FittedRun:
     """The run with its noise levels set to what the fit leaves."""
     y = _channel(run, p, True)
     force = _channel(run, p, False) if run.measured.weight_force > 0 else 0.0
@@ -339,7 +342,7 @@ def _bodies(problem: Problem, optimum: Optimum, index: int) -> tuple[float, floa
     return y, 1.0 / max(1.4826 * float(np.median(np.abs(run.F - log["F"]))), 1e-300)
 
 
-def _channel(run: Run, p: Array, position: bool) -> float:
+def _channel(run: FittedRun, p: Array, position: bool) -> float:
     """Root mean square residual of the position [m] or the force [N]."""
     measured = replace(
         run.measured,
@@ -350,16 +353,16 @@ def _channel(run: Run, p: Array, position: bool) -> float:
     return float(np.sqrt(total_cost([one], p[None], 0.0)[0] / len(measured.y)))
 
 
-def _centred(runs: Sequence[Run], optimum: Optimum, members: Array) -> Optimum:
+def _centred(runs: Sequence[FittedRun], optimum: Optimum, members: Array) -> Optimum:
     """The optimum at the members' mean, or at the best point where the mean falls off a ridge."""
     mean = np.mean(members, axis=0)
     covariance = np.atleast_2d(np.cov(members.T))
-    center = moved(runs, optimum, mean, covariance)
+    center = moved_optimum(runs, optimum, mean, covariance)
     if center.cost <= optimum.cost + 2.0 * len(mean) + 20.0:
         return center
     sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)
     costs = total_cost(runs, sets, 0.0, begun)
     best = int(np.argmin(costs))
     if costs[best] < optimum.cost:
-        return moved(runs, optimum, members[best], covariance)
+        return moved_optimum(runs, optimum, members[best], covariance)
     return replace(optimum, covariance=covariance)

@@ -12,16 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.block import (
+from identification.compiled import compiled, compiled_fast
+from identification.simulation.karnopp_lanes import (
     WIDTH,
     march,
     march_held,
     place,
-    prepare,
+    prepare_lanes,
     work_space,
 )
-from identification.compiled import compiled, compiled_fast
-from identification.stepping import K1, K2
+from identification.simulation.karnopp_step import K1, K2
 
 COMMAND, HELD_FORCE = 0, 1
 CHUNK = 128
@@ -29,7 +29,7 @@ START_Y, START_V, START_G = range(3)
 
 
 @dataclass(frozen=True)
-class Windows:
+class RestartWindows:
     """Where the model restarts: sample `at` (k,), with position `y` [m] and velocity `v` [m/s]."""
 
     at: IntArray
@@ -94,7 +94,7 @@ def _chunk_rows(
 
 
 @compiled
-def evaluate(
+def cost_kernel(
     p: Array,
     start: Array,
     drive: int,
@@ -126,7 +126,7 @@ def evaluate(
     s, modes, tables = work_space()
     out = np.zeros((CHUNK, 2, WIDTH))
     rows = np.zeros((2 * CHUNK, WIDTH))
-    prepare(p, h, tables, s)
+    prepare_lanes(p, h, tables, s)
     cost[:] = 0.0
     gram[:, :, :] = 0.0
     n = len(y)
@@ -167,22 +167,22 @@ def evaluate(
                 _chunk_cost(out, y[low:high], force[low:high], w_y, w_f, cap, cost)
 
 
-def evaluate_block(
+def cost_of_lanes(
     p: Array,
     start: Array,
     log: Measured,
-    windows: Windows,
+    windows: RestartWindows,
     cap: float,
     stretches: int,
 ) -> tuple[Array, Array]:
-    """`evaluate` over a log: costs (WIDTH,), and Gram matrices (stretches, WIDTH, WIDTH).
+    """`cost_kernel` over a log: costs (WIDTH,), and Gram matrices (stretches, WIDTH, WIDTH).
 
     stretches: parts of the log, each with its own matrix; 0 for costs alone.
     """
     cost = np.zeros(WIDTH)
     gram = np.zeros((stretches, WIDTH, WIDTH))
     stretch = len(log.y) // max(stretches, 1) + 1
-    evaluate(
+    cost_kernel(
         p,
         start,
         log.drive,
