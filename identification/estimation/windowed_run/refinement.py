@@ -15,43 +15,55 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.effect_table import LONGEST_BRISTLE
 from identification.effects._base import Param
-from identification.evidence import Moving
-from identification.karnopp import NAMES, NEGATIVE, Karnopp
-from identification.minimum import FINE_STEP, FOLLOWED, Minimum, gauss_newton
-from identification.plant import Actuator, Motor, Plant
-from identification.result import Drive
-from identification.starts import COARSE, SECONDS, WHOLE, freed, left, starts, walks, window_of
+from identification.estimation.gauss_newton import FINE_STEP, FOLLOWED, Minimum, gauss_newton
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.windows import (
+    COARSE,
+    RUN_WINDOW,
+    WHOLE,
+    freed,
+    starts,
+    walks,
+    window_of,
+    window_residual,
+)
+from identification.model.estimates import Drive
+from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.effect_table import LONGEST_BRISTLE
 
-FIRST = 1.0  # s, of the windows in which the search begins
+SHORT_WINDOW = 1.0  # s, of the windows in which the search begins
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
 # where a stop comes late, no more than its own window is lost, so the minimum is wide.
-BRIEF = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
-SAMPLES = 20  # that a brief window has at least
-REACH, LEAST = 0.4, 0.5  # of a parameter, or of so much of its unit, that it changes in them
+BRIEF_WINDOWS = ((0.1, 0.5), (0.1, 0.0), (0.3, 0.0), (1.0, 0.0))
+BRIEF_SAMPLES = 20  # that a brief window has at least
+# Of a parameter, or of so much of its unit, that it changes in them
+BRIEF_REACH, LEAST_OF_UNIT = 0.4, 0.5
 PASSING = 0.03  # share of the cost, below which a step that only leads on is the last
-BEYOND = 8.0  # mean square, from which a run that sliding does not explain is not followed
+SLIDING_MISFIT = 8.0  # mean square, from which a run that sliding does not explain is not followed
 RESCUES = 3  # searches beside, of a run that leaves more than noise
-SAME = 0.8  # of the misfit, above which another search is of no use
-WIDTHS = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
-LIMITS = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
+NO_USE = 0.8  # of the misfit, above which another search is of no use
+BAND_GRID = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
+STICK_GRID = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 REACHED = 60.0  # misfit up to which brief windows may lead to the minimum
-ROUNDS, GAIN = 4, 0.9  # of `onward` at most, each to leave this share of the misfit before
-STEPS, SLOW, FEW = 12, 10, 4  # at most, of a refinement, of one on a bristle and of a quick one
+# Of `onward` at most, each to leave this share of the misfit before
+ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
+# At most, of a refinement, of one on a bristle and of a quick one
+REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
-LONG = 8.0  # s, of those in which a motor is followed in the end
+MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
-LUCK = 0.15  # of the windows, that luck may have spoilt
-LOST = 1e6  # error of a run that cannot be followed
-ROBUST = 3.0  # residual in noise units from which it counts less
-FAR = 300.0  # the same, at most, while much is far off
-MOST, HALF = 0.9, 0.5  # share of the residuals that then count in full
+LUCKY_WINDOWS = 0.15  # of the windows, that luck may have spoilt
+CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
+ROBUST_FROM = 3.0  # residual in noise units from which it counts less
+FARTHEST = 300.0  # the same, at most, while much is far off
+FIRST_SHARE, HALF_SHARE = 0.9, 0.5  # share of the residuals that then count in full
 NARROW = 0.3  # of its value, that the mass keeps at least in a search
-WIDE, OF_PERIOD = 2.0, 1.2  # how far a search moves what an effect is not linear in
+SHAPE_REACH, PERIOD_REACH = 2.0, 1.2  # how far a search moves what an effect is not linear in
 LOOSE = 3.0  # times its standard deviation that the regression is trusted as a prior
-BANDS = (0.15, 0.5, 1.0)
+FIRST_BANDS = (0.15, 0.5, 1.0)
 STICKS = (0.9, 1.0, 1.15, 1.4)
 CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
@@ -117,7 +129,7 @@ def wide(p: Param) -> float:
 
     The equations tell a period closely, and one far beyond the travel is another effect.
     """
-    return OF_PERIOD if p.role == "period" else WIDE
+    return PERIOD_REACH if p.role == "period" else SHAPE_REACH
 
 
 def plant_with(plant: Plant, names: Sequence[str], x: Array) -> Plant:
@@ -160,7 +172,7 @@ Judge = Callable[[Plant], Array]
 
 
 def judge(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, seconds: float, bristle: float = COARSE
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, bristle: float = COARSE
 ) -> Judge:
     """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
     force) over all logs, less what the windows' unsure states account for.
@@ -173,11 +185,11 @@ def judge(
     def errors_of(tried: Plant) -> Array:
         parts = []
         for one, own, size in zip(logs, free, sizes, strict=True):
-            r = left(tried, one, drive, own)
+            r = window_residual(tried, one, drive, own)
             if r is None or not np.all(np.isfinite(r)):
-                parts.append(np.full(size, LOST))
+                parts.append(np.full(size, CANNOT_BE_FOLLOWED))
                 continue
-            parts.append(np.clip(r, -LOST, LOST).ravel())
+            parts.append(np.clip(r, -CANNOT_BE_FOLLOWED, CANNOT_BE_FOLLOWED).ravel())
         return np.concatenate(parts)
 
     return errors_of
@@ -185,22 +197,22 @@ def judge(
 
 def loss(r: Array) -> float:
     """Robust cost."""
-    return float(np.sum(np.log1p((r / ROBUST) ** 2)) * ROBUST**2)
+    return float(np.sum(np.log1p((r / ROBUST_FROM) ** 2)) * ROBUST_FROM**2)
 
 
-def soft(r: Array, far: float = ROBUST) -> Array:
+def soft(r: Array, far: float = ROBUST_FROM) -> Array:
     """Errors whose square sum is a robust cost: those beyond `far` count ever less."""
     return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far)
 
 
-def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) -> Plant:
+def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: float) -> Plant:
     """The plant at the best of a few band widths and stick limits, then of either direction."""
     p = plant.friction
     tried = [
         replace(p, dv_p=width * band, dv_n=-width * band, F_sp=more * p.F_sp, F_sn=more * p.F_sn)
-        for width, more in product(BANDS, STICKS)
+        for width, more in product(FIRST_BANDS, STICKS)
     ]
-    errors_of = judge(plant, logs, drive, FIRST)
+    errors_of = judge(plant, logs, drive, SHORT_WINDOW)
     best = _best_of(plant, tried, errors_of)
     p = best.friction
     up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(CLOSER, CLOSER)]
@@ -209,14 +221,14 @@ def start_band(plant: Plant, logs: Sequence[Moving], drive: Drive, band: float) 
     return _best_of(plant, down, errors_of)
 
 
-def by_side(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Plant:
+def by_side(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Plant:
     """The plant with the best band and stick limit of either direction on a wide grid."""
-    errors_of = judge(plant, logs, drive, FIRST)
+    errors_of = judge(plant, logs, drive, SHORT_WINDOW)
     p = plant.friction
-    up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(WIDTHS, LIMITS)]
+    up = [replace(p, dv_p=a * p.dv_p, F_sp=b * p.F_sp) for a, b in product(BAND_GRID, STICK_GRID)]
     best = _best_of(plant, up, errors_of)
     p = best.friction
-    down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(WIDTHS, LIMITS)]
+    down = [replace(p, dv_n=a * p.dv_n, F_sn=b * p.F_sn) for a, b in product(BAND_GRID, STICK_GRID)]
     return _best_of(best, down, errors_of)
 
 
@@ -229,7 +241,7 @@ def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
 
 
 def refit(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, *, prior: dict[str, float],
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, *, prior: dict[str, float],
     band: float = 0.0, effort: Effort = "whole", rescues: int = 0,
 ) -> Refit:  # fmt: skip
     """All parameters refined together.
@@ -245,7 +257,7 @@ def refit(
     searched = effort in ("rough", "whole")
     if searched:
         plant = start_band(plant, logs, drive, band)
-    evaluations = FEW if quick else STEPS
+    evaluations = QUICK_STEPS if quick else REFIT_STEPS
     names = names_of(plant, drive)
     x0 = values_of(plant, names)
     unit = units_in(plant, names, x0)
@@ -274,29 +286,29 @@ def refit(
         now = plant_with(plant, names, full(x))
         errors_of = judge(now, logs, drive, seconds, bristle)
         # While most is far off, what is far off must still pull.
-        far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST, FAR))
+        far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST_FROM, FARTHEST))
         return gauss_newton(
             lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach, little=little
         )
 
     slow = on_bristle(plant)  # its sub-steps are ten times shorter
     if slow:
-        evaluations = min(evaluations, SLOW)
+        evaluations = min(evaluations, BRISTLE_STEPS)
     x = x0[open_] / unit[open_]
     if searched:
-        x = refined(x, FIRST, True, MOST).x
-    for seconds, part in BRIEF if effort == "far" else ():
-        brief = max(seconds, *(SAMPLES * one.log.h for one in logs))
-        reach = REACH * np.maximum(np.abs(x), LEAST)
+        x = refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
+    for seconds, part in BRIEF_WINDOWS if effort == "far" else ():
+        brief = max(seconds, *(BRIEF_SAMPLES * one.log.h for one in logs))
+        reach = BRIEF_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
         x = refined(x, brief, False, part, reach=reach, little=PASSING).x
-    at = refined(x, SECONDS, True, HALF)
+    at = refined(x, RUN_WINDOW, True, HALF_SHARE)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
-    hopeless = effort == "rough" and at.mean > BEYOND
-    rounds = [] if quick or hopeless else [SECONDS]
+    hopeless = effort == "rough" and at.mean > SLIDING_MISFIT
+    rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
     if steady and not slow and rounds:
-        rounds.append(LONG if plant_is_motor(plant) else WHOLE)
+        rounds.append(MOTOR_WINDOW if plant_is_motor(plant) else WHOLE)
     for seconds in rounds:
         again = refined(at.x, seconds, False)
         at = again if again.followed else at
@@ -316,19 +328,19 @@ def refit(
             break
         # Band and stick limits have narrow minima, and many: another one of either direction.
         other = by_side(plant_with(plant, names, full(at.x)), logs, drive)
-        trial = refined(values_of(other, names)[open_] / unit[open_], SECONDS, False)
+        trial = refined(values_of(other, names)[open_] / unit[open_], RUN_WINDOW, False)
         if steady:
-            longer = refined(trial.x, LONG if plant_is_motor(plant) else WHOLE, False)
+            longer = refined(trial.x, MOTOR_WINDOW if plant_is_motor(plant) else WHOLE, False)
             trial = longer if longer.followed else trial
         trial, better = ended(trial)
         before = found
         if better < found:
             at, found = trial, better
-        if better > SAME * before:
+        if better > NO_USE * before:
             break
     if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
         # Without a spring the errors of the sub-steps add up.
-        trial = refined(at.x, SECONDS, False, bristle=LONGEST_BRISTLE)
+        trial = refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
         left_by = misfit(plant_with(plant, names, full(trial.x)), logs, drive, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
@@ -336,7 +348,7 @@ def refit(
 
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
-        factor = SECONDS / logs[0].log.h if found > FOLLOWED else 1.0
+        factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
         walking = any(walks(one, drive) for one in logs)
         cluster = _windows(logs, drive) if walking else None
         return factor * at.covariance(cluster) * np.outer(unit[open_], unit[open_])
@@ -344,19 +356,19 @@ def refit(
     return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
 
 
-def briefly(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
+def briefly(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     """The plant refined through brief windows, with directions that may be unequal."""
     held = {name: 0.0 for name in even(plant) if not name.endswith("asymmetry")}
     return refit(plant, logs, drive, prior=held, effort="far")
 
 
-def onward(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
+def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     """The plant refined through brief windows while that helps."""
     best: Refit | None = None
     left_by = misfit(plant, logs, drive)
-    for _ in range(ROUNDS):
+    for _ in range(ONWARD_ROUNDS):
         found = briefly(plant, logs, drive)
-        gained = found.misfit < GAIN * left_by
+        gained = found.misfit < ONWARD_GAIN * left_by
         best = found if best is None or found.misfit < best.misfit else best
         if not gained or not COMPLETE < best.misfit < REACHED:
             break
@@ -365,7 +377,7 @@ def onward(plant: Plant, logs: Sequence[Moving], drive: Drive) -> Refit:
     return best
 
 
-def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
+def _windows(logs: Sequence[MotionLog], drive: Drive) -> IntArray:
     """Number of the window of every sample over all logs, (n,)."""
     parts, count = [], 0
     for one in logs:
@@ -376,7 +388,7 @@ def _windows(logs: Sequence[Moving], drive: Drive) -> IntArray:
 
 
 def misfit(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, bristle: float = COARSE, *,
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, bristle: float = COARSE, *,
     every: bool = False,
 ) -> float:  # fmt: skip
     """What the free run leaves of that signal of that log which it follows worst.
@@ -389,11 +401,11 @@ def misfit(
     worst = 0.0
     free = loose(plant, drive) and not every
     for one in logs:
-        least = LOST  # a short window may begin badly, a long one lose a stop
+        least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
         whole = drive == "command" and not walks(one, drive)
-        for seconds in (SECONDS, WHOLE) if whole else (SECONDS,):
+        for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
             begun = starts(one, drive, seconds, bristle)
-            r = left(plant, one, drive, freed(plant, one, drive, begun))
+            r = window_residual(plant, one, drive, freed(plant, one, drive, begun))
             if r is not None:
                 window = window_of(begun, len(one.log)) if free else None
                 moves = one.signals["d"] != 0
@@ -407,11 +419,11 @@ def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None 
     which the worst do not count, of those in which the body moves (n,) at all, so many of them."""
     if window is None:
         return loss(r) / len(r) / NOISE_LOSS
-    square = np.log1p((r / ROBUST) ** 2) * ROBUST**2 / NOISE_LOSS
+    square = np.log1p((r / ROBUST_FROM) ** 2) * ROBUST_FROM**2 / NOISE_LOSS
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
     told = len(size) if moves is None else np.count_nonzero(np.bincount(window, moves))
-    kept = np.argsort(each)[: max(1, len(size) - int(LUCK * told))]
+    kept = np.argsort(each)[: max(1, len(size) - int(LUCKY_WINDOWS * told))]
     return float(np.average(each[kept], weights=size[kept]))
 
 

@@ -4,10 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification import starts as module
+from identification.estimation.windowed_run import windows as module
+from identification.estimation.windowed_run.refinement import judge, misfit
+from identification.estimation.windowed_run.windows import (
+    RUN_WINDOW,
+    WHOLE,
+    position_rms,
+    starts,
+    window_errors,
+    window_run,
+)
 from identification.log import Log
-from identification.refit import judge, misfit
-from identification.starts import SECONDS, WHOLE, errors, position_rms, starts, window_run
 from tests.identification.motor_logs import NOISE, H, made, plant, seen
 
 
@@ -37,7 +44,7 @@ def test_a_body_that_creeps_does_not_rest() -> None:
 
 def test_the_true_plant_leaves_noise_alone_in_windows_and_over_all() -> None:
     one = seen(made(2))
-    for seconds in (0.5, SECONDS, WHOLE):
+    for seconds in (0.5, RUN_WINDOW, WHOLE):
         r = judge(plant(), [one], "command", seconds)(plant())
         assert abs(np.mean(r**2) - 1.0) < 0.1, seconds
     assert abs(misfit(plant(), [one], "command") - 1.0) < 0.05
@@ -52,7 +59,7 @@ def test_what_unsure_states_make_of_it_is_taken_away() -> None:
     run = window_run(plant(), one, "command", begun)
     free = module.freed(plant(), one, "command", begun)
     assert run is not None and free is not None
-    raw = errors(run, one, "command")
+    raw = window_errors(run, one, "command")
     assert np.mean(raw**2) > 2.0 * np.mean(free(raw) ** 2)
 
 
@@ -62,7 +69,7 @@ def test_what_is_taken_away_is_the_likeliest_that_the_states_can_explain() -> No
     run = window_run(plant(), one, "command", begun)
     free = module.freed(plant(), one, "command", begun)
     assert run is not None and free is not None
-    r = errors(run, one, "command")
+    r = window_errors(run, one, "command")
     kept = r.copy()
     after, ends = free(r), [*begun.at[1:], len(one.log)]
     assert np.array_equal(r, kept)

@@ -7,10 +7,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.karnopp import Karnopp
-from identification.minimum import STEP, Minimum, gauss_newton
-from identification.plant import Plant
-from identification.refit import (
+from identification.estimation.gauss_newton import WIDE_STEP, Minimum, gauss_newton
+from identification.estimation.windowed_run.refinement import (
     even,
     mean_loss,
     names_of,
@@ -20,6 +18,8 @@ from identification.refit import (
     units_in,
     values_of,
 )
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 ROUGH = Karnopp.from_array(NINE.array * (1.0, 1.01, 0.99, 0.99, 1.01, 1.3, 0.7, 1.1, 0.92))
@@ -40,13 +40,13 @@ def test_a_rough_refinement_ends_where_it_cannot_follow(monkeypatch: pytest.Monk
     steps: list[float] = []
 
     def counted(
-        fun: Any, x: Array, most: int, step: float = STEP, *, reach: Any = np.inf,
+        fun: Any, x: Array, most: int, step: float = WIDE_STEP, *, reach: Any = np.inf,
         little: float = 0.0,
     ) -> Minimum:  # fmt: skip
         steps.append(little)
         return gauss_newton(fun, x, most, step, reach, little)
 
-    monkeypatch.setattr("identification.refit.gauss_newton", counted)
+    monkeypatch.setattr("identification.estimation.windowed_run.refinement.gauss_newton", counted)
     whole = refit(plant(), [one], "command", prior={}, band=0.012, rescues=0)
     count = len(steps)
     rough = refit(plant(), [one], "command", prior={}, band=0.012, effort="rough")

@@ -14,27 +14,28 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled_fast
 from identification.errors import BadModel
-from identification.evidence import Moving
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.standstill import rest_stretches
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.rest import samples, stretches
-from identification.result import Drive
-from identification.simulate import FreeRun, free_run
+from identification.model.estimates import Drive
+from identification.model.plant import Motor, Plant
+from identification.signals.sampling import samples
+from identification.simulation.free_run import FreeRun, free_run
 
-SECONDS = 2.0  # of a window
-REACH = 0.45  # of a window, within which a rest is looked for
-FAST = 0.5  # of the usual speed, at which a window begins where there is no rest near
+RUN_WINDOW = 2.0  # of a window
+REST_REACH = 0.45  # of a window, within which a rest is looked for
+FAST_SHARE = 0.5  # of the usual speed, at which a window begins where there is no rest near
 LATER = 2.0  # windows by which a start is put off until there is a rest
 COARSE = 5e-4  # s, sub-step of a bristle: errs by a hundredth of the noise where a spring holds it
-LEAST_REST = 24  # samples of 2 ms (as the next two: `rest.samples`)
-SURE = 3.0  # deviations of the velocity from which a body creeps
-WIDEST = 50  # samples on either side by which a creep is seen
+LEAST_REST = 24  # samples of 2 ms (as the next two: `sampling.samples`)
+CREEPS_FROM = 3.0  # deviations of the velocity from which a body creeps
+WIDEST_CREEP = 50  # samples on either side by which a creep is seen
 AROUND = 8  # samples of a rest whose mean is the position
 WHOLE = np.inf  # seconds of a window that is the whole log
-WALKS = 6  # runs by which the walk of a measured force's noise is seen
+NOISE_RUNS = 6  # runs by which the walk of a measured force's noise is seen
 RETURNS = 2  # runs until the body's place behind a transducer has settled
-SETTLED = 1e-3  # of the position's noise, by which that place may still change
-STEP = 0.3  # of a state's deviation, by which the change with it is taken
+PLACE_SETTLED = 1e-3  # of the position's noise, by which that place may still change
+STATE_STEP = 0.3  # of a state's deviation, by which the change with it is taken
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +54,9 @@ class Starts:
     step: float = COARSE
 
 
-def starts(one: Moving, drive: Drive, seconds: float = SECONDS, bristle: float = COARSE) -> Starts:
+def starts(
+    one: MotionLog, drive: Drive, seconds: float = RUN_WINDOW, bristle: float = COARSE
+) -> Starts:
     """Windows of about so many seconds, begun at rest where the body rests near by.
 
     bristle [s]: longest sub-step of one.
@@ -63,7 +66,7 @@ def starts(one: Moving, drive: Drive, seconds: float = SECONDS, bristle: float =
     y = np.asarray(one.log["y"])
     rests = _rests(one)
     speed = np.abs(one.signals["v"]) * (one.signals["d"] != 0)
-    fast = FAST * float(np.median(speed[speed > 0.0])) if np.any(speed) else 0.0
+    fast = FAST_SHARE * float(np.median(speed[speed > 0.0])) if np.any(speed) else 0.0
     at = [0]
     while at[-1] + step < n - step // 2:
         wanted = at[-1] + step
@@ -97,7 +100,7 @@ def window_of(begun: Starts, n: int) -> IntArray:
 
 
 def window_run(
-    plant: Plant, one: Moving, drive: Drive, begun: Starts, shift: Array | None = None,
+    plant: Plant, one: MotionLog, drive: Drive, begun: Starts, shift: Array | None = None,
     log: Log | None = None,
 ) -> FreeRun | None:  # fmt: skip
     """Free run in windows; None where the model cannot be followed.
@@ -127,7 +130,7 @@ def window_run(
         run, shift = run_from(y), np.zeros(len(y))
         for _ in range(RETURNS if sensors else 0):  # what was measured is what is shown
             before, shift = shift, (run.shown - run.y)[np.maximum(at, 0)]
-            if np.all(np.abs(shift - before) <= SETTLED * one.noise_y):
+            if np.all(np.abs(shift - before) <= PLACE_SETTLED * one.noise_y):
                 break
             run = run_from(y - shift)
         return run
@@ -135,12 +138,12 @@ def window_run(
         return None
 
 
-def driven_by(one: Moving, drive: Drive) -> Log:
+def driven_by(one: MotionLog, drive: Drive) -> Log:
     """The log that drives a run: with the measured force between its samples where that does."""
     return one.driving if drive == "force" else one.log
 
 
-def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
+def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
     """Position (and, by command, force) errors in units of the sensors' noise, (k, n)."""
     out = [(run.shown - one.log["y"]) / one.noise_y]
     if drive == "command" and not one.held:
@@ -150,40 +153,40 @@ def errors(run: FreeRun, one: Moving, drive: Drive) -> Array:
 
 def _rest_near(wanted: int, step: int, rests: IntArray) -> int | None:
     """The rest nearest to `wanted`, or else the next one after it, if it is not far."""
-    near = rests[np.abs(rests - wanted) <= int(REACH * step)]
+    near = rests[np.abs(rests - wanted) <= int(REST_REACH * step)]
     if len(near):
         return int(near[np.argmin(np.abs(near - wanted))])
     later = rests[(rests > wanted) & (rests <= wanted + LATER * step)]
     return int(later[0]) if len(later) else None
 
 
-def _calm(one: Moving, wanted: int, step: int, speed: Array, enough: float) -> int:
+def _calm(one: MotionLog, wanted: int, step: int, speed: Array, enough: float) -> int:
     """Sample near `wanted` in calm motion that is fast enough [m/s], if there is any.
 
     Near the band a state within its noise may stop or not: what is sure of itself is fast.
     """
-    reach, last = max(1, int(REACH * step)), len(one.log) - 1
+    reach, last = max(1, int(REST_REACH * step)), len(one.log) - 1
     span = np.arange(wanted - reach, min(wanted + reach, last))
     if np.max(speed[span]) < enough:
         span = np.arange(wanted - reach, min(wanted + round(LATER * step), last))
-    fast = speed[span] >= min(enough, FAST * float(np.max(speed[span])))
+    fast = speed[span] >= min(enough, FAST_SHARE * float(np.max(speed[span])))
     return int(span[np.argmin(np.where(fast, np.abs(one.signals["a"][span]), np.inf))])
 
 
-def _rests(one: Moving) -> IntArray:
+def _rests(one: MotionLog) -> IntArray:
     """Samples in the middle of every sure rest, and the first where the log begins with one."""
     found = []
-    for low, high in stretches(one, samples(LEAST_REST, one.log.h)):
+    for low, high in rest_stretches(one, samples(LEAST_REST, one.log.h)):
         v, sd = _creep(one, low, high)
-        if abs(v) < SURE * sd:
+        if abs(v) < CREEPS_FROM * sd:
             found += [0, (low + high) // 2] if low == 0 else [(low + high) // 2]
     return np.array(found, dtype=np.int64)
 
 
-def _creep(one: Moving, low: int, high: int) -> tuple[float, float]:
+def _creep(one: MotionLog, low: int, high: int) -> tuple[float, float]:
     """Mean velocity and its deviation [m/s] in the middle of samples low to high."""
     middle = (low + high) // 2
-    half = min((high - low) // 2, samples(WIDEST, one.log.h))
+    half = min((high - low) // 2, samples(WIDEST_CREEP, one.log.h))
     x = one.log.h * (np.arange(-half, half) + 0.5)
     square = float(x @ x)
     y = np.asarray(one.log["y"])[middle - half : middle + half]
@@ -235,7 +238,7 @@ def freed_kernel(at: IntArray, B: Array, inverse: Array, r: Array) -> None:
 
 
 def freed(
-    plant: Plant, one: Moving, drive: Drive, begun: Starts, *, even: bool = False
+    plant: Plant, one: MotionLog, drive: Drive, begun: Starts, *, even: bool = False
 ) -> Freed | None:
     """The states' part of errors of this plant; None where it cannot be followed.
 
@@ -245,17 +248,17 @@ def freed(
     if base is None:
         return None
     window = window_of(begun, len(one.log))
-    r = errors(base, one, drive)
+    r = window_errors(base, one, drive)
     weight = np.ones(r.shape) if even else _sureness(plant, one, drive, begun, base, r)
     B = np.zeros((3, *r.shape))
     for i in range(3):
         if not np.any(begun.sd[i]):
             continue
         shift = np.zeros((3, len(begun.at)))
-        shift[i] = STEP * begun.sd[i]
+        shift[i] = STATE_STEP * begun.sd[i]
         moved = window_run(plant, one, drive, begun, shift)
         if moved is not None:
-            B[i] = weight * (errors(moved, one, drive) - r) / STEP
+            B[i] = weight * (window_errors(moved, one, drive) - r) / STATE_STEP
     gram = np.einsum("ikn,jkn->ijn", B, B)
     count = len(begun.at)
     sums = [[np.bincount(window, gram[i, j], count) for j in range(3)] for i in range(3)]
@@ -264,7 +267,7 @@ def freed(
 
 
 def _sureness(
-    plant: Plant, one: Moving, drive: Drive, begun: Starts, base: FreeRun, r: Array
+    plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun, r: Array
 ) -> Array:
     """Weights (k, n) of the errors: a run by a measured force walks with the force's noise.
 
@@ -282,43 +285,45 @@ def _sureness(
     return np.asarray(1.0 / np.sqrt(1.0 + square))
 
 
-def walks(one: Moving, drive: Drive) -> bool:
+def walks(one: MotionLog, drive: Drive) -> bool:
     """Whether a run walks away with the noise of the force that drives it."""
     return (drive == "force" or one.held) and one.noise_F > 0.0
 
 
-def _walk(plant: Plant, one: Moving, drive: Drive, begun: Starts, base: FreeRun) -> Array:
+def _walk(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
     """Variance (n,) of a run by the force's noise, in units of the position's."""
     square = np.zeros(len(one.log))
     own = driven_by(one, drive)
     sd = np.hypot(one.noise_F, one.kinks) if drive == "force" else one.noise_F
-    for seed in range(WALKS):
+    for seed in range(NOISE_RUNS):
         noise = sd * np.random.default_rng(seed).standard_normal(len(one.log))
         more = {"F": own["F"] + noise}
         if isinstance(plant.actuator, Motor):
             more["u"] = own["u"] + noise / plant.actuator.k_a
         run = window_run(plant, one, drive, begun, log=own.with_signals(**more))
         if run is not None:
-            square += ((run.shown - base.shown) / one.noise_y) ** 2 / WALKS
+            square += ((run.shown - base.shown) / one.noise_y) ** 2 / NOISE_RUNS
     return square
 
 
-def left(plant: Plant, one: Moving, drive: Drive, found: Freed | None) -> Array | None:
+def window_residual(
+    plant: Plant, one: MotionLog, drive: Drive, found: Freed | None
+) -> Array | None:
     """Errors of a plant in windows less their states' part, (k, n); None: not to be followed."""
     if found is None:
         return None
     run = window_run(plant, one, drive, found.begun)
-    return None if run is None else found(errors(run, one, drive))
+    return None if run is None else found(window_errors(run, one, drive))
 
 
-def position_rms(plant: Plant, logs: Sequence[Moving], drive: Drive) -> float | None:
+def position_rms(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> float | None:
     """Root mean square of the shown position's error in windows [m], over all logs."""
     off = [position_errors(plant, one, drive) for one in logs]
     squares = [e**2 for e in off if e is not None]
     return float(np.sqrt(np.mean(np.concatenate(squares)))) if len(squares) == len(off) else None
 
 
-def position_errors(plant: Plant, one: Moving, drive: Drive) -> Array | None:
+def position_errors(plant: Plant, one: MotionLog, drive: Drive) -> Array | None:
     """The shown position's error in windows [m], (n,); None where it cannot be followed."""
-    r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive), even=True))
+    r = window_residual(plant, one, drive, freed(plant, one, drive, starts(one, drive), even=True))
     return None if r is None else r[0] * one.noise_y

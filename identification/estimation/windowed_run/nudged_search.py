@@ -1,11 +1,11 @@
-"""Search for a plant by a run that is led by the measured velocity.
+"""Search for a plant by a run that is nudged towards the measured velocity.
 
 A free run that is driven by a force alone turns on every stop: a little too much friction, and the
 body stays where it should have passed. The distance to the log then has many narrow minima, all
 around the right one. A damping between the body and the measured velocity, D (v_log - v), keeps
 the run near the log whatever the friction (as an observer does; Abarbanel, Creveling, Farsian,
 Kostuk, SIAM Journal on Applied Dynamical Systems 8 (2009) 1341), so what is left changes smoothly
-with the parameters. It is searched in a wide range first, then without leading in a narrow one.
+with the parameters. It is searched in a wide range first, then without nudging in a narrow one.
 """
 
 from collections.abc import Mapping, Sequence
@@ -17,13 +17,22 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.effects._base import MAX_SIGNALS, Acting, Param
-from identification.equations import by_load, in_columns
-from identification.evidence import FIVE, SURE, Moving, shortened
-from identification.karnopp import Karnopp
-from identification.plant import Motor, Plant
-from identification.refit import (
+from identification.estimation.global_search import evolve
+from identification.estimation.regression.effect_columns import (
+    LEAST_LEFT_BY_LOAD,
+    by_load,
+    in_columns,
+)
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    SURE_OF_DIRECTION,
+    MotionLog,
+    shortened,
+)
+from identification.estimation.regression.standstill import rest_stretches
+from identification.estimation.windowed_run.refinement import (
     COMPLETE,
-    FIRST,
+    SHORT_WINDOW,
     Judge,
     Refit,
     even,
@@ -38,19 +47,18 @@ from identification.refit import (
     values_of,
     wide,
 )
-from identification.rest import stretches
-from identification.result import Drive
-from identification.search import evolve
-from identification.stage import LOCKED
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
 
-TAU = 0.1  # s, in which a led body takes on the log's velocity
-STRONG = 1.5  # times the body's own viscous friction, with which it is led at least
-SAMPLES = 10  # the same at least, in samples
-SHAKEN = 0.1  # of the Coulomb level, that the velocity's noise may push a led body with
-STILL = 5  # samples of a rest, in which it is led by no velocity
+TAU = 0.1  # s, in which a nudged body takes on the log's velocity
+STRONG = 1.5  # times the body's own viscous friction, with which it is nudged at least
+NUDGED_SAMPLES = 10  # the same at least, in samples
+SHAKEN = 0.1  # of the Coulomb level, that the velocity's noise may push a nudged body with
+REST_SAMPLES = 5  # samples of a rest, in which nothing nudges it
 # Members and generations, of a plant with effects and (its runs are quick) without.
 CROWD, PLAIN_CROWD = (32, 30), (48, 40)
-SPREAD = 0.25  # of the first members
+FIRST_SPREAD = 0.25  # of the first members
 NARROWER = 0.3  # of that spread, for mass and sliding friction
 
 
@@ -69,45 +77,47 @@ class Range:
     known: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
 
 
-FAR = Range(0.03, 0.0, 2.5, 4.0, True)
-SLIDING = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
-TOLD = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
-BREAKS = Range(0.004, 0.12, 8.0, 3.0, False)  # growth may have bent stick limits and bands
-MIDWAY = Range(0.005, 0.1, 1.5, 4.0, False)
-CLOSE = Range(0.005, 0.05, 1.4, 1.4, False)
-SIDES = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be unequal
-GROWTH = Range(0.0, 0.01, 1.02, 3.0, False, 0.5)  # where sliding is known, growing stiction is not
-FINER = Range(0.0, 0.003, 1.01, 1.3, False, 0.1)  # the same, nearly found
+FAR_RANGE = Range(0.03, 0.0, 2.5, 4.0, True)
+SLIDING_RANGE = Range(0.005, 0.0, 2.5, 4.0, True)  # where that much is known
+TOLD_RANGE = Range(0.004, 0.03, 2.5, 1.1, False)  # where the equations tell all but the band
+BREAKS_RANGE = Range(0.004, 0.12, 8.0, 3.0, False)  # growth may have bent stick limits and bands
+MIDWAY_RANGE = Range(0.005, 0.1, 1.5, 4.0, False)
+CLOSE_RANGE = Range(0.005, 0.05, 1.4, 1.4, False)
+SIDES_RANGE = Range(0.005, 0.05, 1.4, 1.4, False, 0.5)  # where directions may be unequal
+# Where sliding is known, growing stiction is not
+GROWTH_RANGE = Range(0.0, 0.01, 1.02, 3.0, False, 0.5)
+FINER_RANGE = Range(0.0, 0.003, 1.01, 1.3, False, 0.1)  # the same, nearly found
 DOUBLE = 2.0  # times the slowest sure sliding, up to which a band is tried
-SHORT = 15.0  # s of each log on which a search from afar is made
-SEARCHES, GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
-PROMISING, POOR = (
+SHORT_SECONDS = 15.0  # s of each log on which a search from afar is made
+SEARCHES, SEARCH_GAIN = 3, 0.8  # close by at most, each to leave this share of the misfit before
+PROMISING_MISFIT, POOR = (
     3.0,
     2,
 )  # misfit on the short logs, of effects worth a search; so many more at most
-AGREED = 1.1  # relative misfit of two searches that have ended in the same place
+SAME_PLACE = 1.1  # relative misfit of two searches that have ended in the same place
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
 NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
-KNOWN = 0.002  # share within which sliding is searched where an effect acts in stops alone
-UNEVEN = 0.15  # by which an asymmetry that is not 0 is searched
-BAND = 0.15  # of the slowest sure speed, that a band is at least
-STICK = (0.95, 1.6, 3.0)  # times the Coulomb level: least, usual and most of a stick limit
-BEYOND = 1.15  # times a stick limit, up to which it is searched
+KNOWN_SLIDING = 0.002  # share within which sliding is searched where an effect acts in stops alone
+ASYMMETRY_REACH = 0.15  # by which an asymmetry that is not 0 is searched
+LEAST_BAND = 0.15  # of the slowest sure speed, that a band is at least
+# Times the Coulomb level: least, usual and most of a stick limit
+STICK_PER_COULOMB = (0.95, 1.6, 3.0)
+STICK_REACH = 1.15  # times a stick limit, up to which it is searched
 
 
-def approach(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
-    stages: Sequence[tuple[float, Range]] = ((1.0, FAR), (0.0, CLOSE)),
+def nudged_search(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
+    stages: Sequence[tuple[float, Range]] = ((1.0, FAR_RANGE), (0.0, CLOSE_RANGE)),
 ) -> Plant:  # fmt: skip
     """The plant with the parameters that the logs' run by force calls for, nearly.
 
-    stages: leading (1: in full, 0: none) and range of one search after the other.
+    stages: nudging (1: in full, 0: none) and range of one search after the other.
     """
     by_force = any(by_load(acting.effect) for acting in plant.effects)
     first = plant
     for share, around in stages:
-        if share > 0.0 and by_force:  # the force that leads would be a load too
+        if share > 0.0 and by_force:  # the force that nudges would be a load too
             continue
         if share == 0.0 and plant is not first:
             plant = nearer((plant, first), logs, drive)
@@ -115,14 +125,14 @@ def approach(
     return plant
 
 
-def nearer(plants: Sequence[Plant], logs: Sequence[Moving], drive: Drive) -> Plant:
-    """The plant whose run, led by nothing, leaves least in short windows."""
-    errors_of = judge(plants[-1], logs, drive, FIRST)
+def nearer(plants: Sequence[Plant], logs: Sequence[MotionLog], drive: Drive) -> Plant:
+    """The plant whose free run leaves least in short windows."""
+    errors_of = judge(plants[-1], logs, drive, SHORT_WINDOW)
     return min(plants, key=lambda one: loss(errors_of(one)))
 
 
 def closest(
-    begins: Sequence[Plant], logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
+    begins: Sequence[Plant], logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
     searches: int = SEARCHES, told: bool = False,
     known: Mapping[str, float] = MappingProxyType({}), done: Refit | None = None,
     vain: float = np.inf,
@@ -135,21 +145,24 @@ def closest(
     a parameter open; done: found already, and beside the searches one that may be agreed with;
     vain: misfit on the short logs beyond which what was found already stays.
     """
-    short = [shortened(one, SHORT) for one in logs]
+    short = [shortened(one, SHORT_SECONDS) for one in logs]
     best, poor = done, 0
     for i, plant in enumerate([*begins[: int(told)], *begins]):
         if told and i == 0:
             banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
-            near = approach(banded, short, drive, rng, ((0.0, TOLD), (0.0, CLOSE)))
+            near = nudged_search(banded, short, drive, rng, ((0.0, TOLD_RANGE), (0.0, CLOSE_RANGE)))
         else:
-            stages = ((1.0, replace(FAR, known=known)), (0.0, replace(CLOSE, known=known)))
-            near = approach(plant, short, drive, rng, stages)
+            stages = (
+                (1.0, replace(FAR_RANGE, known=known)),
+                (0.0, replace(CLOSE_RANGE, known=known)),
+            )
+            near = nudged_search(plant, short, drive, rng, stages)
         begun = refit(near, short, drive, prior=even(near), effort="quick")
         if best is not None and begun.misfit > vain:
             break
-        hopes = not plant.effects or begun.misfit <= PROMISING
+        hopes = not plant.effects or begun.misfit <= PROMISING_MISFIT
         worth = searches if hopes else min(searches, 1)
-        found = _on_whole(begun, logs, drive, rng, worth, replace(CLOSE, known=known), best)
+        found = _on_whole(begun, logs, drive, rng, worth, replace(CLOSE_RANGE, known=known), best)
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
         poor += not hopes
@@ -163,11 +176,11 @@ def agree(one: Refit | None, other: Refit | None) -> bool:
     """Whether two searches have ended in the same place."""
     if one is None or other is None:
         return False
-    return one.misfit < AGREED * other.misfit < AGREED**2 * one.misfit
+    return one.misfit < SAME_PLACE * other.misfit < SAME_PLACE**2 * one.misfit
 
 
 def _on_whole(
-    begun: Refit, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, searches: int,
+    begun: Refit, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator, searches: int,
     around: Range, done: Refit | None,
 ) -> Refit:  # fmt: skip
     """What was found on short logs, refined on the whole; searched closer where it falls short."""
@@ -182,8 +195,8 @@ def _on_whole(
 
 
 def closer(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES, around: Range = CLOSE, hopeless: float = np.inf,
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
+    searches: int = SEARCHES, around: Range = CLOSE_RANGE, hopeless: float = np.inf,
     done: Refit | None = None,
 ) -> Refit:  # fmt: skip
     """The plant refined, then searched close by and refined again, so many times at most, as long
@@ -202,12 +215,12 @@ def closer(
         if agree(done, best):
             break
         plant = plant if best is None else best.plant
-        near = approach(plant, part, drive, rng, ((0.0, around),))
+        near = nudged_search(plant, part, drive, rng, ((0.0, around),))
         if slow:
             found = refit(near, logs, drive, prior=even(near), effort="near")
         else:
             found = onward(near, logs, drive)
-        gained = best is None or found.misfit < GAIN * best.misfit
+        gained = best is None or found.misfit < SEARCH_GAIN * best.misfit
         best = found if best is None or found.misfit < best.misfit else best
         if not gained:
             break
@@ -220,7 +233,7 @@ def load_share(friction: Karnopp, acting: Acting) -> float:
     none = np.zeros(MAX_SIGNALS)
     level = friction.F_cp
     taken = acting.effect.value(0.0, 0.0, 1.0, 1.0, 0.0, 1.0, 0.0, level, level, none, acting.array)
-    return max(1.0 - taken, LOCKED)
+    return max(1.0 - taken, LEAST_LEFT_BY_LOAD)
 
 
 def less_load(base: Plant, acting: Acting) -> Plant:
@@ -246,20 +259,20 @@ def more_load(plant: Plant) -> Plant:
     return replace(plant, friction=Karnopp.from_array(nine))
 
 
-def judge_led(plant: Plant, logs: Sequence[Moving], drive: Drive, share: float) -> Judge:
-    """Errors of a plant like this one led by this share of the full damping (`refit.judge`)."""
-    damping = share * leading(plant, logs)
+def judge_nudged(plant: Plant, logs: Sequence[MotionLog], drive: Drive, share: float) -> Judge:
+    """Errors of a plant like this one nudged by a share of the damping (`refinement.judge`)."""
+    damping = share * nudging(plant, logs)
     if damping == 0.0:
-        return judge(plant, logs, drive, FIRST)
-    pulled = [led(one, plant, damping) for one in logs]
-    errors_of = judge(damped(plant, damping), pulled, drive, FIRST)
+        return judge(plant, logs, drive, SHORT_WINDOW)
+    pulled = [nudged(one, plant, damping) for one in logs]
+    errors_of = judge(damped(plant, damping), pulled, drive, SHORT_WINDOW)
     return lambda tried: errors_of(damped(tried, damping))
 
 
-def led(one: Moving, plant: Plant, damping: float) -> Moving:
-    """The log with the force [N] in it by which a damping [N s/m] leads a body."""
+def nudged(one: MotionLog, plant: Plant, damping: float) -> MotionLog:
+    """The log with the force [N] in it by which a damping [N s/m] nudges a body."""
     v = one.signals["v"].copy()
-    for low, high in stretches(one, STILL):
+    for low, high in rest_stretches(one, REST_SAMPLES):
         v[low:high] = 0.0
     force = damping * np.append(0.5 * (v[1:] + v[:-1]), v[-1])
     more = {"F": one.log["F"] + force}
@@ -268,11 +281,11 @@ def led(one: Moving, plant: Plant, damping: float) -> Moving:
     return replace(one, log=one.log.with_signals(**more))
 
 
-def leading(plant: Plant, logs: Sequence[Moving]) -> float:
-    """Damping [N s/m] by which a body is led to the measured velocity but not shaken by noise."""
+def nudging(plant: Plant, logs: Sequence[MotionLog]) -> float:
+    """Damping [N s/m] that nudges a body to the measured velocity but not shaken by noise."""
     p = plant.friction
     noise = max(one.v_noise for one in logs)
-    tau = max(TAU, *(SAMPLES * one.log.h for one in logs))
+    tau = max(TAU, *(NUDGED_SAMPLES * one.log.h for one in logs))
     strong = max(p.m / tau, STRONG * max(p.F_vp, p.F_vn))
     return float(min(strong, SHAKEN * min(p.F_cp, p.F_cn) / max(noise, 1e-300)))
 
@@ -284,16 +297,16 @@ def damped(plant: Plant, damping: float) -> Plant:
 
 
 def _searched(
-    plant: Plant, logs: Sequence[Moving], drive: Drive, rng: np.random.Generator, share: float,
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator, share: float,
     around: Range,
 ) -> Plant:  # fmt: skip
-    """The best plant in this range, led by this share of the full damping."""
+    """The best plant in this range, nudged by this share of the damping."""
     size, generations = CROWD if plant.effects else PLAIN_CROWD
-    errors_of = judge_led(plant, logs, drive, share)
+    errors_of = judge_nudged(plant, logs, drive, share)
     # Friction by load and everything else scale each other: they are searched apart.
     plant = more_load(plant)
     names = names_of(plant, drive)
-    low, high = limits(plant, names, SURE * max(one.v_noise for one in logs), around)
+    low, high = limits(plant, names, SURE_OF_DIRECTION * max(one.v_noise for one in logs), around)
     by_log = _by_log(names, low, high)
 
     def at(z: Array) -> Plant:
@@ -302,7 +315,7 @@ def _searched(
         return loaded(plant_with(plant, names, x))
 
     here = _place(values_of(plant, names), low, high, by_log)
-    spread = SPREAD * np.where(np.isin(names, FIVE), NARROWER, 1.0)
+    spread = FIRST_SPREAD * np.where(np.isin(names, FIVE), NARROWER, 1.0)
     first = np.clip(here + spread * rng.standard_normal((size, len(names))), 0.0, 1.0)
     first[0] = here
     with ThreadPoolExecutor(2) as pool:
@@ -319,7 +332,7 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
     p = plant.friction
     # Growing stiction does not bend what sliding tells: that is known closely already.
     stops = bool(plant.effects) and all(a.effect.place.in_stops for a in plant.effects)
-    five = min(around.five, KNOWN) if stops else around.five
+    five = min(around.five, KNOWN_SLIDING) if stops else around.five
     params = {f"{a.key}.{one.name}": one for a in plant.effects for one in a.effect.params}
     columns = [f"{a.key}.{one}" for a in plant.effects if in_columns(a.effect) for one in a.values]
     low, high = [], []
@@ -327,12 +340,17 @@ def limits(plant: Plant, names: Sequence[str], slow: float, around: Range) -> tu
         size = abs(value)
         if name in ("dv_p", "dv_n"):
             size = max(size, slow) if around.open else size
-            least = BAND if around.open else 1.0 / around.band
+            least = LEAST_BAND if around.open else 1.0 / around.band
             ends = [np.sign(value) * size * least, np.sign(value) * size * around.band]
         elif name in ("F_sp", "F_sn") and around.open:
             coulomb = p.F_cp if name == "F_sp" else p.F_cn
-            most = min(max(STICK[1], BEYOND * size / coulomb), STICK[2])
-            ends = [np.sign(value) * STICK[0] * coulomb, np.sign(value) * most * coulomb]
+            most = min(
+                max(STICK_PER_COULOMB[1], STICK_REACH * size / coulomb), STICK_PER_COULOMB[2]
+            )
+            ends = [
+                np.sign(value) * STICK_PER_COULOMB[0] * coulomb,
+                np.sign(value) * most * coulomb,
+            ]
         elif name in columns and params[name].spare and value == 0.0:
             ends = [0.0, 0.0]  # sliding calls for none
         elif name in params:
@@ -350,7 +368,7 @@ def _of_effect(p: Param, value: float, around: Range) -> list[float]:
     """Bounds of one parameter of an effect; an asymmetry of 0 stays unless it is searched."""
     factor = around.effect
     if p.name == "asymmetry":
-        off = UNEVEN if value != 0.0 else around.uneven
+        off = ASYMMETRY_REACH if value != 0.0 else around.uneven
         return [max(value - off, p.low), min(value + off, p.high)]
     if p.held(value):
         return [value, value]
