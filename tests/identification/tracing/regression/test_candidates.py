@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.candidates import Candidate, best_of
-from identification.choice import first_stage
-from identification.evidence import moving
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
+from identification.estimation.regression.equation_rows import motion_log
 from identification.log import Log
+from identification.model.karnopp import Karnopp
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import NINE, made, seen
 
 
 def best(
     key: str, effects: Mapping[str, Mapping[str, float]], friction: Karnopp = NINE
-) -> Candidate:
+) -> EffectCandidate:
     """The effect `key` at its best on the log of a motor with these effects."""
     stage, base = first_stage([seen(made(3, effects, friction=friction))], by_command=False)
     found = best_of(stage, built_in()[key], base)
@@ -88,7 +88,7 @@ def test_a_chamber_whose_seal_has_no_friction_comes_out_as_nothing(seed: int) ->
             "p_n": p_n,
         },
     )
-    stage, base = first_stage([moving(log, held=False, by_command=False)], by_command=False)
+    stage, base = first_stage([motion_log(log, held=False, by_command=False)], by_command=False)
     found = best_of(stage, built_in()["pressure_dependent_friction"], base)
     assert found is not None
     assert found.values["mu_p"] >= 0.0

@@ -2,15 +2,15 @@
 
 import numpy as np
 
-from identification.along import contribution
 from identification.arrays import Array
 from identification.effects._base import Effect
-from identification.equations import Values
-from identification.evidence import Moving, integral
-from identification.karnopp import Karnopp
+from identification.estimation.regression.effect_columns import Values
+from identification.estimation.regression.equation_rows import MotionLog, integral
+from identification.model.karnopp import Karnopp
+from identification.simulation.effect_along_motion import contribution
 
 
-def shown_to_true(effect: Effect, values: Values, one: Moving, friction: Karnopp) -> Array:
+def shown_to_true(effect: Effect, values: Values, one: MotionLog, friction: Karnopp) -> Array:
     """Position of the body [m] behind the measured one, (n,), by the sensor effect's own equation.
 
     A play is crossed while the measured position rests, so the body is on the side of the last
@@ -27,14 +27,14 @@ def shown_to_true(effect: Effect, values: Values, one: Moving, friction: Karnopp
     return true
 
 
-def driven(one: Moving, reached: Array) -> Array:
+def driven(one: MotionLog, reached: Array) -> Array:
     """Force of a motor [N], (n,), by the integral of the command that reaches it [V s]."""
     u = np.asarray(one.log["u"])
     k_a = float(u @ one.log["F"]) / max(float(u @ u), 1e-300)
-    return np.asarray(k_a * command(one, reached))
+    return np.asarray(k_a * command_of(one, reached))
 
 
-def command(one: Moving, reached: Array) -> Array:
+def command_of(one: MotionLog, reached: Array) -> Array:
     """Command [V], (n,), by its integral."""
     return np.append(np.diff(reached), 0.0) / one.log.h
 
@@ -45,7 +45,7 @@ def _last_direction(d: Array) -> Array:
     return d[at]
 
 
-def reached(effect: Effect, values: Values, one: Moving, friction: Karnopp) -> Array:
+def reached(effect: Effect, values: Values, one: MotionLog, friction: Karnopp) -> Array:
     """Integral of the command that reaches the actuator [V s], (n,)."""
     h, u = one.log.h, np.asarray(one.log["u"])
     given = contribution(effect, values, one.signals, h, friction)

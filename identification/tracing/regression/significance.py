@@ -5,18 +5,21 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.candidates import Candidate
-from identification.outcome import Outcome
-from identification.stage import Stage
+from identification.tracing.regression.candidates import EffectCandidate
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit
 
 DRAWS = 200  # of the null hypothesis
 SEARCHED = 2.0  # times the gain of columns at one place: the search over shapes finds more
 
 
 def chance(
-    best: Candidate, rivals: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome],
+    best: EffectCandidate,
+    rivals: Sequence[EffectCandidate],
+    stage: EffectRows,
+    base: Mapping[str, RowFit],
     rng: np.random.Generator,
-) -> float:  # fmt: skip
+) -> float:
     """Chance that some effect of the library gains as much where none is missing.
 
     The model without the effect is given the residual that the best candidate leaves, its signs
@@ -44,7 +47,7 @@ def chance(
         for c in (best, *rivals):
             if equation not in c.outcomes:
                 continue
-            own = directions(c.outcomes[equation], kept) * heavy[:, np.newaxis]
+            own = effect_directions(c.outcomes[equation], kept) * heavy[:, np.newaxis]
             if o.robust:
                 own = np.clip(own, -limit, limit)
             own = own - Q @ (Q.T @ own)
@@ -54,7 +57,7 @@ def chance(
     return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
 
 
-def directions(o: Outcome, base: Outcome) -> Array:
+def effect_directions(o: RowFit, base: RowFit) -> Array:
     """Whitened columns (r, k) by which an effect moves the rows."""
     more = o.rows.X[:, base.rows.X.shape[1] :] / o.rows.sd[:, np.newaxis]
     moved = (base.fit.residual - o.fit.residual)[:, np.newaxis]

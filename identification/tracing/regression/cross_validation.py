@@ -3,29 +3,31 @@
 import numpy as np
 
 from identification.arrays import Array
-from identification.evidence import MECHANICAL, Rows, solve, stacked
-from identification.stage import Stage
+from identification.estimation.regression.equation_rows import MECHANICAL, Rows, solve_rows, stacked
+from identification.tracing.regression.effect_rows import EffectRows
 
 
-def residual(stage: Stage, equation: str, theta: Array, slowest: float) -> tuple[Array, Array]:
+def row_residual(
+    stage: EffectRows, equation: str, theta: Array, slowest: float
+) -> tuple[Array, Array]:
     """Residual (r,) of the rows that count with these parameters, and their left side."""
     rows = stacked(stage.parts[equation])
     keep = rows.speed >= slowest
     return (rows.b - rows.X @ theta)[keep], rows.b[keep]
 
 
-def left_out(rows: Rows, slowest: float) -> tuple[Array, Array]:
-    """As `residual`, each stretch of time with the sizes that all others give."""
+def left_out_residual(rows: Rows, slowest: float) -> tuple[Array, Array]:
+    """As `row_residual`, each stretch of time with the sizes that all others give."""
     keep = rows.speed >= slowest
     r = np.zeros(len(rows.b))
     for block in np.unique(rows.block):
         out = rows.block == block
-        theta = solve(rows, keep & ~out).theta
+        theta = solve_rows(rows, keep & ~out).theta
         r[out] = rows.b[out] - rows.X[out] @ theta
     return r[keep], rows.b[keep]
 
 
-def left_out_error(stage: Stage, slowest: float) -> float:
+def left_out_error(stage: EffectRows, slowest: float) -> float:
     """Root mean square of the mechanical equation [N] on each log, fitted on all others.
 
     Runs of one file, cut at its gaps, are left out together where there are more files. 0 where
@@ -42,6 +44,6 @@ def left_out_error(stage: Stage, slowest: float) -> float:
     r = np.zeros(len(rows.b))
     for i in range(int(of_part.max()) + 1):
         out = of_log == i
-        theta = solve(rows, keep & ~out).theta
+        theta = solve_rows(rows, keep & ~out).theta
         r[out] = rows.b[out] - rows.X[out] @ theta
     return float(np.sqrt(np.mean(r[keep] ** 2)))

@@ -7,43 +7,53 @@ from types import MappingProxyType
 
 import numpy as np
 
-from identification.along import contribution, elastic_displacement, elastic_share
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Effect
-from identification.equations import Values, by_load, equations_of, needs_rounds, split
-from identification.evidence import (
+from identification.estimation.regression.effect_columns import (
+    LEAST_LEFT_BY_LOAD,
+    Values,
+    by_load,
+    equations_of,
+    needs_rounds,
+    split,
+)
+from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     EQUATIONS,
     MECHANICAL,
     REST,
-    Moving,
+    MotionLog,
     Rows,
     actuator,
     mechanical,
 )
-from identification.karnopp import Karnopp
-from identification.limits import breakaway_limits
-from identification.rest import (
+from identification.estimation.regression.standstill import (
     Breakaways,
     Rest,
     breakaway_rows,
     breakaways,
     rest_rows,
+    rest_stretches,
     rests,
-    stretches,
 )
-from identification.transforms import driven, reached, shown_to_true
+from identification.model.karnopp import Karnopp
+from identification.simulation.effect_along_motion import (
+    contribution,
+    elastic_displacement,
+    elastic_share,
+)
+from identification.tracing.regression.breakaway import breakaway_limits
+from identification.tracing.regression.signals_behind_effects import driven, reached, shown_to_true
 
 BLURRED = 1e3  # times the noise, of a row that says nothing
-LOCKED = 0.1  # of the applied force, at least left to drive
-SMALL = 1e-6  # of the largest command, a step by which its passing is told
+COMMAND_STEP = 1e-6  # of the largest command, a step by which its passing is told
 FLAT = 0.2  # of the time in sliding, that a command may leave a motor without force
-SLIGHTLY = 1e-3  # of a level of friction, over which a slope is taken
-HOPELESS = 1e3  # times the force to be explained
+SLOPE_STEP = 1e-3  # of a level of friction, over which a slope is taken
+UNEXPLAINED = 1e3  # times the force to be explained
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class EffectRows:
     """Logs and the structure found so far.
 
     logs: with sensor and command effects found already taken out; theta: m, F_cp, F_cn, F_vp,
@@ -57,7 +67,7 @@ class Stage:
     scales: by equation, what its rows' squares are divided by.
     """
 
-    logs: tuple[Moving, ...]
+    logs: tuple[MotionLog, ...]
     theta: Array
     theta_a: Array
     by_command: bool
@@ -87,11 +97,11 @@ class Stage:
         for equation in EQUATIONS:
             if equation == ACTUATOR and not self.by_command:
                 continue
-            own = [plain(self, equation, i) for i in range(len(self.logs))]
+            own = [plain_rows(self, equation, i) for i in range(len(self.logs))]
             for effect, values in self.chosen:
                 if equation in equations_of(effect, self.by_command, self.held):
                     own = [
-                        joined(self, equation, effect, values, i, rows)
+                        with_effect(self, equation, effect, values, i, rows)
                         for i, rows in enumerate(own)
                     ]
             out[equation] = own
@@ -116,17 +126,17 @@ class Stage:
         return self.logs[0].held
 
     @property
-    def led(self) -> bool:
+    def imposed(self) -> bool:
         """Whether the motion is imposed: a body that a rig moves is not stuck at any speed."""
-        return self.logs[0].led
+        return self.logs[0].imposed
 
     def scale(self, equation: str) -> float:
         """What squares of rows are divided by, 1 where nothing but noise is left."""
         return self.scales.get(equation, 1.0)
 
 
-def plain(
-    stage: Stage, equation: str, i: int, y: Array | None = None, u: Array | None = None
+def plain_rows(
+    stage: EffectRows, equation: str, i: int, y: Array | None = None, u: Array | None = None
 ) -> Rows:
     """Rows of the model without effects, of log `i`; y, u (its integral): in place of the log's."""
     one = stage.logs[i]
@@ -143,7 +153,7 @@ def plain(
     return breakaway_rows(one, stage.events[i])
 
 
-def one_way(one: Moving) -> BoolArray:
+def one_way(one: MotionLog) -> BoolArray:
     """Rows of the actuator equation without a reversal, in which a play may be crossed, (r,)."""
     assert one.whole is not None
     way = np.sign(one.signals["v"])
@@ -152,7 +162,9 @@ def one_way(one: Moving) -> BoolArray:
     return np.asarray(turns[high] == turns[low])
 
 
-def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, rows: Rows) -> Rows:
+def with_effect(
+    stage: EffectRows, equation: str, effect: Effect, shape: Values, i: int, rows: Rows
+) -> Rows:
     """`rows` of log `i` with the effect in them: columns, or transformed signals."""
     one = stage.logs[i]
     if effect.place.elastic:
@@ -160,16 +172,18 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
             bent = elastic_displacement(effect, shape, one.signals, one.log.h, stage.friction)
             return replace(
                 rows,
-                b=rows.b - (plain(stage, REST, i).b - rest_rows(one, stage.at_rest[i], bent).b),
+                b=rows.b
+                - (plain_rows(stage, REST, i).b - rest_rows(one, stage.at_rest[i], bent).b),
             )
         return _elastic(effect, shape, one, stage, rows)
     if effect.place.shows:
         return _beside(
-            plain(stage, equation, i, y=shown_to_true(effect, shape, one, stage.friction)), rows
+            plain_rows(stage, equation, i, y=shown_to_true(effect, shape, one, stage.friction)),
+            rows,
         )
     if effect.place.on_command:
         behind = _beside(
-            plain(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
+            plain_rows(stage, equation, i, u=reached(effect, shape, one, stage.friction)), rows
         )
         if one.held and equation == MECHANICAL and not effect.place.delays:
             return _flattened(effect, shape, one, stage, behind)
@@ -197,20 +211,22 @@ def joined(stage: Stage, equation: str, effect: Effect, shape: Values, i: int, r
     )  # fmt: skip
 
 
-def _flattened(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+def _flattened(
+    effect: Effect, shape: Values, one: MotionLog, stage: EffectRows, rows: Rows
+) -> Rows:
     """A motor's rows with what they lose where the effect flattens their force.
 
     By the change of variable from the logged force to the one that reaches the body; where none
     of it passes, the log tells no more than that it lies within the force's range.
     """
     s, h, u = one.signals, one.log.h, np.asarray(one.log["u"])
-    step = SMALL * float(np.max(np.abs(u)))
+    step = COMMAND_STEP * float(np.max(np.abs(u)))
     more = contribution(effect, shape, {**s, "u": u + np.copysign(step, u)}, h, stage.friction)
     given = contribution(effect, shape, s, h, stage.friction)
     slope = np.abs(more - given) / step
     least = float(np.median(rows.sd)) * np.sqrt(2 * np.pi) / max(float(np.ptp(s["F"])), 1e-300)
     if np.mean(one.sliding.held @ (slope < least)) > FLAT:  # a body driven by nothing
-        return replace(rows, b=HOPELESS * (one.sliding.held @ one.log["F"]))
+        return replace(rows, b=UNEXPLAINED * (one.sliding.held @ one.log["F"]))
     lost = -2.0 * np.sum(one.sliding.held @ np.log(np.maximum(slope, min(least, 1.0))))
     return replace(rows, lost=float(lost))
 
@@ -222,7 +238,9 @@ def _beside(fresh: Rows, rows: Rows) -> Rows:
     return replace(fresh, X=both, names=rows.names, positive=rows.positive)
 
 
-def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[list[Array], Array]:
+def columns(
+    effect: Effect, shape: Values, one: MotionLog, stage: EffectRows
+) -> tuple[list[Array], Array]:
     """Columns (r,) of the linear parameters, and the contribution as it is where there are none."""
     trials = [
         {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear
@@ -242,7 +260,7 @@ def columns(effect: Effect, shape: Values, one: Moving, stage: Stage) -> tuple[l
     return (out, np.zeros(0)) if effect.linear else ([], out[0])
 
 
-def _in_sliding(effect: Effect, values: Values, one: Moving, friction: Karnopp) -> Array:
+def _in_sliding(effect: Effect, values: Values, one: MotionLog, friction: Karnopp) -> Array:
     """What an effect contributes, (n,), right where the body slides."""
     if effect.evolve is not None:
         return contribution(effect, values, one.signals, one.log.h, friction)
@@ -253,7 +271,7 @@ def _in_sliding(effect: Effect, values: Values, one: Moving, friction: Karnopp) 
 
 
 def _bent(
-    effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows, fixed: Array
+    effect: Effect, shape: Values, one: MotionLog, stage: EffectRows, rows: Rows, fixed: Array
 ) -> Rows:
     """Rows with what the effect makes of the friction that is fitted beside it.
 
@@ -261,19 +279,19 @@ def _bent(
     sliding parameters joins their columns, or substitution would creep to them in many rounds.
     """
     now = np.maximum(stage.theta if stage.theta_f is None else stage.theta_f, 1e-9)
-    level = max(float(np.mean(now[1:3])), SLIGHTLY * float(np.std(one.log["F"])), 1e-12)
+    level = max(float(np.mean(now[1:3])), SLOPE_STEP * float(np.std(one.log["F"])), 1e-12)
     pace = level / max(float(np.max(one.speed)), 1e-300)
     X, b = rows.X.copy(), rows.b - fixed
     for i, step in ((1, level), (2, level), (3, pace), (4, pace)):
-        theta = now + SLIGHTLY * step * (np.arange(len(now)) == i)
+        theta = now + SLOPE_STEP * step * (np.arange(len(now)) == i)
         _, more = columns(effect, shape, one, replace(stage, theta_f=theta))
-        slope = (more - fixed) / (SLIGHTLY * step)
+        slope = (more - fixed) / (SLOPE_STEP * step)
         X[:, i] += slope
         b += slope * now[i]
     return replace(rows, b=b, X=X)
 
 
-def _implicit(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+def _implicit(effect: Effect, shape: Values, one: MotionLog, stage: EffectRows, rows: Rows) -> Rows:
     """Rows solved for the applied force: F - d added(F) = X theta, divided by 1 - d added'(F).
 
     Without the division, friction that grows with F would explain F by itself.
@@ -284,13 +302,14 @@ def _implicit(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Ro
     raw = contribution(effect, shape, s, h, stage.friction)
     more = contribution(effect, shape, {**s, "F": s["F"] + step}, h, stage.friction)
     steep = 1.0 - d * (one.sliding.mean @ ((more - raw) / step))
-    if np.any(steep < LOCKED):  # it would hold itself: no motion could be explained by it
-        return replace(rows, b=HOPELESS * rows.b)
+    # It would hold itself: no motion could be explained by it
+    if np.any(steep < LEAST_LEFT_BY_LOAD):
+        return replace(rows, b=UNEXPLAINED * rows.b)
     b = (rows.b - d * (one.sliding.mean @ raw)) / steep
     return replace(rows, b=b, X=rows.X / steep[:, np.newaxis])
 
 
-def _elastic(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Rows) -> Rows:
+def _elastic(effect: Effect, shape: Values, one: MotionLog, stage: EffectRows, rows: Rows) -> Rows:
     """The two Coulomb columns replaced by an elastic force that builds up to them."""
     level = elastic_share(effect, shape, one.signals, one.log.h, stage.friction)
     X = rows.X.copy()
@@ -299,12 +318,14 @@ def _elastic(effect: Effect, shape: Values, one: Moving, stage: Stage, rows: Row
     return replace(rows, X=X)
 
 
-def _stiction(effect: Effect, shape: Values, i: int, stage: Stage) -> tuple[list[Array], Array]:
+def _stiction(
+    effect: Effect, shape: Values, i: int, stage: EffectRows
+) -> tuple[list[Array], Array]:
     """Columns (k,) of the linear parameters at the breakaways of log `i`, signed as the force."""
     one, events = stage.logs[i], stage.events[i]
     signals = dict(one.signals)
     signals["d"] = np.ones(len(one.log))
-    for low, high in stretches(one, 2):
+    for low, high in rest_stretches(one, 2):
         signals["d"][low:high] = 0.0
     trials = [
         {**shape, **{k: float(k == name) for k in effect.linear}} for name in effect.linear

@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 from identification.arrays import Array
 from identification.effects._base import Effect, Param
-from identification.equations import (
+from identification.estimation.regression.effect_columns import (
     Values,
     admissible,
     equations_of,
@@ -23,42 +23,44 @@ from identification.equations import (
     needs_rounds,
     shape_params,
 )
-from identification.evidence import MECHANICAL, stacked
-from identification.grids import shape_grid
-from identification.outcome import Outcome, outcome
-from identification.stage import Stage, joined
+from identification.estimation.regression.equation_rows import MECHANICAL, stacked
+from identification.tracing.regression.effect_rows import EffectRows, with_effect
+from identification.tracing.regression.row_fit import RowFit, row_fit
+from identification.tracing.regression.shape_grid import shape_grid
 
 REFINED = 30  # evaluations of the refinement for each parameter
-ROUNDS = 4  # of substitution where a contribution depends on the friction itself
+SUBSTITUTIONS = 4  # of substitution where a contribution depends on the friction itself
 CALLED = 10.0  # criterion that each parameter has to gain, to leave its default
-OUTSIDE = 1e12  # criterion of parameters outside their bounds
+OUT_OF_BOUNDS = 1e12  # criterion of parameters outside their bounds
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class EffectCandidate:
     """An effect at its best: its parameters, and every equation that it changes."""
 
     effect: Effect
     values: dict[str, float]
-    outcomes: Mapping[str, Outcome]
+    outcomes: Mapping[str, RowFit]
     gain: float
 
 
 def trial(
-    stage: Stage, effect: Effect, shape: Values, told_in: Sequence[str]
-) -> tuple[float, dict[str, Outcome]]:
+    stage: EffectRows, effect: Effect, shape: Values, told_in: Sequence[str]
+) -> tuple[float, dict[str, RowFit]]:
     """Criterion over the equations `told_in` with the effect at this shape, and their outcomes."""
     found = {}
     for equation in told_in:
         parts = [
-            joined(stage, equation, effect, shape, i, rows)
+            with_effect(stage, equation, effect, shape, i, rows)
             for i, rows in enumerate(stage.parts[equation])
         ]
-        found[equation] = outcome(stage, equation, stacked(parts))
+        found[equation] = row_fit(stage, equation, stacked(parts))
     return sum(x.criterion for x in found.values()), found
 
 
-def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candidate | None:
+def best_of(
+    stage: EffectRows, effect: Effect, base: Mapping[str, RowFit]
+) -> EffectCandidate | None:
     """The effect at its best beside what the stage holds; None where it cannot show or stand."""
     told_in = [e for e in equations_of(effect, stage.by_command, stage.held) if e in base]
     if not told_in or any(name not in one.signals for one in stage.logs for name in effect.needs):
@@ -79,7 +81,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     def score(shape: Values) -> float:
         total, found = trial(own, effect, shape, told_in)
         fair = needs_rounds(effect) or admissible(effect, with_sizes(effect, shape, found))
-        return total if fair else OUTSIDE
+        return total if fair else OUT_OF_BOUNDS
 
     best = min(starts, key=score)
     defaults = {p.name: p.default for p in free if p.optional and p.default is not None}
@@ -88,7 +90,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     if half != best and score(half) < score(best) + CALLED:
         best = half  # a harmonic had taken the whole of it
     total, found = trial(own, effect, best, told_in)
-    for i in range(ROUNDS if needs_rounds(effect) else 0):
+    for i in range(SUBSTITUTIONS if needs_rounds(effect) else 0):
         five = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else own.theta
         own = replace(own, theta_f=five)
         if i == 0:  # the plain friction's levels had bent its shape
@@ -98,7 +100,7 @@ def best_of(stage: Stage, effect: Effect, base: Mapping[str, Outcome]) -> Candid
     if not admissible(effect, values):
         return None
     gain = sum(base[e].criterion for e in told_in) - total
-    return Candidate(effect, values, found, float(gain))
+    return EffectCandidate(effect, values, found, float(gain))
 
 
 def shaped(
@@ -109,9 +111,9 @@ def shaped(
     best = dict(shape)
     told = [i for i, p in enumerate(free) if not p.optional]
     if told:
-        best = refined([free[i] for i in told], [bounds[i] for i in told], best, score)
+        best = refined_shape([free[i] for i in told], [bounds[i] for i in told], best, score)
     if len(told) < len(free):
-        other = refined(free, bounds, best, score)
+        other = refined_shape(free, bounds, best, score)
         if score(other) < score(best) - CALLED * (len(free) - len(told)):
             best = other
     return best
@@ -124,7 +126,7 @@ def bounds_of(p: Param, tried: Array) -> tuple[float, float]:
     return float(np.min(tried)), float(np.max(tried))
 
 
-def refined(
+def refined_shape(
     free: Sequence[Param], bounds: Sequence[tuple[float, float]], shape: Values,
     score: Callable[[Values], float],
 ) -> dict[str, float]:  # fmt: skip
@@ -148,7 +150,7 @@ def refined(
     return at(found.x)
 
 
-def with_sizes(effect: Effect, shape: Values, found: Mapping[str, Outcome]) -> dict[str, float]:
+def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> dict[str, float]:
     """All parameters: shape, and the linear ones found; two directions as mean and asymmetry."""
     values = {p.name: p.default for p in effect.params if p.default is not None} | dict(shape)
     if not in_columns(effect):

@@ -7,30 +7,35 @@ from functools import partial
 
 import numpy as np
 
-from identification.candidates import Candidate, best_of
-from identification.chance import chance
-from identification.equations import slow_motion
-from identification.evidence import (
+from identification.effects._library import Library
+from identification.estimation.regression.effect_columns import slow_motion
+from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
     MECHANICAL,
     REST,
-    Moving,
+    MotionLog,
 )
-from identification.held_out import left_out_error
-from identification.library import Library
-from identification.outcome import Outcome, base_outcomes, outcome, spread
-from identification.stage import Stage
-from identification.transforms import command, driven, reached, shown_to_true
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.cross_validation import left_out_error
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, base_fits, mean_square, row_fit
+from identification.tracing.regression.signals_behind_effects import (
+    command_of,
+    driven,
+    reached,
+    shown_to_true,
+)
+from identification.tracing.regression.significance import chance
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
-MOST = 4  # effects in one machine
-SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
-LEVEL = 0.01  # chance up to which a gain is no luck
+MOST_EFFECTS = 4  # effects in one machine
+LEAST_SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
+CHANCE_LEVEL = 0.01  # chance up to which a gain is no luck
 MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
 CARRIES = 0.95  # of the error on logs left out, that an effect may leave
-MOSTLY = 0.55  # of what is missing, where much is left in the end
-FAR = 25.0  # square in noise units from which much is left
+MOSTLY_EXPLAINED = 0.55  # of what is missing, where much is left in the end
+MUCH_IS_LEFT = 25.0  # square in noise units from which much is left
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
@@ -48,11 +53,11 @@ class Step:
     apart: keys of rivals that the equations do not tell from it, but the free run does.
     """
 
-    candidate: Candidate
+    candidate: EffectCandidate
     p_value: float
-    rivals: tuple[Candidate, ...]
-    stage: Stage
-    base: Mapping[str, Outcome]
+    rivals: tuple[EffectCandidate, ...]
+    stage: EffectRows
+    base: Mapping[str, RowFit]
     explained: float | None = None
     apart: frozenset[str] = frozenset()
 
@@ -62,34 +67,36 @@ class Choice:
     """The plain stage, the steps taken, and the stage with all effects in it; tried: what else was
     tried beside them."""
 
-    start: Stage
-    first: Mapping[str, Outcome]
+    start: EffectRows
+    first: Mapping[str, RowFit]
     steps: tuple[Step, ...]
-    end: Stage
-    base: Mapping[str, Outcome]
-    tried: tuple[Candidate, ...] = ()
+    end: EffectRows
+    base: Mapping[str, RowFit]
+    tried: tuple[EffectCandidate, ...] = ()
 
 
-def settled(stage: Stage) -> tuple[Stage, dict[str, Outcome]]:
+def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
     """The stage with its parameters fitted (rows' noise depends on them), and the outcomes."""
-    found = base_outcomes(stage)
+    found = base_fits(stage)
     for _ in range(2):
         theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
         theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
         stage = replace(stage, theta=theta, theta_a=theta_a)
-        found = base_outcomes(stage)
+        found = base_fits(stage)
     return stage, found
 
 
-def first_stage(logs: Sequence[Moving], by_command: bool) -> tuple[Stage, dict[str, Outcome]]:
+def first_stage(
+    logs: Sequence[MotionLog], by_command: bool
+) -> tuple[EffectRows, dict[str, RowFit]]:
     """The model without effects."""
     first = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0])
-    return settled(Stage(tuple(logs), *first, by_command))
+    return settled_fits(EffectRows(tuple(logs), *first, by_command))
 
 
 def choose(
-    start: Stage, first: Mapping[str, Outcome], library: Library, rng: np.random.Generator,
-    report: Progress, begun: Choice | None = None, most: int = MOST,
+    start: EffectRows, first: Mapping[str, RowFit], library: Library, rng: np.random.Generator,
+    report: Progress, begun: Choice | None = None, most: int = MOST_EFFECTS,
 ) -> Choice:  # fmt: skip
     """Effects that the logs call for, one after the other, each judged beside those before.
 
@@ -97,12 +104,12 @@ def choose(
     to go on from; most: effects at most.
     """
     stage, base, steps = start, first, list[Step]()
-    tried: Sequence[Candidate] = ()
+    tried: Sequence[EffectCandidate] = ()
     if begun is not None:
         stage, base, steps, tried = begun.end, begun.base, list(begun.steps), begun.tried
     for turn in range(len(steps), most):
         done = partial(_report, report, turn)
-        tried = candidates(stage, base, library, done)
+        tried = all_candidates(stage, base, library, done)
         found = accepted(tried, stage, base, rng)
         if found is None:
             break
@@ -116,50 +123,55 @@ def choose(
 
 
 def accepted(
-    tried: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome], rng: np.random.Generator
-) -> tuple[Step, Stage, Mapping[str, Outcome]] | None:
+    tried: Sequence[EffectCandidate],
+    stage: EffectRows,
+    base: Mapping[str, RowFit],
+    rng: np.random.Generator,
+) -> tuple[Step, EffectRows, Mapping[str, RowFit]] | None:
     """The best step that does not gain at the price of what it bends, and what is then left."""
     for _ in range(REFUSED):
         step = next_step(tried, stage, base, rng)
         if step is None:
             return None
-        after, left = settled(replace(absorb(step.stage, step.candidate), scales={}))
+        after, left = settled_fits(replace(absorb(step.stage, step.candidate), scales={}))
         told = base.keys() & left.keys()
         if sum(left[e].criterion for e in told) <= sum(base[e].criterion for e in told):
             return step, after, left
-        if all(spread(base[e]) <= HARDLY for e in step.candidate.outcomes):
+        if all(mean_square(base[e]) <= HARDLY for e in step.candidate.outcomes):
             return None
         key = step.candidate.effect.key
         tried = [one for one in tried if one.effect.key != key]
     return None
 
 
-def rough(base: Mapping[str, Outcome]) -> bool:
+def rough(base: Mapping[str, RowFit]) -> bool:
     """Whether far more than the sensors' noise is left when nothing more is found."""
-    return any(spread(base[e]) > FAR for e in (MECHANICAL, ACTUATOR) if e in base)
+    return any(mean_square(base[e]) > MUCH_IS_LEFT for e in (MECHANICAL, ACTUATOR) if e in base)
 
 
-def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Outcome], list[Step]]:
+def trusted(
+    start: EffectRows, steps: Sequence[Step]
+) -> tuple[EffectRows, Mapping[str, RowFit], list[Step]]:
     """The leading steps that carry over to logs left out, or else explain most of what is missing.
 
     Where much is left whatever is added, a term that explains a part of it lowers the training
     error and may raise that of another run (measured on EMPS).
     """
     kept: list[Step] = []
-    stage, base = start, base_outcomes(start)
+    stage, base = start, base_fits(start)
     slowest = base[MECHANICAL].slowest
     error = left_out_error(stage, slowest)
-    missing = spread(base[MECHANICAL]) - 1.0
+    missing = mean_square(base[MECHANICAL]) - 1.0
     for step in steps:
-        after, found = settled(replace(absorb(stage, step.candidate), scales={}))
+        after, found = settled_fits(replace(absorb(stage, step.candidate), scales={}))
         without = left_out_error(after, slowest)
         if error > 0 and MECHANICAL in step.candidate.outcomes:
-            less = spread(base[MECHANICAL]) - spread(found[MECHANICAL])
+            less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
             carries = without < CARRIES * error
             explains = less / max(missing, 1e-300)
         else:
             carries, explains = False, share(step.candidate, step.base)
-        if not carries and explains < MOSTLY:
+        if not carries and explains < MOSTLY_EXPLAINED:
             break
         kept.append(step)
         stage, base, error = after, found, without
@@ -167,18 +179,18 @@ def trusted(start: Stage, steps: Sequence[Step]) -> tuple[Stage, Mapping[str, Ou
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
-    report("tracing", (turn + part) / MOST)
+    report("tracing", (turn + part) / MOST_EFFECTS)
 
 
 def polished(
-    stage: Stage, base: Mapping[str, Outcome], steps: list[Step]
-) -> tuple[Stage, dict[str, Outcome], list[Step]]:
+    stage: EffectRows, base: Mapping[str, RowFit], steps: list[Step]
+) -> tuple[EffectRows, dict[str, RowFit], list[Step]]:
     """Every effect kept as columns at its best beside the others; those not needed any more go."""
-    scales = {equation: max(1.0, spread(o)) for equation, o in base.items()}
+    scales = {equation: max(1.0, mean_square(o)) for equation, o in base.items()}
     for effect, _values in stage.chosen[:-1]:
         others = tuple(x for x in stage.chosen if x[0].key != effect.key)
         without = replace(stage, chosen=others, scales=scales)
-        candidate = best_of(without, effect, base_outcomes(without))
+        candidate = best_of(without, effect, base_fits(without))
         at = next(i for i, s in enumerate(steps) if s.candidate.effect.key == effect.key)
         if candidate is None or merit(candidate) <= 0:
             stage, steps = replace(stage, chosen=others), steps[:at] + steps[at + 1 :]
@@ -189,17 +201,17 @@ def polished(
         steps[at] = replace(
             steps[at], candidate=replace(steps[at].candidate, values=candidate.values)
         )
-    stage, found = settled(replace(stage, scales={}))
+    stage, found = settled_fits(replace(stage, scales={}))
     return stage, found, steps
 
 
-def candidates(
-    stage: Stage, base: Mapping[str, Outcome], library: Library, report: Callable[[float], None]
-) -> list[Candidate]:
+def all_candidates(
+    stage: EffectRows, base: Mapping[str, RowFit], library: Library, report: Callable[[float], None]
+) -> list[EffectCandidate]:
     """Every effect of the library that is not in the stage yet, at its best beside it."""
     taken = {effect.key for effect, _ in stage.chosen} | set(stage.taken)
     keys = [k for k in library if k not in taken and k not in ABSORBED]
-    found: list[Candidate] = []
+    found: list[EffectCandidate] = []
     with ThreadPoolExecutor(2) as pool:
         each = pool.map(lambda key: best_of(stage, library[key], base), keys)
         for i, candidate in enumerate(each):
@@ -210,21 +222,24 @@ def candidates(
 
 
 def next_step(
-    found: Sequence[Candidate], stage: Stage, base: Mapping[str, Outcome], rng: np.random.Generator
+    found: Sequence[EffectCandidate],
+    stage: EffectRows,
+    base: Mapping[str, RowFit],
+    rng: np.random.Generator,
 ) -> Step | None:
     """The candidate that gains most, if it is material and no luck; None where there is none."""
     if not found:
         return None
     scales = scales_of(found, base)
     scaled = replace(stage, scales=scales)
-    base = base_outcomes(scaled)
+    base = base_fits(scaled)
     ranked = sorted((rescaled(scaled, c, base) for c in found), key=lambda c: -merit(c))
     # What explains a trifle of what is missing in its own equations must not hide the next.
     worth = [
         c
         for c in ranked
         if material(c, scaled, base)
-        and share(c, base) >= SHARE
+        and share(c, base) >= LEAST_SHARE
         and shows_fast(c, scaled, base)
         and gives_way(c, base)
     ]
@@ -233,17 +248,17 @@ def next_step(
     best = worth[0]
     ranked = [best, *(c for c in ranked if c is not best)]
     p_value = chance(best, ranked, scaled, base, rng)
-    if p_value > LEVEL or merit(best) <= 0:
+    if p_value > CHANCE_LEVEL or merit(best) <= 0:
         return None
     return Step(best, p_value, tuple(ranked[1:]), scaled, base)
 
 
-def merit(candidate: Candidate) -> float:
+def merit(candidate: EffectCandidate) -> float:
     """Gain less what its parameters would gain by luck."""
     return candidate.gain - PENALTY * len(candidate.effect.params)
 
 
-def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) -> bool:
+def shows_fast(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
     """Whether an effect that acts at any speed gains where the base explains the motion at all.
 
     In the band the body takes any force, so some effect always fits a few of its rows.
@@ -263,7 +278,7 @@ def shows_fast(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) 
     return gain > PENALTY * len(effect.params)
 
 
-def gives_way(candidate: Candidate, base: Mapping[str, Outcome]) -> bool:
+def gives_way(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> bool:
     """Whether a bristle that gains most at rest explains most of the motion seen there.
 
     What creeps from one short stop to the next moves there as well, but not with the force.
@@ -273,17 +288,17 @@ def gives_way(candidate: Candidate, base: Mapping[str, Outcome]) -> bool:
     at_rest = base[REST].criterion - candidate.outcomes[REST].criterion
     if at_rest < 0.5 * candidate.gain:
         return True
-    left = spread(candidate.outcomes[REST]) - 1.0
-    return left <= ELASTIC * max(spread(base[REST]) - 1.0, 0.0)
+    left = mean_square(candidate.outcomes[REST]) - 1.0
+    return left <= ELASTIC * max(mean_square(base[REST]) - 1.0, 0.0)
 
 
-def share(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
+def share(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> float:
     """Share of what is missing in its equations that an effect explains."""
     missing = sum(max(base[k].criterion - len(base[k].rows.b), 0.0) for k in candidate.outcomes)
     return float(candidate.gain / max(missing, candidate.gain, 1e-300))
 
 
-def explained_part(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
+def explained_part(candidate: EffectCandidate, base: Mapping[str, RowFit]) -> float:
     """Part of the square beyond the sensors' noise that an effect explains in its equations, on
     the rows that count with it."""
     before, after = 0.0, 0.0
@@ -300,24 +315,26 @@ def explained_part(candidate: Candidate, base: Mapping[str, Outcome]) -> float:
     return max(0.0, 1.0 - after / before) if before > 0.0 else 0.0
 
 
-def scales_of(found: Sequence[Candidate], base: Mapping[str, Outcome]) -> dict[str, float]:
+def scales_of(found: Sequence[EffectCandidate], base: Mapping[str, RowFit]) -> dict[str, float]:
     """Square that the best candidate leaves in each equation, 1 at least: what is noise to all."""
     out = {}
     for equation, o in base.items():
         options = [c.outcomes[equation] for c in found if equation in c.outcomes] + [o]
-        out[equation] = max(1.0, min(spread(x) for x in options))
+        out[equation] = max(1.0, min(mean_square(x) for x in options))
     return out
 
 
-def rescaled(stage: Stage, candidate: Candidate, base: Mapping[str, Outcome]) -> Candidate:
+def rescaled(
+    stage: EffectRows, candidate: EffectCandidate, base: Mapping[str, RowFit]
+) -> EffectCandidate:
     """The candidate judged at the stage's scales."""
-    outcomes = {e: outcome(stage, e, o.rows) for e, o in candidate.outcomes.items()}
+    outcomes = {e: row_fit(stage, e, o.rows) for e, o in candidate.outcomes.items()}
     gain = sum(base[e].criterion - o.criterion for e, o in outcomes.items())
     return replace(candidate, outcomes=outcomes, gain=float(gain))
 
 
 def contribution_rms(
-    candidate: Candidate, base: Mapping[str, Outcome], equation: str, band: float
+    candidate: EffectCandidate, base: Mapping[str, RowFit], equation: str, band: float
 ) -> float:
     """Root mean square of what the effect changes in an equation, in its unit."""
     before, after = base[equation], candidate.outcomes[equation]
@@ -332,7 +349,7 @@ def contribution_rms(
     return float(np.sqrt(np.mean(moved[keep] ** 2))) if np.any(keep) else 0.0
 
 
-def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) -> bool:
+def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, RowFit]) -> bool:
     """Whether the effect is large enough to matter to the machine, noise apart."""
     level = 0.5 * float(np.sum(np.abs(stage.theta[1:3])))
     if candidate.effect.place.shows:
@@ -350,13 +367,13 @@ def material(candidate: Candidate, stage: Stage, base: Mapping[str, Outcome]) ->
     return False
 
 
-def shift_rms(candidate: Candidate, stage: Stage, one: Moving) -> float:
+def shift_rms(candidate: EffectCandidate, stage: EffectRows, one: MotionLog) -> float:
     """Spread of what a sensor effect adds to the shown position [m]."""
     true = shown_to_true(candidate.effect, candidate.values, one, stage.friction)
     return float(np.std(one.log["y"] - true))
 
 
-def absorb(stage: Stage, candidate: Candidate) -> Stage:
+def absorb(stage: EffectRows, candidate: EffectCandidate) -> EffectRows:
     """The stage with the effect in it: its columns kept, or the logs' signals freed of it."""
     effect, values = candidate.effect, candidate.values
     if not effect.place.on_signals:
@@ -368,7 +385,7 @@ def absorb(stage: Stage, candidate: Candidate) -> Stage:
         else:
             whole = reached(effect, values, one, stage.friction)
             more = {"F": driven(one, whole)} if one.held else {}
-            log = one.log.with_signals(u=command(one, whole), **more)
+            log = one.log.with_signals(u=command_of(one, whole), **more)
         logs.append(one.again(log))
     play = stage.play or (effect.place.shows and effect.evolve is not None)
     return replace(stage, logs=tuple(logs), taken=(*stage.taken, effect.key), play=play)

@@ -10,31 +10,38 @@ from functools import lru_cache
 import numpy as np
 
 from identification.arrays import Array
-from identification.evidence import Moving
-from identification.karnopp import Karnopp
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.standstill import (
+    LEAST_BREAKAWAY,
+    MEAN,
+    RATE,
+    Breakaways,
+    rest_stretches,
+)
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.rest import LEAST, MEAN, RATE, Breakaways, samples, stretches
-from identification.result import Drive
-from identification.simulate import free_run
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
+from identification.signals.sampling import samples
+from identification.simulation.free_run import free_run
 
-BEFORE, AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
-EXACT = 1e-12  # m or rad: a position without noise
+SAMPLES_BEFORE, SAMPLES_AFTER = 30, 25  # samples of 2 ms of rest and of motion that are compared
+EXACT_POSITION = 1e-12  # m or rad: a position without noise
 GRID = 25  # limits tried between the smallest and the largest force around the breakaway
 NARROWED = 2  # times that the grid is drawn around its best
 MOVED = 20.0  # times the position's noise that a body goes on to move, or it was no breakaway
-FITS = 9.0  # mean square in noise units up to which an event counts as understood
+UNDERSTOOD = 9.0  # mean square in noise units up to which an event counts as understood
 
 
 @lru_cache(maxsize=16)
-def breakaway_limits(one: Moving, friction: Karnopp, falls: bool = False) -> Breakaways:
+def breakaway_limits(one: MotionLog, friction: Karnopp, falls: bool = False) -> Breakaways:
     """Breakaways of a log: a rest of at least 48 ms, then motion; `force` is the stick limit.
 
     friction: sliding and band as the model without effects has them; falls: with the first motion
     the limit falls to that of `friction`, so it is no less.
     """
     found = []
-    for low, high in stretches(one, 3 * samples(MEAN, one.log.h)):
+    for low, high in rest_stretches(one, 3 * samples(MEAN, one.log.h)):
         event = _event(one, friction, falls, low, high)
         if event is not None:
             found.append(event)
@@ -42,17 +49,20 @@ def breakaway_limits(one: Moving, friction: Karnopp, falls: bool = False) -> Bre
     for way in (1.0, -1.0):  # a body that is pushed on at the start of a log has not broken away
         own = k[:, 1] == way
         if np.any(own):
-            k = k[~own | (way * k[:, 3] > LEAST * np.median(way * k[own, 3]))]
+            k = k[~own | (way * k[:, 3] > LEAST_BREAKAWAY * np.median(way * k[own, 3]))]
     return Breakaways(k[:, 0].astype(np.int64), k[:, 1], k[:, 2], k[:, 3], k[:, 4])
 
 
 def _event(
-    one: Moving, friction: Karnopp, falls: bool, low: int, high: int
+    one: MotionLog, friction: Karnopp, falls: bool, low: int, high: int
 ) -> tuple[float, float, float, float, float] | None:
     """Last sample at rest, direction, time at rest, limit and rate of force; None: no breakaway."""
     y, F, h = one.log["y"], one.log["F"], one.log.h
     mean, of_rate = samples(MEAN, h), samples(RATE, h)
-    first, last = max(low + mean, high - samples(BEFORE, h)), high + samples(AFTER, h)
+    first, last = (
+        max(low + mean, high - samples(SAMPLES_BEFORE, h)),
+        high + samples(SAMPLES_AFTER, h),
+    )
     if last >= len(y) or first + mean >= high:
         return None
     way = float(np.sign(one.signals["d"][high]))
@@ -75,7 +85,7 @@ def _event(
         best = float(np.mean(tried[np.array(costs) <= left * (1.0 + 1e-9)]))  # a held force jumps
         span = 2.0 * span / (GRID - 1)
         tried = np.linspace(max(best - span, 0.0), best + span, GRID)
-    if left > FITS or best >= highest:
+    if left > UNDERSTOOD or best >= highest:
         return None
     risen = np.flatnonzero(pushed >= best)
     at = first + max(int(risen[0]) - 1, 0) if len(risen) else high
@@ -84,7 +94,13 @@ def _event(
 
 
 def _cost(
-    one: Moving, friction: Karnopp, falls: bool, part: Log, level: float, way: float, limit: float
+    one: MotionLog,
+    friction: Karnopp,
+    falls: bool,
+    part: Log,
+    level: float,
+    way: float,
+    limit: float,
 ) -> float:
     """Mean square of the position's error in noise units from rest on with this stick limit [N]."""
     side = {"F_sp": limit} if way > 0 else {"F_sn": -limit}
@@ -103,5 +119,5 @@ def _cost(
     y = held
     if len(part):
         y = np.append(held, free_run(plant, part, (level, 0.0, float(part["F"][0])), drive).y)
-    r: Array = (y - y_m) / max(one.noise_y, EXACT)
+    r: Array = (y - y_m) / max(one.noise_y, EXACT_POSITION)
     return float(np.mean(np.minimum(r**2, 1e4)))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.evidence import (
+from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
     EQUATIONS,
@@ -14,19 +14,19 @@ from identification.evidence import (
     Rows,
     non_negative,
     of_column,
-    solve,
+    solve_rows,
     stacked,
 )
-from identification.stage import Stage
+from identification.tracing.regression.effect_rows import EffectRows
 
 TRIM = 4.0  # what a row counts that is left out for its low speed
 TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that may be left out
 FEWEST_EVENTS = 6
-ROBUST = 9.0  # square from which a row of rest counts less
+ROBUST_SQUARE = 9.0  # square from which a row of rest counts less
 
 
 @dataclass(frozen=True, eq=False)
-class Outcome:
+class RowFit:
     """Rows, fit, criterion (in units of the scale) and lowest speed of one equation.
 
     robust: rows far off count less.
@@ -39,26 +39,26 @@ class Outcome:
     robust: bool = False
 
 
-def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
+def row_fit(stage: EffectRows, equation: str, rows: Rows) -> RowFit:
     """Fit and criterion of an equation's rows.
 
     Within the band the model's slip friction does not hold. Rows slower than a threshold count
-    TRIM each instead of their squared residual; the best threshold is taken. A body that is led
-    along slides at any speed.
+    TRIM each instead of their squared residual; the best threshold is taken. Under imposed
+    motion it slides at any speed.
     """
     scale = stage.scale(equation)
     if equation == REST:
         r = rows.b / rows.sd
-        return Outcome(
+        return RowFit(
             rows, Fitted(np.zeros(0), r, float(np.sum(r**2))), _robust(r, scale), 0.0, True
         )
     if equation == BREAKAWAY:
         fit = _resistant(rows, scale)
-        return Outcome(rows, fit, _robust(fit.residual, scale), 0.0, True)
+        return RowFit(rows, fit, _robust(fit.residual, scale), 0.0, True)
     if not np.any(np.isfinite(rows.speed)):
-        fit = solve(rows)
-        return Outcome(rows, fit, fit.cost / scale + rows.lost, 0.0)
-    edges = np.quantile(rows.speed, TRIMS[:1] if stage.led else TRIMS)
+        fit = solve_rows(rows)
+        return RowFit(rows, fit, fit.cost / scale + rows.lost, 0.0)
+    edges = np.quantile(rows.speed, TRIMS[:1] if stage.imposed else TRIMS)
     A = np.column_stack([rows.X, rows.b]) / rows.sd[:, np.newaxis]
     size = of_column(A)
     whitened = A / size
@@ -75,15 +75,15 @@ def outcome(stage: Stage, equation: str, rows: Rows) -> Outcome:
     total, theta = totals[best], thetas[best] * size[-1] / size[:-1]
     residual = A[:, -1] - A[:, :-1] @ theta
     fit = Fitted(theta, residual, float(np.sum(residual[bins >= best] ** 2)))
-    return Outcome(rows, fit, float(total), 0.0 if stage.led else float(edges[best]))
+    return RowFit(rows, fit, float(total), 0.0 if stage.imposed else float(edges[best]))
 
 
 def _resistant(rows: Rows, scale: float) -> Fitted:
     """Least squares in which events far off count less (Cauchy's weights)."""
-    fit = solve(rows)
+    fit = solve_rows(rows)
     for _ in range(10):
-        weight = 1.0 / np.sqrt(1.0 + fit.residual**2 / (scale * ROBUST))
-        theta = solve(replace(rows, sd=rows.sd / np.maximum(weight, 1e-6))).theta
+        weight = 1.0 / np.sqrt(1.0 + fit.residual**2 / (scale * ROBUST_SQUARE))
+        theta = solve_rows(replace(rows, sd=rows.sd / np.maximum(weight, 1e-6))).theta
         residual = (rows.b - rows.X @ theta) / rows.sd
         fit = Fitted(theta, residual, float(np.sum(residual**2)))
     return fit
@@ -91,7 +91,7 @@ def _resistant(rows: Rows, scale: float) -> Fitted:
 
 def _robust(r: Array, scale: float) -> float:
     """Criterion of rows of which some are no rest at all: Cauchy's, near r^2 for small r."""
-    return float(np.sum(ROBUST * np.log1p(r**2 / (scale * ROBUST))))
+    return float(np.sum(ROBUST_SQUARE * np.log1p(r**2 / (scale * ROBUST_SQUARE))))
 
 
 def _of_grams(grams: Array, positive: IntArray) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ def _not_negative(A: Array, c: Array, positive: IntArray) -> Array:
     return non_negative(least_squares, len(c), positive)
 
 
-def told(stage: Stage, equation: str) -> bool:
+def told(stage: EffectRows, equation: str) -> bool:
     """Whether the logs have enough rows of an equation."""
     rows = sum(len(part.b) for part in stage.parts[equation])
     least = FEWEST_EVENTS if equation == BREAKAWAY else 2 * (6 if equation == REST else 12)
@@ -122,16 +122,16 @@ def told(stage: Stage, equation: str) -> bool:
     return rows >= least and finite
 
 
-def base_outcomes(stage: Stage) -> dict[str, Outcome]:
+def base_fits(stage: EffectRows) -> dict[str, RowFit]:
     """Every equation that the logs tell, with the structure found so far."""
     return {
-        equation: outcome(stage, equation, stacked(stage.parts[equation]))
+        equation: row_fit(stage, equation, stacked(stage.parts[equation]))
         for equation in EQUATIONS
         if (equation != ACTUATOR or stage.by_command) and told(stage, equation)
     }
 
 
-def spread(o: Outcome) -> float:
+def mean_square(o: RowFit) -> float:
     """Mean square of the rows that count."""
     kept = o.fit.residual[o.rows.speed >= o.slowest]
     if o.robust:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.grids import shape_grid
-from identification.library import built_in
+from identification.effects._library import built_in
+from identification.tracing.regression.shape_grid import shape_grid
 from tests.identification.motor_logs import made, seen
 
 

@@ -6,14 +6,20 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.outside_rig import EFFECTS, write
-from identification.candidates import best_of
-from identification.choice import choose, explained_part, first_stage, gives_way, trusted
-from identification.evidence import ACTUATOR, REST, moving
-from identification.library import built_in
+from identification.effects._library import built_in
+from identification.estimation.regression.equation_rows import ACTUATOR, REST, motion_log
 from identification.log import Log
-from identification.stage import Stage
+from identification.tracing.regression.candidates import best_of
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.stepwise import (
+    choose,
+    explained_part,
+    first_stage,
+    gives_way,
+    trusted,
+)
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
-from tests.identification.test_trace import made as pneumatic
+from tests.identification.tracing.test_trace import made as pneumatic
 
 
 def quiet(_stage: str, _share: float) -> None:
@@ -29,13 +35,13 @@ def outside_log(folder: Path, effect: str, seed: int) -> Log:
 
 def test_an_effect_that_bends_the_rest_does_not_hide_the_next(tmp_path: Path) -> None:
     # On this log friction by load gains most, with nine tenths of the force taken by it.
-    one = moving(outside_log(tmp_path, "input_delay", 51), held=True, by_command=False)
+    one = motion_log(outside_log(tmp_path, "input_delay", 51), held=True, by_command=False)
     start, first = first_stage([one], False)
     found = choose(start, first, built_in(), np.random.default_rng(0), quiet)
     assert [step.candidate.effect.key for step in found.steps] == ["input_delay"]
 
 
-def at_rest(log: Log, moved: float, rng: np.random.Generator) -> Stage:
+def at_rest(log: Log, moved: float, rng: np.random.Generator) -> EffectRows:
     """The stage of a log that stands still under a swinging force, and moves by random steps."""
     n = 6000
     F = 8.0 * np.sin(2.0 * np.pi * 0.5 * H * np.arange(n))
@@ -65,7 +71,7 @@ def test_a_bristle_that_explains_rest_gives_way() -> None:
 
 def test_logs_left_out_say_nothing_against_an_effect_of_another_equation() -> None:
     effects = {"leakage": {"leak": 1.5}}
-    logs = [moving(pneumatic(seed, effects), held=False, by_command=True) for seed in (21, 22)]
+    logs = [motion_log(pneumatic(seed, effects), held=False, by_command=True) for seed in (21, 22)]
     start, first = first_stage(logs, True)
     library = {"leakage": built_in()["leakage"]}
     found = choose(start, first, library, np.random.default_rng(0), quiet)

@@ -1,0 +1,1 @@
+"""Which effects the equations call for: rows, candidates, forward choice, significance."""
