@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.candidates import best_of
-from identification.choice import first_stage
-from identification.grids import median_rest, shape_grid
-from identification.library import built_in
-from identification.outcome import base_outcomes
-from identification.trials import grid, grown, rigid
+from identification.effects._library import built_in
+from identification.tracing.free_run.trial_structures import grid, grown, rigid
+from identification.tracing.regression.candidates import best_of
+from identification.tracing.regression.row_fit import base_fits
+from identification.tracing.regression.shape_grid import median_rest, shape_grid
+from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 
@@ -29,7 +29,7 @@ def test_growth_is_tried_from_what_a_limit_that_falls_tells() -> None:
     one = seen(made(3, {"rising_stiction": {"F_r": 5.0, "tau": 0.4}}, n=30_000))
     start, _ = first_stage([one], False)
     start = replace(start, sliding=NINE)
-    told = best_of(start, effect, base_outcomes(start))
+    told = best_of(start, effect, base_fits(start))
     assert told is not None
     bent = replace(NINE, m=1.2 * NINE.m, F_sp=1.1 * NINE.F_sp, F_sn=1.1 * NINE.F_sn)
     base, values = grown(told, plant(friction=bent), start)

@@ -10,34 +10,48 @@ from itertools import takewhile
 
 import numpy as np
 
-from identification.approach import closer, more_load, nearer
 from identification.arrays import Array
-from identification.candidates import Candidate
-from identification.choice import Choice, Step, absorb, material, settled
-from identification.equations import slow_motion
-from identification.evidence import ACTUATOR, FIVE, MECHANICAL, Moving
-from identification.karnopp import Karnopp
-from identification.library import Library
+from identification.effects._library import Library
+from identification.estimation.regression.effect_columns import slow_motion
+from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
+from identification.estimation.windowed_run.nudged_search import closer, more_load, nearer
+from identification.estimation.windowed_run.refinement import (
+    COMPLETE,
+    Refit,
+    even,
+    loose,
+    misfit,
+    on_bristle,
+    refit,
+)
 from identification.log import Rig
-from identification.outcome import Outcome, spread
-from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, even, loose, misfit, on_bristle, refit
-from identification.result import Drive
-from identification.stage import Stage
-from identification.structure import MUCH, Model, band, model_of
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.tracing.free_run.fitted_structure import (
+    MUCH,
+    FittedStructure,
+    band,
+    fitted_structure,
+)
+from identification.tracing.regression.candidates import EffectCandidate
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, mean_square
+from identification.tracing.regression.stepwise import Choice, Step, absorb, material, settled_fits
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 WALKED = 3.0  # the same, where the noise of a measured force may leave as much
 BENT = 2.0  # the same, of a bristle where nothing holds the run to the log
-ENOUGH = 0.1  # of the plain model's excess misfit, left by effects that need no contest
-NEAR = 8.0  # misfit up to which a run is nearly followed
+UNCONTESTED = 0.1  # of the plain model's excess misfit, left by effects that need no contest
+NEARLY_FOLLOWED = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
 EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
-HOPELESS = 2.0  # times what it stands against, that brief windows leave where no search will do
+# Times what it stands against, that brief windows leave where no search will do
+NO_SEARCH_WILL_DO = 2.0
 VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
 ONCE_MORE = 2  # searches of a run that is all but followed
 NEEDLESS = 1.02  # relative misfit without an effect that is not needed
-NOTHING = 1.002  # the same, of the plant as it is, without one that does nothing in the run
+DOES_NOTHING = 1.002  # the same, of the plant as it is, without one that does nothing in the run
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,17 +62,17 @@ class Setting:
     models by the keys of their effects.
     """
 
-    logs: Sequence[Moving]
-    short: Sequence[Moving]
+    logs: Sequence[MotionLog]
+    short: Sequence[MotionLog]
     drive: Drive
     rig: Rig
     library: Library
-    start: Stage
-    first: Mapping[str, Outcome]
-    plain: Model
+    start: EffectRows
+    first: Mapping[str, RowFit]
+    plain: FittedStructure
     rng: np.random.Generator
     doubted: tuple[Step, ...] = ()
-    made: dict[frozenset[str], Model] = field(default_factory=dict)
+    made: dict[frozenset[str], FittedStructure] = field(default_factory=dict)
 
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
@@ -67,7 +81,7 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
     if not steps:
         return DECISIVE
     least = DECISIVE if setting.drive == "command" else WALKED
-    return max(least, 1.0 + ENOUGH * (setting.plain.misfit - 1.0))
+    return max(least, 1.0 + UNCONTESTED * (setting.plain.misfit - 1.0))
 
 
 def seconds(setting: Setting) -> float:
@@ -78,12 +92,12 @@ def seconds(setting: Setting) -> float:
 def known(setting: Setting) -> bool:
     """Whether the plain plant's sliding is right: its run, or at least the equations, show no less.
 
-    Then an effect in stops and reversals is searched in the run itself, led by nothing.
+    Then an effect in stops and reversals is searched in the run itself, without nudging.
     """
-    return setting.plain.misfit <= NEAR or explained(setting.first)
+    return setting.plain.misfit <= NEARLY_FOLLOWED or equations_explained(setting.first)
 
 
-def fitted(choice: Choice, setting: Setting) -> Model:
+def fitted(choice: Choice, setting: Setting) -> FittedStructure:
     """The model of a choice made on the equations; the plant of the same effects is made once."""
     keys = frozenset(step.candidate.effect.key for step in choice.steps)
     if keys not in setting.made:
@@ -91,13 +105,13 @@ def fitted(choice: Choice, setting: Setting) -> Model:
     return replace(setting.made[keys], stage=choice.end, outcomes=choice.base)
 
 
-def _model(choice: Choice, setting: Setting) -> Model:
-    near = None if setting.plain.led else setting.plain.plant.friction
-    model = model_of(
+def _model(choice: Choice, setting: Setting) -> FittedStructure:
+    near = None if setting.plain.imposed else setting.plain.plant.friction
+    model = fitted_structure(
         choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
         setting.rng, near=near, vain=vain(setting),
     )  # fmt: skip
-    found = None if model.led else insisted(model.plant, model.misfit, setting)
+    found = None if model.imposed else insisted(model.plant, model.misfit, setting)
     if found is None:
         return model
     return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
@@ -108,22 +122,24 @@ def vain(setting: Setting) -> float:
 
     Where sliding lacks hardly anything without them, they may be a trifle.
     """
-    return VAIN * setting.plain.misfit if explained(setting.first) else np.inf
+    return VAIN * setting.plain.misfit if equations_explained(setting.first) else np.inf
 
 
-def first_alone(choice: Choice, setting: Setting) -> Model | None:
+def first_alone(choice: Choice, setting: Setting) -> FittedStructure | None:
     """The model of a choice of one effect, where the equations call for no other."""
     free = loose(setting.plain.plant, setting.drive)
     choice = without_growth(choice) if free else choice
-    return fitted(choice, setting) if choice.steps and explained(choice.base) else None
+    return fitted(choice, setting) if choice.steps and equations_explained(choice.base) else None
 
 
-def suffices(alone: Model | None, choice: Choice, setting: Setting) -> bool:
+def suffices(alone: FittedStructure | None, choice: Choice, setting: Setting) -> bool:
     """Whether the run is followed with the effects of a choice, so that no other is looked for."""
-    return alone is not None and (alone.led or alone.misfit <= followed(choice, setting, False))
+    return alone is not None and (
+        alone.imposed or alone.misfit <= followed_up_to(choice, setting, False)
+    )
 
 
-def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Model]:
+def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, FittedStructure]:
     """The fewest of the leading effects with which the run is followed, and the model.
 
     Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
@@ -135,13 +151,13 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
     choice = without_growth(choice) if free else choice
     if not choice.steps:
         return choice, setting.plain
-    best: tuple[Choice, Model] | None = None
+    best: tuple[Choice, FittedStructure] | None = None
     for n in range(1, len(choice.steps) + 1):
-        part, whole = leading(choice, n), n == len(choice.steps)
-        if not whole and not explained(choice.steps[n].base):
+        part, whole = first_steps(choice, n), n == len(choice.steps)
+        if not whole and not equations_explained(choice.steps[n].base):
             continue
         model = fitted(part, setting)
-        if model.led or model.misfit <= followed(part, setting, whole):
+        if model.imposed or model.misfit <= followed_up_to(part, setting, whole):
             return part, model
         if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):
             best = part, model
@@ -155,29 +171,29 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Mode
     return less, fitted(less, setting) if less.steps else setting.plain
 
 
-def followed(choice: Choice, setting: Setting, whole: bool) -> float:
+def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
     """Misfit up to which a run is followed; whole: with all effects that the equations call for."""
     if whole:
-        return min(enough(setting, choice.steps), NEAR)
+        return min(enough(setting, choice.steps), NEARLY_FOLLOWED)
     bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
     if bristle and loose(setting.plain.plant, setting.drive):  # minima are many and narrow
         return BENT
     return DECISIVE if bristle or setting.drive == "force" else COMPLETE
 
 
-def explained(base: Mapping[str, Outcome]) -> bool:
+def equations_explained(base: Mapping[str, RowFit]) -> bool:
     """Whether the equations leave hardly more than the sensors' noise."""
-    return all(spread(base[e]) <= MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in base)
+    return all(mean_square(base[e]) <= MUCH**2 for e in (MECHANICAL, ACTUATOR) if e in base)
 
 
-def leading(choice: Choice, count: int) -> Choice:
+def first_steps(choice: Choice, count: int) -> Choice:
     """The choice up to so many effects."""
     if count == len(choice.steps):
         return choice
     return only(choice, choice.steps[:count])
 
 
-def only(choice: Choice, stay: tuple[Step, ...], gone: Sequence[Candidate] = ()) -> Choice:
+def only(choice: Choice, stay: tuple[Step, ...], gone: Sequence[EffectCandidate] = ()) -> Choice:
     """The choice with these of its steps; gone: to be tried again beside them."""
     end, base = with_steps(stay, choice.start, choice.first)
     return Choice(choice.start, choice.first, stay, end, base, (*choice.tried, *gone))
@@ -189,7 +205,7 @@ def without_slow(choice: Choice) -> Choice:
     While the band is not known, the passage through it may have been taken for one, and what was
     chosen after it was chosen beside it.
     """
-    return leading(choice, len(tuple(takewhile(lambda step: not _slow(step), choice.steps))))
+    return first_steps(choice, len(tuple(takewhile(lambda step: not _slow(step), choice.steps))))
 
 
 def without_growth(choice: Choice) -> Choice:
@@ -201,7 +217,7 @@ def without_growth(choice: Choice) -> Choice:
     kept = [step for step in choice.steps if not step.candidate.effect.place.in_stops]
     if len(kept) == len(choice.steps):
         return choice
-    slides = explained(choice.first)
+    slides = equations_explained(choice.first)
     stay = tuple(step for step in kept if not (slides and _slow(step)))
     return only(choice, stay, [step.candidate for step in choice.steps if step not in stay])
 
@@ -212,7 +228,9 @@ def _slow(step: Step) -> bool:
     return slow_motion(effect) or effect.place.elastic
 
 
-def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Model]:
+def doubted(
+    choice: Choice, after: FittedStructure, setting: Setting
+) -> tuple[Choice, FittedStructure]:
     """Without an effect of slow or micro-motion that the run does as well without, or that its band
     hides.
 
@@ -224,8 +242,8 @@ def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Mod
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
-        found = refined(keeping(after.plant, stay), setting, after.misfit)
-        other = Model(less.end, less.base, found.plant, found.sd, False, found.misfit)
+        found = refined_near(keeping(after.plant, stay), setting, after.misfit)
+        other = FittedStructure(less.end, less.base, found.plant, found.sd, False, found.misfit)
         if other.misfit > COMPLETE:
             again = fitted(less, setting) if stay else setting.plain
             other = again if again.misfit < other.misfit else other
@@ -236,20 +254,27 @@ def doubted(choice: Choice, after: Model, setting: Setting) -> tuple[Choice, Mod
     return choice, after
 
 
-def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Model]:
+def pruned(
+    choice: Choice, model: FittedStructure, setting: Setting
+) -> tuple[Choice, FittedStructure]:
     """Without the effects that a run which is followed does as well without."""
     for step in choice.steps:
         free = loose(model.plant, setting.drive)
-        if (len(choice.steps) < 2 and not free) or model.misfit > NEAR:
+        if (len(choice.steps) < 2 and not free) or model.misfit > NEARLY_FOLLOWED:
             break
         if _slow(step) and choice.steps == setting.doubted:
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
         bare = keeping(model.plant, stay)
-        if free and misfit(bare, setting.logs, setting.drive) <= NOTHING * model.misfit:
+        if free and misfit(bare, setting.logs, setting.drive) <= DOES_NOTHING * model.misfit:
             found = refit(bare, setting.logs, setting.drive, prior=even(bare), effort="near")
-        elif free and not _slow(step) and explained(choice.base) and not explained(less.base):
+        elif (
+            free
+            and not _slow(step)
+            and equations_explained(choice.base)
+            and not equations_explained(less.base)
+        ):
             continue  # sliding alone calls for it: a search would not find otherwise
         else:
             base = without(model, stay, setting)
@@ -259,12 +284,12 @@ def pruned(choice: Choice, model: Model, setting: Setting) -> tuple[Choice, Mode
                 base = nearer((base, level), setting.logs, setting.drive)
             elif stay:
                 base = replace(base, friction=levelled(base.friction, less.end.theta))
-            found = refined(base, setting, model.misfit)
+            found = refined_near(base, setting, model.misfit)
             found = insisted(found.plant, found.misfit, setting) or found
         if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
             continue
         choice = less
-        model = Model(less.end, less.base, found.plant, found.sd, False, found.misfit)
+        model = FittedStructure(less.end, less.base, found.plant, found.sd, False, found.misfit)
     return choice, model
 
 
@@ -274,7 +299,7 @@ def keeping(plant: Plant, stay: Sequence[Step]) -> Plant:
     return replace(plant, effects=tuple(a for a in plant.effects if a.key in keys))
 
 
-def without(model: Model, stay: Sequence[Step], setting: Setting) -> Plant:
+def without(model: FittedStructure, stay: Sequence[Step], setting: Setting) -> Plant:
     """The model's plant with the effects of these steps only; the plain one where none stays."""
     kept = keeping(model.plant, stay)
     return kept if stay else replace(kept, friction=setting.plain.plant.friction)
@@ -295,12 +320,12 @@ def levelled(friction: Karnopp, theta: Array) -> Karnopp:
 
 
 def with_steps(
-    steps: Sequence[Step], start: Stage, first: Mapping[str, Outcome]
-) -> tuple[Stage, Mapping[str, Outcome]]:
+    steps: Sequence[Step], start: EffectRows, first: Mapping[str, RowFit]
+) -> tuple[EffectRows, Mapping[str, RowFit]]:
     """The stage with these effects in it, and what it leaves."""
     stage, outcomes = start, first
     for step in steps:
-        stage, outcomes = settled(replace(absorb(stage, step.candidate), scales={}))
+        stage, outcomes = settled_fits(replace(absorb(stage, step.candidate), scales={}))
     return stage, outcomes
 
 
@@ -324,12 +349,12 @@ def insisted(plant: Plant, left: float, setting: Setting) -> Refit | None:
     return best
 
 
-def refined(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
+def refined_near(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
     """The plant refined on the whole logs from close by.
 
     rival: misfit of what it stands against; one far beyond that is not searched again.
     """
     logs, drive = setting.logs, setting.drive
     if loose(plant, drive):
-        return closer(plant, logs, drive, setting.rng, hopeless=HOPELESS * max(rival, 1.0))
+        return closer(plant, logs, drive, setting.rng, hopeless=NO_SEARCH_WILL_DO * max(rival, 1.0))
     return refit(plant, logs, drive, prior=even(plant), effort="near")

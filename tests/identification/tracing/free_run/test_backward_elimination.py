@@ -5,21 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.choice import Choice, Step, choose, first_stage
-from identification.library import built_in
+from identification.effects._library import built_in
+from identification.estimation.windowed_run.refinement import COMPLETE, Refit
 from identification.log import Rig
-from identification.needed import (
+from identification.model.plant import Plant
+from identification.tracing.free_run.backward_elimination import (
     DECISIVE,
     WALKED,
     Setting,
     enough,
-    explained,
+    equations_explained,
     fewest,
     first_alone,
-    followed,
+    first_steps,
+    followed_up_to,
     keeping,
     known,
-    leading,
     levelled,
     pruned,
     suffices,
@@ -28,9 +29,8 @@ from identification.needed import (
     without_growth,
     without_slow,
 )
-from identification.plant import Plant
-from identification.refit import COMPLETE, Refit
-from identification.structure import model_of
+from identification.tracing.free_run.fitted_structure import fitted_structure
+from identification.tracing.regression.stepwise import Choice, Step, choose, first_stage
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -44,7 +44,7 @@ def found() -> tuple[Setting, Choice]:
     one = seen(made(4, SPRING))
     rng = np.random.default_rng(0)
     start, first = first_stage([one], False)
-    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
     library = {key: built_in()[key] for key in ("spring", "stribeck")}
     setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
@@ -62,19 +62,19 @@ def test_a_choice_goes_on_from_its_first_effect(found: tuple[Setting, Choice]) -
 
 def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
-    part = leading(choice, 1)
+    part = first_steps(choice, 1)
     alone = first_alone(part, setting)
     assert alone is not None and suffices(alone, part, setting)
     assert fewest(part, setting, False)[1].plant is alone.plant  # made once
     assert not suffices(replace(alone, misfit=1.01 * WALKED), part, setting)
     missing = replace(part, base=setting.first)  # the spring is not explained
-    assert not explained(missing.base) and first_alone(missing, setting) is None
+    assert not equations_explained(missing.base) and first_alone(missing, setting) is None
     assert not suffices(None, part, setting)
 
 
 def test_a_trifle_that_does_not_help_the_run_is_not_taken(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
-    part = leading(choice, 1)
+    part = first_steps(choice, 1)
     assert vain(setting) == np.inf  # its equations call for the spring
     slides = replace(setting, first=choice.base)  # as if they hardly did
     alone = first_alone(part, setting)
@@ -104,7 +104,7 @@ def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(
 def test_an_effect_that_is_needed_stays(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     kept = without_slow(choice)
-    model = model_of(
+    model = fitted_structure(
         kept.end, kept.base, kept.steps, setting.logs, "command", MOTOR, np.random.default_rng(1)
     )
     assert model.misfit <= COMPLETE
@@ -155,7 +155,9 @@ def test_what_sliding_calls_for_is_not_searched_without(
         searched.append(tried)
         return Refit(tried, 5.0, (), {}, lambda: np.zeros((0, 0)))
 
-    monkeypatch.setattr("identification.needed.refined", refined)
+    monkeypatch.setattr(
+        "identification.tracing.free_run.backward_elimination.refined_near", refined
+    )
     assert pruned(kept, model, setting)[0] is kept and not searched
     assert pruned(replace(kept, base=choice.first), model, setting)[0].steps == kept.steps
     assert len(searched) == len(kept.steps)
@@ -173,9 +175,12 @@ def test_what_does_nothing_goes_though_sliding_calls_for_it(
         near.append(tried)
         return Refit(tried, 1.0, (), {}, lambda: np.zeros((0, 0)))
 
-    monkeypatch.setattr("identification.needed.refit", refined)
+    monkeypatch.setattr("identification.tracing.free_run.backward_elimination.refit", refined)
     for bare, count in ((1.01, 1), (1.0, 0)):  # what the run leaves without the spring
-        monkeypatch.setattr("identification.needed.misfit", lambda *_, bare=bare: bare)
+        monkeypatch.setattr(
+            "identification.tracing.free_run.backward_elimination.misfit",
+            lambda *_, bare=bare: bare,
+        )
         assert len(pruned(kept, model, setting)[0].steps) == count
     assert [one.effects for one in near] == [()]
 
@@ -188,7 +193,7 @@ def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting,
     kept, model = fewest(both, setting, True)
     assert [step.candidate.effect.key for step in kept.steps] == ["spring"]
     assert model.misfit <= COMPLETE
-    assert leading(both, 2) is both and len(leading(both, 1).steps) == 1
+    assert first_steps(both, 2) is both and len(first_steps(both, 1).steps) == 1
 
 
 @pytest.mark.parametrize(("less", "count"), [(5.0, 1), (4.0, 2)])
@@ -201,10 +206,12 @@ def test_one_effect_more_has_to_earn_its_place_in_the_run(
     plain = replace(setting.plain, misfit=90.0)
     misfits = {1: 5.4, 2: less}
     monkeypatch.setattr(
-        "identification.needed.fitted",
+        "identification.tracing.free_run.backward_elimination.fitted",
         lambda part, _setting: replace(plain, misfit=misfits[len(part.steps)]),
     )
-    monkeypatch.setattr("identification.needed.followed", lambda *_: COMPLETE)
+    monkeypatch.setattr(
+        "identification.tracing.free_run.backward_elimination.followed_up_to", lambda *_: COMPLETE
+    )
     kept, model = fewest(both, replace(setting, plain=plain), unsure=False)
     assert (len(kept.steps), model.misfit) == (count, misfits[count])
 
@@ -212,10 +219,10 @@ def test_one_effect_more_has_to_earn_its_place_in_the_run(
 def test_what_a_choice_has_to_reach(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     far = replace(setting, plain=replace(setting.plain, misfit=41.0))
-    assert followed(choice, far, True) == pytest.approx(5.0)  # a tenth of what was left
-    assert followed(choice, far, False) == COMPLETE
-    assert followed(choice, replace(far, drive="force"), False) > COMPLETE
-    assert explained(choice.base) and not explained(setting.first)
+    assert followed_up_to(choice, far, True) == pytest.approx(5.0)  # a tenth of what was left
+    assert followed_up_to(choice, far, False) == COMPLETE
+    assert followed_up_to(choice, replace(far, drive="force"), False) > COMPLETE
+    assert equations_explained(choice.base) and not equations_explained(setting.first)
 
 
 def test_what_stops_lack_is_searched_in_the_run_where_sliding_is_explained(

@@ -3,41 +3,41 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from identification.candidates import Candidate
-from identification.choice import SHARE, Choice, Step, merit, share
-from identification.needed import Setting, fitted, only, seconds
-from identification.refit import COMPLETE
-from identification.structure import Model
+from identification.estimation.windowed_run.refinement import COMPLETE
+from identification.tracing.free_run.backward_elimination import Setting, fitted, only, seconds
+from identification.tracing.free_run.fitted_structure import FittedStructure
+from identification.tracing.regression.candidates import EffectCandidate
+from identification.tracing.regression.stepwise import LEAST_SHARE, Choice, Step, merit, share
 
-ALIKE = 10.0  # gain by which two effects that explain equally may differ
+LUCK_IN_GAIN = 10.0  # gain by which two effects that explain equally may differ
 
 
-def alike(step: Step) -> tuple[Candidate, ...]:
+def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
     """Rivals that explain as much as the effect taken, but for luck."""
     mine = merit(step.candidate)
     return tuple(
         c
         for c in step.rivals
         if c.effect.key not in step.apart
-        and mine - merit(c) < ALIKE
-        and share(c, step.base) >= SHARE
+        and mine - merit(c) < LUCK_IN_GAIN
+        and share(c, step.base) >= LEAST_SHARE
     )
 
 
-def told_apart(choice: Choice, after: Model, setting: Setting) -> Choice:
+def told_apart(choice: Choice, after: FittedStructure, setting: Setting) -> Choice:
     """The choice, its steps with those rivals named whose run falls short where this one follows.
 
     The equations see means over stretches of sliding; the run has the starts and stops too.
     """
-    if after.led or after.misfit > COMPLETE:
+    if after.imposed or after.misfit > COMPLETE:
         return choice
 
     def short(step: Step) -> Iterator[str]:
-        for rival in alike(step):
+        for rival in equal_rivals(step):
             stay = tuple(replace(x, candidate=rival) if x is step else x for x in choice.steps)
             run = fitted(only(choice, stay), setting)
             lost = seconds(setting) * (run.misfit - after.misfit)
-            if not run.led and run.misfit > COMPLETE and lost > ALIKE:
+            if not run.imposed and run.misfit > COMPLETE and lost > LUCK_IN_GAIN:
                 yield rival.effect.key
 
     return replace(choice, steps=tuple(replace(x, apart=frozenset(short(x))) for x in choice.steps))

@@ -7,23 +7,23 @@ from itertools import product
 import numpy as np
 
 from identification.arrays import Array
-from identification.candidates import Candidate, best_of
-from identification.choice import ABSORBED, Choice, Step, gives_way
 from identification.effects._base import Effect, Param
-from identification.equations import by_load, slow_motion
-from identification.evidence import BREAKAWAY, FIVE, REST, Moving
-from identification.grids import median_rest, shape_grid
-from identification.needed import Setting, without
-from identification.outcome import Outcome, base_outcomes, spread
-from identification.plant import Plant
-from identification.refit import loose
-from identification.stage import Stage
-from identification.structure import Model, inside
+from identification.estimation.regression.effect_columns import by_load, slow_motion
+from identification.estimation.regression.equation_rows import BREAKAWAY, FIVE, REST, MotionLog
+from identification.estimation.windowed_run.refinement import loose
+from identification.model.plant import Plant
+from identification.tracing.free_run.backward_elimination import Setting, without
+from identification.tracing.free_run.fitted_structure import FittedStructure, inside
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, base_fits, mean_square
+from identification.tracing.regression.shape_grid import median_rest, shape_grid
+from identification.tracing.regression.stepwise import ABSORBED, Choice, Step, gives_way
 
-STILL = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
-SHOWN = 3  # rivals of an effect taken that are tried in its place
+RIGID_CONTACT = 2.0  # square of what is seen of it at rest, in noise units, of a rigid contact
+RIVALS_TRIED = 3  # rivals of an effect taken that are tried in its place
 MOST_TRIED = 40  # starts of one effect
-LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
+FORCE_LEVELS = (0.05, 0.2, 0.6)  # of the Coulomb level, sizes of a force tried
 GROWN = (1.0, 1.5, 2.2)  # times the size that breakaways show
 REST_SHARES = (0.3, 1.0, 3.0)  # of the median rest
 BRAKES = 0.005  # of the sliding, in which the force has to oppose it for its share to show
@@ -39,7 +39,7 @@ class Trial:
     values: list[dict[str, float]]
 
 
-def structures(choice: Choice, model: Model, setting: Setting) -> Iterator[Trial]:
+def structures(choice: Choice, model: FittedStructure, setting: Setting) -> Iterator[Trial]:
     """One effect more, and another in the place of each."""
     yield from _beside(choice.steps, model.plant, choice.tried, setting, False)
     for i, step in enumerate(choice.steps):
@@ -50,7 +50,7 @@ def structures(choice: Choice, model: Model, setting: Setting) -> Iterator[Trial
 def _beside(
     steps: tuple[Step, ...],
     base: Plant,
-    tried: Sequence[Candidate],
+    tried: Sequence[EffectCandidate],
     setting: Setting,
     instead: bool,
 ) -> Iterator[Trial]:
@@ -59,7 +59,7 @@ def _beside(
     keys = {step.candidate.effect.key for step in steps}
     regressed = {one.effect.key: one for one in tried}
     ranked = sorted(tried, key=lambda one: -one.gain)
-    shown = {one.effect.key for one in ranked[: SHOWN if instead else 0]}
+    shown = {one.effect.key for one in ranked[: RIVALS_TRIED if instead else 0]}
     free = loose(base, setting.drive)
     for key, effect in setting.library.items():
         if key in keys or key in ABSORBED:
@@ -81,7 +81,9 @@ def _beside(
                 yield Trial(steps, own, effect, values)
 
 
-def grown(one: Candidate, base: Plant, start: Stage) -> tuple[Plant, list[dict[str, float]]]:
+def grown(
+    one: EffectCandidate, base: Plant, start: EffectRows
+) -> tuple[Plant, list[dict[str, float]]]:
     """Stick limits and sizes from which stiction that grows is tried.
 
     The first motion was told as if the limit stayed, which shows less growth than there is: the
@@ -100,18 +102,18 @@ def grown(one: Candidate, base: Plant, start: Stage) -> tuple[Plant, list[dict[s
         five = dict(zip(FIVE, start.theta.tolist(), strict=True))
         friction = replace(friction, **five)
     stage = replace(start, sliding=friction, falls=True)
-    outcomes = base_outcomes(stage)
+    outcomes = base_fits(stage)
     again = best_of(stage, effect, outcomes) if BREAKAWAY in outcomes else None
     more = [inside(effect, again.values)] if again is not None else []
     return replace(base, friction=friction), more + values
 
 
-def rigid(first: Mapping[str, Outcome]) -> bool:
+def rigid(first: Mapping[str, RowFit]) -> bool:
     """Whether the body is seen at rest and does not move there: on bristles it would."""
-    return REST in first and spread(first[REST]) < STILL
+    return REST in first and mean_square(first[REST]) < RIGID_CONTACT
 
 
-def driven_only(logs: Sequence[Moving]) -> bool:
+def driven_only(logs: Sequence[MotionLog]) -> bool:
     """Whether the force points along the motion in all sliding but a trace of it."""
     against = [
         (one.sliding.mean @ one.log["F"]) * np.where(one.up, 1.0, -1.0) < 0.0 for one in logs
@@ -130,7 +132,7 @@ def seen_in_run(effect: Effect) -> bool:
     return in_run or by_load(effect) or slow_motion(effect)
 
 
-def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, float]]:
+def grid(effect: Effect, base: Plant, logs: Sequence[MotionLog]) -> list[dict[str, float]]:
     """Values from which an effect that the equations hardly show is tried."""
     if not seen_in_run(effect):
         return []
@@ -142,10 +144,10 @@ def grid(effect: Effect, base: Plant, logs: Sequence[Moving]) -> list[dict[str, 
     return [inside(effect, x) for x in every[:MOST_TRIED]]
 
 
-def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[Moving]) -> Array:
+def _starts_of(effect: Effect, p: Param, base: Plant, logs: Sequence[MotionLog]) -> Array:
     """Values of one parameter to begin from."""
     if p.unit in ("N", "N m"):
-        return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(LEVELS)
+        return 0.5 * (base.friction.F_cp + base.friction.F_cn) * np.array(FORCE_LEVELS)
     if effect.place.in_stops and p.unit == "s":
         return median_rest(logs, p.typical) * np.array(REST_SHARES)
     return shape_grid(effect, p, logs)

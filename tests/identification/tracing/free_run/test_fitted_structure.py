@@ -1,7 +1,7 @@
 """From a regression's sizes to a plant."""
 
-from identification.library import built_in
-from identification.structure import SURELY, left_open, slight
+from identification.effects._library import built_in
+from identification.tracing.free_run.fitted_structure import EQUATION_DEVIATIONS, left_open, slight
 
 KEY = "position_dependent_friction"
 
@@ -35,6 +35,9 @@ def test_only_what_sliding_tells_is_known() -> None:
     spring = effects["spring"].acting({"k": 50.0})
     growth = effects["rising_stiction"].acting({"F_r": 2.0, "tau": 1.0})
     sd = {"m": 0.01, "F_cp": 0.0, "spring.k": 2.0, "rising_stiction.F_r": 0.1}
-    assert left_open([spring], sd) == {"m": SURELY * 0.01, "spring.k": SURELY * 2.0}
+    assert left_open([spring], sd) == {
+        "m": EQUATION_DEVIATIONS * 0.01,
+        "spring.k": EQUATION_DEVIATIONS * 2.0,
+    }
     assert left_open([spring, growth], sd) == {}
     assert left_open([], sd) == {}

@@ -5,18 +5,26 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.approach import NEARLY, SEARCHES, STICK, closest, loaded
 from identification.arrays import Array
-from identification.candidates import with_sizes
-from identification.choice import Step, rough
 from identification.effects._base import AT_REST, Acting, Effect
-from identification.equations import by_load, in_columns
-from identification.evidence import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL, Moving, shortened
-from identification.karnopp import Karnopp
-from identification.log import Rig
-from identification.outcome import Outcome, spread
-from identification.plant import Actuator, Motor, Plant
-from identification.refit import (
+from identification.estimation.regression.effect_columns import by_load, in_columns
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    BREAKAWAY,
+    FIVE,
+    MECHANICAL,
+    MotionLog,
+    shortened,
+)
+from identification.estimation.regression.standstill import borne
+from identification.estimation.windowed_run.nudged_search import (
+    NEARLY,
+    SEARCHES,
+    STICK_PER_COULOMB,
+    closest,
+    loaded,
+)
+from identification.estimation.windowed_run.refinement import (
     COMPLETE,
     RESCUES,
     Effort,
@@ -27,45 +35,57 @@ from identification.refit import (
     onward,
     refit,
 )
-from identification.rest import borne
-from identification.result import Drive
-from identification.stage import Stage
+from identification.log import Rig
+from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.tracing.regression.candidates import with_sizes
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, mean_square
+from identification.tracing.regression.stepwise import Step, rough
 
-USUAL = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
+USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
-MOSTLY = 0.4  # of the median speed of sliding, that the band can be at most
-SURELY = 4.0  # deviations within which a search keeps what the equations tell
+WIDEST_BAND = 0.4  # of the median speed of sliding, that the band can be at most
+EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
-PIECE = 10.0  # s of each log, which fewer marginal stops spoil than the whole
-BEYOND = 1.3  # times the band, above which sliding friction is judged
+PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
+ABOVE_BAND = 1.3  # times the band, above which sliding friction is judged
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
+class FittedStructure:
     """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
 
-    led: the motion is imposed, so the plant has no free run to be refined on; misfit: of the free
+    imposed: the motion is, so the plant has no free run to be refined on; misfit: of the free
     run, 1 where it leaves the sensors' noise.
     """
 
-    stage: Stage
-    outcomes: Mapping[str, Outcome]
+    stage: EffectRows
+    outcomes: Mapping[str, RowFit]
     plant: Plant
     sd: Mapping[str, float]
-    led: bool
+    imposed: bool
     misfit: float = np.inf
 
 
-def model_of(
-    stage: Stage, outcomes: Mapping[str, Outcome], steps: Sequence[Step], logs: Sequence[Moving],
-    drive: Drive, rig: Rig, rng: np.random.Generator, *, near: Karnopp | None = None,
+def fitted_structure(
+    stage: EffectRows,
+    outcomes: Mapping[str, RowFit],
+    steps: Sequence[Step],
+    logs: Sequence[MotionLog],
+    drive: Drive,
+    rig: Rig,
+    rng: np.random.Generator,
+    *,
+    near: Karnopp | None = None,
     vain: float = np.inf,
-) -> Model:  # fmt: skip
+) -> FittedStructure:
     """The plant of a structure: the regression's numbers, refined on the free run.
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
@@ -111,12 +131,12 @@ def model_of(
         prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
     plant = Plant(nine, drives, tuple(acting))
-    if drive == "force" and led(outcomes[MECHANICAL]):
-        return Model(stage, outcomes, plant, prior | silent, True)
+    if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
+        return FittedStructure(stage, outcomes, plant, prior | silent, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
     # follows the velocity as the log tells it, so even of the right effect more than noise is left.
     remembers = any(s.candidate.effect.evolve and s.candidate.effect.place.rubs for s in steps)
-    left = [spread(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
+    left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
     missing = max(left) > MUCH**2 and not remembers
     free = loose(plant, drive)
     effort: Effort = "rough" if missing and (steps or rough(outcomes)) else "whole"
@@ -130,7 +150,7 @@ def model_of(
         )
         done = other if other.misfit < done.misfit else done
     if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
-        part = [shortened(one, PIECE) for one in logs]
+        part = [shortened(one, PIECE_SECONDS) for one in logs]
         begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
         begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
         close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
@@ -152,12 +172,12 @@ def model_of(
         known = {} if missing else left_open(acting, prior)
         searches = 0 if missing else SEARCHES
         done = closest(begins, logs, drive, rng, searches, told, known, done, vain)
-    return Model(stage, outcomes, done.plant, done.sd, False, done.misfit)
+    return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 
 def _limit(coulomb: float, held: float) -> float:
     """A stick limit [N] to begin from; a body at rest against a stop bears more than any."""
-    return min(max(USUAL * coulomb, held), STICK[2] * coulomb)
+    return min(max(USUAL_STICK * coulomb, held), STICK_PER_COULOMB[2] * coulomb)
 
 
 def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:
@@ -174,7 +194,7 @@ def untold(sd: float | None, value: float, typical: float) -> bool:
     return sd is not None and not sd < UNTOLD * max(abs(value), abs(typical))
 
 
-def led(o: Outcome) -> bool:
+def inertia_is_lost(o: RowFit) -> bool:
     """Whether the motion is imposed: inertia is of no account beside what the model leaves."""
     keep = o.rows.speed >= o.slowest
     inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
@@ -192,7 +212,9 @@ def left_open(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, f
     ):
         return {}
     sizes = (f"{a.key}.{name}" for a in effects for name in a.effect.linear)
-    return {name: SURELY * sd[name] for name in (*FIVE, *sizes) if sd.get(name, 0.0) > 0.0}
+    return {
+        name: EQUATION_DEVIATIONS * sd[name] for name in (*FIVE, *sizes) if sd.get(name, 0.0) > 0.0
+    }
 
 
 def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:
@@ -212,7 +234,7 @@ def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     return {p.name: float(np.clip(values[p.name], p.low, p.high)) for p in effect.params}
 
 
-def deviations(o: Outcome) -> Array:
+def deviations(o: RowFit) -> Array:
     """Standard deviations of theta, (k,), widened by what the rows leave and their overlap.
 
     0 where a column is nothing.
@@ -226,7 +248,7 @@ def deviations(o: Outcome) -> Array:
 
 
 def effect_sd(
-    effect: Effect, values: Mapping[str, float], outcomes: Mapping[str, Outcome]
+    effect: Effect, values: Mapping[str, float], outcomes: Mapping[str, RowFit]
 ) -> dict[str, float]:
     """Standard deviations of an effect's parameters for the prior; 0 holds one at its value."""
     out: dict[str, float] = {}
@@ -247,11 +269,11 @@ def effect_sd(
     return out
 
 
-def band(model: Model) -> float:
+def band(model: FittedStructure) -> float:
     """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
     p = model.plant.friction
     signals = [one.signals for one in model.stage.logs]
     pace = np.concatenate([np.abs(s["v"][s["d"] != 0]) for s in signals])
     # A run that is not followed may have any band; most of the sliding is judged all the same.
-    widest = MOSTLY * float(np.median(pace)) if len(pace) else np.inf
-    return 0.0 if model.led else min(BEYOND * max(p.dv_p, -p.dv_n), widest)
+    widest = WIDEST_BAND * float(np.median(pace)) if len(pace) else np.inf
+    return 0.0 if model.imposed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)

@@ -5,13 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.approach import less_load
-from identification.candidates import Candidate, best_of
-from identification.choice import FAR, Choice, Step, choose, first_stage
-from identification.evidence import Moving, shortened
-from identification.forward import (
+from identification.effects._library import built_in
+from identification.estimation.regression.equation_rows import MotionLog, shortened
+from identification.estimation.windowed_run.nudged_search import less_load
+from identification.estimation.windowed_run.refinement import COMPLETE, even
+from identification.log import Rig
+from identification.tracing.free_run.backward_elimination import Setting
+from identification.tracing.free_run.fitted_structure import FittedStructure, fitted_structure
+from identification.tracing.free_run.forward_selection import (
     Begun,
-    Contender,
+    RunContender,
     cut_short,
     decisive,
     hidden,
@@ -21,25 +24,28 @@ from identification.forward import (
     scales_alone,
     screening,
 )
-from identification.library import built_in
-from identification.log import Rig
-from identification.needed import Setting
-from identification.outcome import spread
-from identification.refit import COMPLETE, even
-from identification.structure import Model, model_of
-from identification.trace import trace
-from identification.trials import Trial
+from identification.tracing.free_run.trial_structures import Trial
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.row_fit import mean_square
+from identification.tracing.regression.stepwise import (
+    MUCH_IS_LEFT,
+    Choice,
+    Step,
+    choose,
+    first_stage,
+)
+from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
 
 
-def setting_of(seed: int, width: float) -> tuple[Setting, Model]:
+def setting_of(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     """What the contest needs of a log with that play in its transducer."""
     one = seen(made(seed, {"backlash": {"width": width}}))
     start, first = first_stage([one], False)
     rng = np.random.default_rng(0)
-    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
     return Setting([one], [one], "command", MOTOR, built_in(), start, first, plain, rng), plain
 
 
@@ -64,17 +70,20 @@ def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyP
     beside = best_of(setting.start, library["stribeck"], setting.first)
     assert beside is not None
     step = Step(beside, 0.01, (), setting.start, setting.first)
-    seen_short: list[list[Moving]] = []
+    seen_short: list[list[MotionLog]] = []
 
-    def contest(choice: Choice, _model: Model, own: Setting, _report: object) -> None:
+    def contest(choice: Choice, _model: FittedStructure, own: Setting, _report: object) -> None:
         assert not choice.steps
         seen_short.append(list(own.short))
 
-    monkeypatch.setattr("identification.forward.contest", contest)
+    monkeypatch.setattr("identification.tracing.free_run.forward_selection.contest", contest)
     monkeypatch.setattr(
-        "identification.forward.most_left", lambda _p, one, _d, size: shortened(one, size, 2000)
+        "identification.tracing.free_run.forward_selection.most_left",
+        lambda _p, one, _d, size: shortened(one, size, 2000),
     )
-    monkeypatch.setattr("identification.forward.pruned", lambda *_: (tried, plain))
+    monkeypatch.setattr(
+        "identification.tracing.free_run.forward_selection.pruned", lambda *_: (tried, plain)
+    )
     followed = replace(plain, misfit=1.2)
     kept, model = judged_forward(
         replace(tried, steps=(step,)), followed, setting, lambda _s, _p: None
@@ -112,9 +121,9 @@ def test_a_complete_run_of_a_motor_has_nothing_missing() -> None:
 
 
 def test_what_is_decisive() -> None:
-    def others(*misfits: float) -> list[Contender]:
+    def others(*misfits: float) -> list[RunContender]:
         effect = built_in()["spring"]
-        return [Contender((), effect, plant(), m) for m in misfits]
+        return [RunContender((), effect, plant(), m) for m in misfits]
 
     assert decisive(100.0, others(90.0)) == pytest.approx(8.0)  # far less than any other
     assert decisive(20.0, others(3.0)) == pytest.approx(1.5)  # another does nearly as well
@@ -135,12 +144,12 @@ def test_contenders_are_tried_until_one_is_followed(
     setting, plain = setting_of(4, 4e-4)
     asked: list[str] = []
 
-    def screened(one: Begun, _setting: Setting, _enough: float) -> Contender:
+    def screened(one: Begun, _setting: Setting, _enough: float) -> RunContender:
         asked.append(one.trial.effect.key)
         misfit = 1.0 if asked == ["backlash"] else 5.0 - len(asked)
-        return Contender((), one.trial.effect, one.plant, misfit)
+        return RunContender((), one.trial.effect, one.plant, misfit)
 
-    monkeypatch.setattr("identification.forward._screened", screened)
+    monkeypatch.setattr("identification.tracing.free_run.forward_selection._screened", screened)
     begun = [
         Begun(
             Trial((), plain.plant, built_in()[key], []), plain.plant, plain.plant, loss, misfit, ()
@@ -156,7 +165,7 @@ def test_contenders_are_tried_until_one_is_followed(
 
 
 def test_luck_grows_with_what_was_tried() -> None:
-    spring = Candidate(built_in()["spring"], {"k": 1.0, "k_3": 0.0}, {}, 12.0)
+    spring = EffectCandidate(built_in()["spring"], {"k": 1.0, "k_3": 0.0}, {}, 12.0)
     assert luck(spring, 1) == pytest.approx(np.exp(-6.0))  # chi-square of two, at 12
     assert luck(spring, 18) == pytest.approx(18 * luck(spring, 1))
     assert luck(replace(spring, gain=-3.0), 18) == 1.0
@@ -222,7 +231,7 @@ def test_no_contest_where_no_effect_brings_a_free_body_near() -> None:
     one = seen(made(4, {"spring": {"k": 40.0}}))
     start, first = first_stage([one], False)
     shown = choose(start, first, {}, np.random.default_rng(0), lambda _s, _p: None)
-    assert spread(first["mechanical"]) > 2.0 * FAR
+    assert mean_square(first["mechanical"]) > 2.0 * MUCH_IS_LEFT
     spring = best_of(start, built_in()["spring"], first)
     assert spring is not None
 
@@ -232,6 +241,6 @@ def test_no_contest_where_no_effect_brings_a_free_body_near() -> None:
         o = replace(first["mechanical"], fit=replace(first["mechanical"].fit, residual=r))
         return replace(shown, tried=(replace(spring, outcomes={"mechanical": o}),))
 
-    left = 1.1 * FAR / spread(first["mechanical"])
+    left = 1.1 * MUCH_IS_LEFT / mean_square(first["mechanical"])
     assert hidden(leaving(left), False) and not hidden(leaving(left), True)
     assert hidden(leaving(0.5 * left), True) and not hidden(leaving(0.9), False)

@@ -13,44 +13,33 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from identification.approach import (
-    BREAKS,
-    CLOSE,
-    FAR,
-    FINER,
-    GROWTH,
-    MIDWAY,
+from identification.effects._base import Effect
+from identification.errors import UserError
+from identification.estimation.regression.effect_columns import by_load, equations_of
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    MECHANICAL,
+    MotionLog,
+    shortened,
+)
+from identification.estimation.windowed_run.nudged_search import (
+    BREAKS_RANGE,
+    CLOSE_RANGE,
+    FAR_RANGE,
+    FINER_RANGE,
+    GROWTH_RANGE,
+    MIDWAY_RANGE,
     NEARLY,
-    SHORT,
-    SIDES,
-    SLIDING,
-    approach,
+    SHORT_SECONDS,
+    SIDES_RANGE,
+    SLIDING_RANGE,
     closer,
-    judge_led,
+    judge_nudged,
     less_load,
     nearer,
+    nudged_search,
 )
-from identification.candidates import Candidate, trial
-from identification.choice import LEVEL, Choice, Step, absorb, rough, settled
-from identification.effects._base import Effect
-from identification.equations import by_load, equations_of
-from identification.errors import UserError
-from identification.evidence import ACTUATOR, MECHANICAL, Moving, shortened
-from identification.needed import (
-    DECISIVE,
-    EARNS,
-    NEAR,
-    Setting,
-    enough,
-    known,
-    pruned,
-    refined,
-    seconds,
-    with_steps,
-)
-from identification.outcome import Outcome, spread
-from identification.plant import Plant
-from identification.refit import (
+from identification.estimation.windowed_run.refinement import (
     COMPLETE,
     Refit,
     briefly,
@@ -64,29 +53,63 @@ from identification.refit import (
     refit,
     start_band,
 )
-from identification.result import Drive
-from identification.stage import Stage
-from identification.starts import SECONDS, freed, left, starts
-from identification.structure import MUCH, Model
-from identification.trials import Trial, driven_only, seen_in_run, structures
+from identification.estimation.windowed_run.windows import (
+    RUN_WINDOW,
+    freed,
+    starts,
+    window_residual,
+)
+from identification.model.estimates import Drive
+from identification.model.plant import Plant
+from identification.tracing.free_run.backward_elimination import (
+    DECISIVE,
+    EARNS,
+    NEARLY_FOLLOWED,
+    Setting,
+    enough,
+    known,
+    pruned,
+    refined_near,
+    seconds,
+    with_steps,
+)
+from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure
+from identification.tracing.free_run.trial_structures import (
+    Trial,
+    driven_only,
+    seen_in_run,
+    structures,
+)
+from identification.tracing.regression.candidates import EffectCandidate, trial
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, mean_square
+from identification.tracing.regression.stepwise import (
+    CHANCE_LEVEL,
+    Choice,
+    Step,
+    absorb,
+    rough,
+    settled_fits,
+)
 
-HALF = 0.5  # of the excess misfit before, at most
+HALF_OF_EXCESS = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
 OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
-UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
-PROMISING = 0.6  # of the misfit before, that the best may leave on the short logs to go on
+MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
+GOES_ON = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
 FINALISTS = 2  # refined on the whole logs
 AHEAD = 4  # first of those begun, tried where two effects are there already: each takes long
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
-LOST = 3.0  # misfit after a first search, of one no longer tried where another is followed by then
+# Misfit after a first search, of one no longer tried where another is followed by then
+LOST_MISFIT = 3.0
 Report = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
-class Contender:
+class RunContender:
     """A structure in the free run: its steps but the last, the last effect, plant and misfit."""
 
     steps: tuple[Step, ...]
@@ -97,7 +120,7 @@ class Contender:
 
 @dataclass(frozen=True, eq=False)
 class Begun:
-    """A trial after a first search: the plant before and after it, what that leaves (a run led
+    """A trial after a first search: the plant before and after it, what that leaves (a run nudged
     along the log where nothing else holds it, and one let go), and other plants to begin from."""
 
     trial: Trial
@@ -109,12 +132,12 @@ class Begun:
 
 
 def judged_forward(
-    choice: Choice, model: Model, setting: Setting, report: Report
-) -> tuple[Choice, Model]:
+    choice: Choice, model: FittedStructure, setting: Setting, report: Report
+) -> tuple[Choice, FittedStructure]:
     """The choice and its model, with what the free run adds, exchanges or finds needless."""
     free = loose(model.plant, setting.drive)
     # On bristles a run takes ten times as long, and where all of it is searched, too long.
-    if model.led or (on_bristle(model.plant) and free):
+    if model.imposed or (on_bristle(model.plant) and free):
         return choice, model
     called_for = choice.steps
     if model.misfit > enough(setting, choice.steps) and hidden(choice, free):
@@ -129,24 +152,24 @@ def judged_forward(
 
 
 def at_once(
-    choice: Choice, model: Model, setting: Setting, report: Report
-) -> tuple[Choice, Model] | None:
+    choice: Choice, model: FittedStructure, setting: Setting, report: Report
+) -> tuple[Choice, FittedStructure] | None:
     """The choice and its model with one effect more, where a first search in the run finds one
     with which nothing is missing."""
     free = loose(model.plant, setting.drive)
-    if model.led or (on_bristle(model.plant) and free):
+    if model.imposed or (on_bristle(model.plant) and free):
         return None
     short = cut_short(choice, model, setting)
     found = contest(choice, model, replace(setting, short=short), report, quickly=True)
     return found if found is not None and found[1].misfit <= COMPLETE else None
 
 
-def cut_short(choice: Choice, model: Model, setting: Setting) -> list[Moving]:
+def cut_short(choice: Choice, model: FittedStructure, setting: Setting) -> list[MotionLog]:
     """The logs' beginnings or, where the run alone tells what is missing, what it follows least."""
     logs, drive = setting.logs, setting.drive
     if not choice.steps and loose(model.plant, drive) and known(setting):
-        return [most_left(model.plant, one, drive, SHORT) for one in logs]
-    return [shortened(one, SHORT) for one in logs]
+        return [most_left(model.plant, one, drive, SHORT_SECONDS) for one in logs]
+    return [shortened(one, SHORT_SECONDS) for one in logs]
 
 
 def hidden(choice: Choice, free: bool) -> bool:
@@ -156,8 +179,8 @@ def hidden(choice: Choice, free: bool) -> bool:
     nothing brings the run back (free) and none brings the equations near the sensors' noise.
     """
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    return all(spread(choice.base[e]) <= MUCH**2 for e in told) or any(
-        spread(one.outcomes[e]) < HALF * spread(choice.base[e])
+    return all(mean_square(choice.base[e]) <= MUCH**2 for e in told) or any(
+        mean_square(one.outcomes[e]) < HALF_OF_EXCESS * mean_square(choice.base[e])
         for one in choice.tried
         if not (free and rough(one.outcomes))
         for e in told
@@ -166,8 +189,13 @@ def hidden(choice: Choice, free: bool) -> bool:
 
 
 def contest(
-    choice: Choice, model: Model, setting: Setting, report: Report, *, quickly: bool = False
-) -> tuple[Choice, Model] | None:
+    choice: Choice,
+    model: FittedStructure,
+    setting: Setting,
+    report: Report,
+    *,
+    quickly: bool = False,
+) -> tuple[Choice, FittedStructure] | None:
     """The best structure of one effect more, or of another in an effect's place, if decisive.
 
     quickly: only where a first search already follows the short logs with one.
@@ -185,13 +213,13 @@ def contest(
     begun = begun[:AHEAD] if many else begun
     # The short logs may be those stretches of which most is left.
     short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
-    promising = max(NEAR, PROMISING * short)
+    promising = max(NEARLY_FOLLOWED, GOES_ON * short)
     promising = min(promising, earning(choice, model, setting))
     needed = 1.0 + EARNS * (model.misfit - 1.0) if choice.steps else np.inf
     screened = screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
-    best: tuple[Refit, Contender] | None = None
+    best: tuple[Refit, RunContender] | None = None
     for finalist in screened[: 1 if many else FINALISTS]:
         if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
             break
@@ -211,10 +239,10 @@ def contest(
     if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
         return None
     taken = _taken(winner, done, rivals, setting, model.misfit)
-    return taken if taken[0].steps[-1].p_value <= LEVEL else None
+    return taken if taken[0].steps[-1].p_value <= CHANCE_LEVEL else None
 
 
-def earning(choice: Choice, model: Model, setting: Setting) -> float:
+def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
     """Misfit on the short logs that one effect more has to get below, beside others.
 
     What a refinement on the short logs alone does without it is no merit of the effect.
@@ -227,13 +255,13 @@ def earning(choice: Choice, model: Model, setting: Setting) -> float:
 
 def screening(
     begun: Sequence[Begun], setting: Setting, promising: float, report: Report
-) -> list[Contender]:
+) -> list[RunContender]:
     """The contenders refined a little on the short logs, the best first.
 
     begun: those followed first, then from the least loss up. Once one is followed, those far behind
     it are not tried.
     """
-    screened = list[Contender]()
+    screened = list[RunContender]()
     settled_at, lost = np.inf, np.inf
     for i, one in enumerate(begun):
         if one.loss > settled_at or one.misfit > lost:
@@ -243,32 +271,35 @@ def screening(
             screened.append(found)
             if found.misfit <= NEARLY:
                 settled_at = min(settled_at, BEHIND * one.loss)
-                lost = LOST if one.misfit <= NEARLY else lost
+                lost = LOST_MISFIT if one.misfit <= NEARLY else lost
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
     return sorted(screened, key=lambda one: one.misfit)
 
 
-def scales_alone(effect: Effect, plant: Plant, logs: Sequence[Moving]) -> bool:
+def scales_alone(effect: Effect, plant: Plant, logs: Sequence[MotionLog]) -> bool:
     """Whether an effect of the plant is friction by load, alike in both directions, where nothing
     brakes: it but scales the other parameters there, and a better run was found by luck."""
     values = next(acting.values for acting in plant.effects if acting.key == effect.key)
     return by_load(effect) and values.get("asymmetry", 0.0) == 0.0 and driven_only(logs)
 
 
-def decisive(before: float, others: Sequence[Contender]) -> float:
+def decisive(before: float, others: Sequence[RunContender]) -> float:
     """Misfit that a structure may leave to be taken: next to nothing, or far less than any other.
 
     before: misfit without it; others: what was tried besides.
     """
     rival = min((one.misfit for one in others), default=before)
     least = min(before, rival)
-    return max(min(DECISIVE, 1.0 + HALF * (before - 1.0)), min(NEAR, 1.0 + ALONE * (least - 1.0)))
+    return max(
+        min(DECISIVE, 1.0 + HALF_OF_EXCESS * (before - 1.0)),
+        min(NEARLY_FOLLOWED, 1.0 + ALONE * (least - 1.0)),
+    )
 
 
-def most_left(plant: Plant, one: Moving, drive: Drive, seconds: float) -> Moving:
+def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> MotionLog:
     """The stretch of a log, of so many seconds, of which the plant's run leaves most."""
     n, size = len(one.log), round(seconds / one.log.h)
-    r = left(plant, one, drive, freed(plant, one, drive, starts(one, drive)))
+    r = window_residual(plant, one, drive, freed(plant, one, drive, starts(one, drive)))
     if r is None or size >= n:
         return shortened(one, seconds)
     sums = np.concatenate([[0.0], np.cumsum(np.log1p(np.sum(r**2, axis=0)))])
@@ -291,9 +322,9 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
         return []
     free = loose(plants[0], setting.drive)
     if free and not known(setting):
-        errors_of = judge_led(plants[0], setting.short, setting.drive, 1.0)
+        errors_of = judge_nudged(plants[0], setting.short, setting.drive, 1.0)
     else:
-        errors_of = judge(plants[0], setting.short, setting.drive, SECONDS)
+        errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
     try:
         with ThreadPoolExecutor(2) as pool:
             costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
@@ -312,7 +343,7 @@ def _begun(trial: Trial, setting: Setting) -> list[Begun]:
         return []
 
 
-def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
+def _screened(one: Begun, setting: Setting, enough: float) -> RunContender | None:
     """The contender refined a little on the short logs, from its other starts too.
 
     enough: misfit from which it may be the best; far above it no other start is tried.
@@ -328,7 +359,7 @@ def _screened(one: Begun, setting: Setting, enough: float) -> Contender | None:
             found = min(found, again, key=lambda x: x.misfit)
     except UserError:
         return None
-    return Contender(trial.steps, trial.effect, found.plant, found.misfit)
+    return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
 
 
 def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
@@ -338,10 +369,10 @@ def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
             return briefly(plant, setting.short, setting.drive).plant
         # Growth shows in stops alone, of which brief windows see little.
         # Where the plain run is nearly followed, its band and limits are nearly right.
-        around = MIDWAY if setting.plain.misfit <= NEAR else SLIDING
-        around = BREAKS if effect.place.in_stops else around
-        stage = (0.0, around) if known(setting) else (1.0, FAR)
-        return approach(plant, setting.short, setting.drive, setting.rng, (stage,))
+        around = MIDWAY_RANGE if setting.plain.misfit <= NEARLY_FOLLOWED else SLIDING_RANGE
+        around = BREAKS_RANGE if effect.place.in_stops else around
+        stage = (0.0, around) if known(setting) else (1.0, FAR_RANGE)
+        return nudged_search(plant, setting.short, setting.drive, setting.rng, (stage,))
     if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
         p = plant.friction
         return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
@@ -352,24 +383,26 @@ def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
     """The plant after a first search, or its start, refined a little on the short logs."""
     if loose(plant, setting.drive) and misfit(plant, setting.short, setting.drive) > COMPLETE:
         plant = nearer((plant, start), setting.short, setting.drive)
-        plant = approach(plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE),))
+        plant = nudged_search(
+            plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE_RANGE),)
+        )
     return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
 
 
-def _whole(one: Contender, setting: Setting) -> Refit:
+def _whole(one: RunContender, setting: Setting) -> Refit:
     """The contender refined on the whole logs; its asymmetries free where it falls short."""
     growth = one.effect.place.in_stops and loose(one.plant, setting.drive)
-    found = _grown(one, setting) if growth else refined(one.plant, setting)
-    if COMPLETE < found.misfit < UNEVEN and even(found.plant):
+    found = _grown(one, setting) if growth else refined_near(one.plant, setting)
+    if COMPLETE < found.misfit < MAY_BE_UNEVEN and even(found.plant):
         again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
         found = again if again.misfit < found.misfit else found
         if found.misfit > COMPLETE and loose(found.plant, setting.drive):
-            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES)
+            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES_RANGE)
             found = again if again.misfit < found.misfit else found
     return found
 
 
-def _grown(one: Contender, setting: Setting) -> Refit:
+def _grown(one: RunContender, setting: Setting) -> Refit:
     """A contender of growing stiction, searched and refined on the whole logs in turn.
 
     A breakaway is at one sample or the next, so a small change of its limit changes nothing, and
@@ -377,14 +410,15 @@ def _grown(one: Contender, setting: Setting) -> Refit:
     """
     logs, drive = setting.logs, setting.drive
     begins = [one.plant]
-    if not one.steps and setting.plain.misfit <= NEAR:  # all but the rare late breakaways
+    # All but the rare late breakaways
+    if not one.steps and setting.plain.misfit <= NEARLY_FOLLOWED:
         begins.append(replace(one.plant, friction=setting.plain.plant.friction))
     best: Refit | None = None
-    for around in (GROWTH, GROWTH, FINER, FINER):
-        near = [approach(x, logs, drive, setting.rng, ((0.0, around),)) for x in begins]
+    for around in (GROWTH_RANGE, GROWTH_RANGE, FINER_RANGE, FINER_RANGE):
+        near = [nudged_search(x, logs, drive, setting.rng, ((0.0, around),)) for x in begins]
         found = onward(nearer((*begins, *near), logs, drive), logs, drive)
         best = found if best is None or found.misfit < best.misfit else best
-        if not COMPLETE < best.misfit < UNEVEN:
+        if not COMPLETE < best.misfit < MAY_BE_UNEVEN:
             break
         begins = [best.plant]
     assert best is not None
@@ -392,8 +426,12 @@ def _grown(one: Contender, setting: Setting) -> Refit:
 
 
 def _taken(
-    winner: Contender, done: Refit, rivals: Sequence[Contender], setting: Setting, before: float
-) -> tuple[Choice, Model]:
+    winner: RunContender,
+    done: Refit,
+    rivals: Sequence[RunContender],
+    setting: Setting,
+    before: float,
+) -> tuple[Choice, FittedStructure]:
     """The choice with the winner as its last step, and the model."""
     stage, base = with_steps(winner.steps, setting.start, setting.first)
     values = next(dict(a.values) for a in done.plant.effects if a.key == winner.effect.key)
@@ -408,21 +446,21 @@ def _taken(
         replace(mine, values=values), p_value, tuple(sorted(scaled, key=lambda c: -c.gain)),
         stage, base, explained,
     )  # fmt: skip
-    end, last = settled(replace(absorb(stage, step.candidate), scales={}))
+    end, last = settled_fits(replace(absorb(stage, step.candidate), scales={}))
     choice = Choice(setting.start, setting.first, (*winner.steps, step), end, last, ())
-    return choice, Model(end, last, done.plant, done.sd, False, done.misfit)
+    return choice, FittedStructure(end, last, done.plant, done.sd, False, done.misfit)
 
 
-def luck(candidate: Candidate, tried: int) -> float:
+def luck(candidate: EffectCandidate, tried: int) -> float:
     """Chance that any of so many effects gains as much, every second counted as one sample."""
     free = len(candidate.effect.params)
     return float(min(1.0, tried * chi2.sf(max(candidate.gain, 0.0), free)))
 
 
 def _as_candidate(
-    one: Contender, stage: Stage, base: Mapping[str, Outcome], gain: float
-) -> Candidate:
+    one: RunContender, stage: EffectRows, base: Mapping[str, RowFit], gain: float
+) -> EffectCandidate:
     """A contender as the equations see it."""
     values = next(dict(a.values) for a in one.plant.effects if a.key == one.effect.key)
     told = [e for e in equations_of(one.effect, stage.by_command, stage.held) if e in base]
-    return Candidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)
+    return EffectCandidate(one.effect, values, trial(stage, one.effect, values, told)[1], gain)

@@ -1,0 +1,1 @@
+"""Which effects the free run calls for: added, exchanged, taken out."""
