@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.differentiate import (
+from identification.errors import BadLog
+from identification.signals.differentiate import (
     Method,
     differentiate,
     low_pass,
@@ -14,7 +15,6 @@ from identification.differentiate import (
     resolution,
     spectrum,
 )
-from identification.errors import BadLog
 
 h = 1e-3
 METHODS: tuple[Method, ...] = ("butterworth", "local")

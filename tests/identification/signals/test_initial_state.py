@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.log import Log
-from identification.start import measured_start
+from identification.signals.initial_state import measured_start
 
 
 @pytest.mark.parametrize("v", [0.0, 0.05, -0.3])

@@ -22,7 +22,7 @@ HOP = 0.25  # of a window, between the starts of two
 
 
 @dataclass(frozen=True, eq=False)
-class Windows:
+class WeakWindows:
     """Rows over one log as operators (rows, n): weighted mean of a signal, of its first and second
     derivative, of a signal held over each period and of one that is straight in between; `start`
     (rows,) and `length` in samples."""
@@ -71,7 +71,7 @@ def weights(length: int, h: float) -> tuple[Array, Array, Array, Array, Array]:
     return mean, first, second, np.append(np.diff(whole), 0.0), kinked
 
 
-def windows(starts: IntArray, length: int, n: int, h: float) -> Windows:
+def windows(starts: IntArray, length: int, n: int, h: float) -> WeakWindows:
     """Operators of windows of `length` samples that begin at `starts`, on a log of n samples."""
     r = len(starts)
     column = (starts[:, np.newaxis] + np.arange(length + 1)).ravel()
@@ -80,16 +80,16 @@ def windows(starts: IntArray, length: int, n: int, h: float) -> Windows:
         sparse.csr_array((np.tile(w, r), column, row), shape=(r, n)) for w in weights(length, h)
     )
     mean, first, second, held, kinked = made
-    return Windows(mean, first, second, held, kinked, starts, length)
+    return WeakWindows(mean, first, second, held, kinked, starts, length)
 
 
-def all_windows(n: int, length: int, h: float) -> Windows:
+def all_windows(n: int, length: int, h: float) -> WeakWindows:
     """Windows over the whole log, overlapping."""
     step = max(1, round(HOP * length))
     return windows(np.arange(0, n - length, step, dtype=np.int64), length, n, h)
 
 
-def sliding_windows(direction: Array, length: int, h: float) -> Windows:
+def sliding_windows(direction: Array, length: int, h: float) -> WeakWindows:
     """Windows inside stretches in which `direction` (n,), +1, -1 or 0, is the same and not 0."""
     step = max(1, round(HOP * length))
     cuts = np.flatnonzero(np.diff(direction)) + 1

@@ -18,13 +18,14 @@ from identification.errors import BadLog
 Method = Literal["butterworth", "local"]
 MIN_SAMPLES = 64
 ORDER = 4
-DEGREE = 5
-MARGIN = 2.0
-RESTED, LEVELS = 0.05, 8  # share of the samples at which it stands, and levels at which it does
+LOCAL_DEGREE = 5
+CUTOFF_MARGIN = 2.0
+# Share of the samples at which it stands, and levels at which it does
+RESTED, LEVELS_AT_REST = 0.05, 8
 MOST_STEPS = 1e8  # in the range of a position that is counted
 WHOLE_STEP = 0.01  # of a step, that a counted position is off a multiple
 # Periods of the cut-off after which the filter's start has died out (to 1e-8).
-SETTLED = 8.0
+FILTER_SETTLED = 8.0
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def spectrum(y: Array, h: float) -> Spectrum:
     floor = max(floor, 2.0 * resolution(y) ** 2 / 12.0)
     above = np.flatnonzero(_smooth(ratio) > 2.0 * floor)
     cut = float(f[above[-1]]) if len(above) else float(f[0])
-    return Spectrum(float(np.sqrt(floor / 2.0)), min(MARGIN * cut, 0.4) / h)
+    return Spectrum(float(np.sqrt(floor / 2.0)), min(CUTOFF_MARGIN * cut, 0.4) / h)
 
 
 def resolution(x: Array) -> float:
@@ -93,7 +94,7 @@ def resolution(x: Array) -> float:
     if step > 0.0 or len(stood) < RESTED * len(x):
         return step
     levels = np.unique(stood)
-    return _step_of(levels) if len(levels) >= LEVELS else 0.0
+    return _step_of(levels) if len(levels) >= LEVELS_AT_REST else 0.0
 
 
 def _step_of(levels: Array) -> float:
@@ -145,7 +146,7 @@ def low_pass(x: Array, h: float, cutoff: float, order: int = ORDER) -> Array:
     if cutoff * h >= 0.5:
         return np.array(x, dtype=np.float64)
     sections = signal.butter(order, cutoff, fs=1.0 / h, output="sos")
-    pad = min(len(x) - 1, int(np.ceil(SETTLED / (cutoff * h))))
+    pad = min(len(x) - 1, int(np.ceil(FILTER_SETTLED / (cutoff * h))))
     return np.asarray(signal.sosfiltfilt(sections, x, padlen=pad), dtype=np.float64)
 
 
@@ -181,15 +182,15 @@ def _smooth(ratio: Array) -> Array:
 
 def _window(h: float, cutoff: float) -> int:
     """Odd window of the local polynomial of that cut-off (Schafer, IEEE SPM 2011, eq. (12))."""
-    half = ((DEGREE + 1) / (2.0 * cutoff * h) + 4.6) / 3.2
-    return 2 * max(round(half), DEGREE // 2 + 1) + 1
+    half = ((LOCAL_DEGREE + 1) / (2.0 * cutoff * h) + 4.6) / 3.2
+    return 2 * max(round(half), LOCAL_DEGREE // 2 + 1) + 1
 
 
 def _local(y: Array, h: float, cutoff: float, order: int) -> Array:
     window = _window(h, cutoff)
     if window > len(y):
         raise BadLog(f"cut-off {cutoff:g} Hz needs {window} samples, {len(y)} found; raise it")
-    out = signal.savgol_filter(y, window, DEGREE, deriv=order, delta=h, mode="interp")
+    out = signal.savgol_filter(y, window, LOCAL_DEGREE, deriv=order, delta=h, mode="interp")
     return np.asarray(out, dtype=np.float64)
 
 
@@ -202,5 +203,5 @@ def _velocity_gain(h: float, cutoff: float, method: Method) -> float:
         response = np.gradient(low_pass(impulse, h, cutoff), h)
     else:
         window = _window(h, cutoff)
-        response = signal.savgol_coeffs(window, DEGREE, deriv=1, delta=h)
+        response = signal.savgol_coeffs(window, LOCAL_DEGREE, deriv=1, delta=h)
     return float(np.sqrt(np.sum(response**2)))

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.check import check, check_driven
 from identification.errors import BadLog
 from identification.log import Log, Rig
+from identification.signals.check import check, check_driven
 
 
 def test_a_noisy_position_that_sticks_is_refused() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.clean import check, prepare, repair
 from identification.errors import BadLog
 from identification.log import Log, Rig
+from identification.signals.clean import check, prepare, repair
 
 RIG = Rig("force")
 ROTARY = Rig("force", motion="rotary")

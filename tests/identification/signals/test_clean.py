@@ -6,8 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.check import work_share
-from identification.clean import (
+from identification.errors import BadLog, BadSpecification
+from identification.log import Log, Rig
+from identification.signals.check import work_share
+from identification.signals.clean import (
     RIG_A,
     RIG_C,
     applied_force,
@@ -19,8 +21,6 @@ from identification.clean import (
     repair,
     velocity,
 )
-from identification.errors import BadLog, BadSpecification
-from identification.log import Log, Rig
 
 RIG = Rig(kind="force", stroke=(-0.2, 0.2))
 

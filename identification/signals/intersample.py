@@ -6,7 +6,7 @@ from identification.arrays import Array
 
 # A kink at tau in [0, 1] of a sample lies tau (1 - tau) of the change of slope beyond the line; a
 # part of the second differences raises the line there by tau^2 + (1 - tau)^2 of it. Means over tau:
-BEYOND = (1.0 / 6.0) / (2.0 / 3.0)
+KINK_PER_DIFFERENCE = (1.0 / 6.0) / (2.0 / 3.0)
 SHARP = 2.0  # deviations by noise, from which a second difference is a change of slope
 
 
@@ -21,4 +21,4 @@ def kinks(F: Array, noise: float) -> Array:
     chance = 6.0 * (SHARP * noise) ** 2  # six variances in a second difference
     stands_out = second**2 > chance
     part = np.divide(chance, second**2, out=np.ones(len(F)), where=stands_out)
-    return np.asarray(-BEYOND * second * (1.0 - part))
+    return np.asarray(-KINK_PER_DIFFERENCE * second * (1.0 - part))

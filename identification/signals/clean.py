@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array
-from identification.check import SHORTEST, check_time
-from identification.check import check as check
 from identification.errors import BadLog, BadSpecification
-from identification.jumps import LONGEST_SPIKE, Mask, spikes
 from identification.log import Log, Rig
+from identification.signals.check import SHORTEST_LOG, check_time
+from identification.signals.check import check as check
+from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
 
 LONGEST_REPAIR = 3
 """Missing samples in a row that are interpolated; a longer run is refused."""
@@ -142,7 +142,7 @@ def even_clock(log: Log) -> tuple[Log, ...]:
     resampled at the log's median period. The command `u` and two-valued signals are held (the
     last value at the middle of the new period); the rest follows a piecewise cubic that keeps
     monotone stretches monotone, so that a step neither rings nor spreads over more than one
-    sample. Runs under `SHORTEST` samples are left out. Raises BadLog where none is left.
+    sample. Runs under `SHORTEST_LOG` samples are left out. Raises BadLog where none is left.
     """
     t, h = log["t"], log.h
     cuts = np.flatnonzero(np.diff(t) > LONGEST_GAP * h) + 1
@@ -153,11 +153,11 @@ def even_clock(log: Log) -> tuple[Log, ...]:
             continue
         run = log if (start, stop) == (0, len(log)) else log.part(start, stop)
         run = run if _is_even(run["t"]) else _resample(run, h)
-        if len(run) >= SHORTEST:
+        if len(run) >= SHORTEST_LOG:
             runs.append(run)
     if not runs:
         raise BadLog(
-            f"{log.name}: {len(cuts)} gaps leave no run of {SHORTEST} samples at {h:.4g} s; "
+            f"{log.name}: {len(cuts)} gaps leave no run of {SHORTEST_LOG} samples at {h:.4g} s; "
             "log without gaps"
         )
     return tuple(runs)

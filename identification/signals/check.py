@@ -7,10 +7,10 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadLog
-from identification.jumps import Jumps, jumps
 from identification.log import Log, Rig
+from identification.signals.jumps import Jumps, jumps
 
-SHORTEST = 100
+SHORTEST_LOG = 100
 """Samples that a run needs at least; below that no parameter of nine is better than a guess."""
 
 # Share of the exchanged work below which F is refused. The shipped sets and simulated loops lie
@@ -93,10 +93,10 @@ def _check_moving_force(log: Log) -> None:
 
 
 def check_time(log: Log, first_row: int = 1) -> None:
-    """Pass a log of at least `SHORTEST` samples whose time is finite and increases."""
-    if len(log) < SHORTEST:
+    """Pass a log of at least `SHORTEST_LOG` samples whose time is finite and increases."""
+    if len(log) < SHORTEST_LOG:
         raise BadLog(
-            f"{log.name}: {len(log)} samples, at least {SHORTEST} needed; give a longer run"
+            f"{log.name}: {len(log)} samples, at least {SHORTEST_LOG} needed; give a longer run"
         )
     t = log["t"]
     if not np.all(np.isfinite(t)):
@@ -199,7 +199,7 @@ def _check_stuck(log: Log, first_row: int) -> None:
         return
     bend = np.diff(y, 2)
     bend = bend[bend != 0.0]
-    if bend.size < SHORTEST or np.mean(bend[1:] * bend[:-1] < 0.0) < _NOISE_LIKE:
+    if bend.size < SHORTEST_LOG or np.mean(bend[1:] * bend[:-1] < 0.0) < _NOISE_LIKE:
         return
     worst = int(np.argmax(lengths))
     raise BadLog(

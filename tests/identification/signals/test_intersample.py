@@ -5,13 +5,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.between import kinks
-from identification.evidence import moving
-from identification.karnopp import Karnopp
+from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Log
-from identification.plant import Actuator, Plant
-from identification.refit import misfit
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.signals.intersample import kinks
+from identification.simulation.free_run import free_run
 
 NINE = Karnopp(1.4, 18.0, 15.0, 300.0, 330.0, 0.03, -0.022, 24.0, -18.0)
 
@@ -70,10 +70,13 @@ def pneumatic(seed: int) -> Log:
 def test_breakaways_that_a_force_only_just_reaches_are_followed(
     seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    one = moving(pneumatic(seed), held=False, by_command=False)
+    one = motion_log(pneumatic(seed), held=False, by_command=False)
     found = misfit(Plant(NINE), [one], "force", every=True)
-    monkeypatch.setattr("identification.evidence.kinks", lambda F, _noise: np.zeros(len(F)))
-    bare = moving(pneumatic(seed), held=False, by_command=False)
+    monkeypatch.setattr(
+        "identification.estimation.regression.equation_rows.kinks",
+        lambda F, _noise: np.zeros(len(F)),
+    )
+    bare = motion_log(pneumatic(seed), held=False, by_command=False)
     without = misfit(Plant(NINE), [bare], "force", every=True)
     assert found < 0.2 * without
 

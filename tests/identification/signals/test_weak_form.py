@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification.weak_form import all_windows, noise_gain, sliding_windows, weights
+from identification.signals.weak_form import all_windows, noise_gain, sliding_windows, weights
 
 H = 2e-3
 

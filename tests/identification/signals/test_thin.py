@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identification import thin
 from identification.log import Log
-from identification.thin import thinned
+from identification.signals import thin
+from identification.signals.thin import thinned
 
 
 def oscillation(n: int, h: float) -> Log:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from identification.excitation import (
+from identification.signals.excitation import (
     Multisine,
     Ramps,
     RandomSteps,
