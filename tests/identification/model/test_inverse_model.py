@@ -10,10 +10,10 @@ import pytest
 from scipy.io import loadmat
 
 from identification.arrays import Array
-from identification.differentiate import Method
 from identification.errors import BadLog, NotIdentifiable
-from identification.inverse_model import (
-    NAMES,
+from identification.log import Log
+from identification.model.inverse_model import (
+    SLIDING_NAMES,
     InverseModel,
     Smoothing,
     Viscous,
@@ -22,10 +22,10 @@ from identification.inverse_model import (
     force_predicted,
     held_force,
 )
-from identification.karnopp import Karnopp, friction
-from identification.log import Log
+from identification.model.karnopp import Karnopp, friction
+from identification.signals.differentiate import Method
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 EMPS = Path(os.environ.get("WORKBENCH_DATA") or ROOT.parent / "shared" / "data") / "emps"
 REFERENCE: dict[str, Any] = tomllib.loads((ROOT / "tests/reference/emps.toml").read_text())
 PUBLISHED = Smoothing(
@@ -78,7 +78,7 @@ def stopping(p: Karnopp) -> Log:
 
 
 def five(p: Karnopp) -> Array:
-    return np.array([getattr(p, name) for name in NAMES])
+    return np.array([getattr(p, name) for name in SLIDING_NAMES])
 
 
 @pytest.mark.parametrize("method", ["butterworth", "local"])
@@ -92,7 +92,7 @@ def test_recovers_known_friction(log: Log, method: Method) -> None:
 def test_deviations_hold_the_truth() -> None:
     """Over twenty seeds the errors are of the size that the deviations announce."""
     fits = [fit_inverse(moving(TRUE, seed, noise=1e-5)) for seed in range(20)]
-    z = np.array([(f.array - five(TRUE)) / [f.sd[name] for name in NAMES] for f in fits])
+    z = np.array([(f.array - five(TRUE)) / [f.sd[name] for name in SLIDING_NAMES] for f in fits])
     assert 0.2 < float(np.sqrt(np.mean(z**2))) < 3.0
 
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from identification.arrays import Array
-from identification.karnopp import Karnopp
-from identification.plant import Actuator, Motor
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor
 
 Drive = Literal["command", "force"]
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from identification.effects._base import Acting
 from identification.errors import BadModel
-from identification.karnopp import ROTARY_UNITS, UNITS, Karnopp
+from identification.model.karnopp import ROTARY_UNITS, UNITS, Karnopp
 
 ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m", "k_a": "N/V"}
 ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad", "k_a": "N m/V"}

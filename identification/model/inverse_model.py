@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array, frozen
-from identification.differentiate import Method, Motion, differentiate, parallel_filter
 from identification.errors import BadLog, NotIdentifiable
-from identification.karnopp import Karnopp, friction
 from identification.log import Log
+from identification.model.karnopp import Karnopp, friction
+from identification.signals.differentiate import Method, Motion, differentiate, parallel_filter
 
 Viscous = Literal["symmetric", "directional"]
 BoolArray = NDArray[np.bool_]
-NAMES = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
-SURE = 5.0
+SLIDING_NAMES = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
+SURE_SLIDING = 5.0
 MIN_SLIDING = 20
 MAX_CONDITION = 100.0
 
@@ -52,7 +52,7 @@ class Smoothing:
 
 @dataclass(frozen=True)
 class Regression:
-    """Filtered columns (n, 5) in the order of `NAMES` and force [N] (n,) of the sliding samples.
+    """Filtered columns (n, 5) in the order of `SLIDING_NAMES`, force [N] (n,), while sliding.
 
     `index` (n,) says which samples of the log they are; `factor` of them count as one.
     """
@@ -78,8 +78,8 @@ class InverseModel:
     """The Karnopp parameters that sliding shows, with standard deviations and force error.
 
     m [kg], F_cp, F_cn [N], F_vp, F_vn [N s/m]. `sd` holds these and F_c, offset; `covariance`
-    (5, 5) is in the order of `NAMES`. `samples` counts independent sliding samples; `cutoff` [Hz],
-    `noise` [m] and `threshold` [m/s] are those of the smoothing used.
+    (5, 5) is in the order of `SLIDING_NAMES`. `samples` counts independent sliding samples;
+    `cutoff` [Hz], `noise` [m] and `threshold` [m/s] are those of the smoothing used.
     """
 
     viscous: Viscous
@@ -98,8 +98,8 @@ class InverseModel:
 
     @property
     def array(self) -> Array:
-        """The five parameters in the order of `NAMES`."""
-        return np.array([getattr(self, name) for name in NAMES], dtype=np.float64)
+        """The five parameters in the order of `SLIDING_NAMES`."""
+        return np.array([getattr(self, name) for name in SLIDING_NAMES], dtype=np.float64)
 
     @property
     def F_c(self) -> float:
@@ -113,14 +113,14 @@ class InverseModel:
 
 
 def regression(log: Log, how: Smoothing | None = None) -> Regression:
-    """The log's sliding samples as a linear regression in the five parameters of `NAMES`.
+    """The log's sliding samples as a linear regression in the five parameters of `SLIDING_NAMES`.
 
     Raises BadLog where the clock is uneven, NotIdentifiable where too little of it slides.
     """
     how = how or Smoothing()
     h = _even_period(log)
     motion = differentiate(log["y"], h, how.cutoff, how.method)
-    threshold = SURE * motion.v_noise if how.threshold is None else how.threshold
+    threshold = SURE_SLIDING * motion.v_noise if how.threshold is None else how.threshold
     force = held_force(log["F"]) if how.held else np.array(log["F"])
     up, down = motion.v > threshold, motion.v < -threshold
     columns = np.column_stack([motion.a, up, -1.0 * down, motion.v * up, motion.v * down])
@@ -145,7 +145,7 @@ def fit_inverse(
     does not slide enough, in both directions. Source: IDIM-LS, Janot et al. 2019 (see above).
     """
     data = regression(log, how)
-    basis = ONE_VISCOUS if viscous == "symmetric" else np.eye(len(NAMES))
+    basis = ONE_VISCOUS if viscous == "symmetric" else np.eye(len(SLIDING_NAMES))
     columns = data.columns @ basis
     _independent(log.name, columns)
     q, r = np.linalg.qr(columns)
@@ -169,7 +169,7 @@ def force_error(
 ) -> ForceError:
     """Error of the inverse model's force on the sliding samples of a log, filtered as for a fit."""
     data = regression(log, how)
-    theta = np.array([getattr(model, name) for name in NAMES], dtype=np.float64)
+    theta = np.array([getattr(model, name) for name in SLIDING_NAMES], dtype=np.float64)
     return _error(data.force - data.columns @ theta, data.force)
 
 
@@ -210,7 +210,7 @@ def _error(residual: Array, force: Array) -> ForceError:
 
 def _deviations(covariance: Array) -> Mapping[str, float]:
     """Standard deviations of the five and of F_c and the offset, half their sum and difference."""
-    each = dict(zip(NAMES, np.sqrt(np.diag(covariance)).tolist(), strict=True))
+    each = dict(zip(SLIDING_NAMES, np.sqrt(np.diag(covariance)).tolist(), strict=True))
     for name, sign in (("F_c", 1.0), ("offset", -1.0)):
         mix = np.array([0.0, 0.5, 0.5 * sign, 0.0, 0.0])
         each[name] = float(np.sqrt(mix @ covariance @ mix))

@@ -1,0 +1,1 @@
+"""The plant as equations: Karnopp friction, actuator, inverse model, and estimates of them."""
