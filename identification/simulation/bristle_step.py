@@ -4,13 +4,13 @@ import math
 
 from identification.arrays import Array
 from identification.compiled import call_value, compiled, compiled_inline
-from identification.stepping import K2, M, Parameters
+from identification.simulation.karnopp_step import K2, M, Parameters
 
 # Damping ratio of the micro-motion on a bristle: without it a body at rest would ring on. LuGre's
 # sigma_1 = 2 MICRO_DAMPING sqrt(sigma_0 m) is its authors' choice (IEEE TAC 40 (1995), table I).
 MICRO_DAMPING = 0.5
 ITERATIONS = 8  # most, of a bristle's mean slope within a sub-step
-SHARE = 1e-3  # of the level, by which the slope of a bristle is differentiated
+SLOPE_SHARE = 1e-3  # of the level, by which the slope of a bristle is differentiated
 
 
 @compiled
@@ -20,13 +20,13 @@ def bristle_slopes(
 ) -> tuple[float, float, float]:  # fmt: skip
     """Slope dF/dy of a bristle at z, its derivative by z, and its slope without load."""
     x = (t, y, v, F, u, d, z, c, c)
-    beside = (t, y, v, F, u, d, z - d * SHARE * c, c, c)
+    beside = (t, y, v, F, u, d, z - d * SLOPE_SHARE * c, c, c)
     free = (t, y, v, F, u, d, 0.0, c, c)
     slope = call_value(address, x, s.ctypes.data, q.ctypes.data)
     change = slope - call_value(address, beside, s.ctypes.data, q.ctypes.data)
     return (
         slope,
-        change / (d * SHARE * c),
+        change / (d * SLOPE_SHARE * c),
         max(call_value(address, free, s.ctypes.data, q.ctypes.data), 1e-300),
     )
 

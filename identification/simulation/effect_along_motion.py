@@ -7,13 +7,13 @@ from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray, read_only
 from identification.compiled import call_evolve, call_value, compiled
-from identification.effect_table import EVOLVE, INITIAL, VALUE
 from identification.effects._base import MAX_PARAMS, Effect
-from identification.karnopp import Karnopp
-from identification.rest import samples
+from identification.model.karnopp import Karnopp
+from identification.signals.sampling import samples
+from identification.simulation.effect_table import EVOLVE, INITIAL, VALUE
 
 SMOOTH = 8  # samples of 2 ms, over which the force on a bristle at rest is averaged, twice
-PIECES = 8  # of a sample, in which a bristle is followed
+BRISTLE_PIECES = 8  # of a sample, in which a bristle is followed
 
 
 @compiled
@@ -119,7 +119,7 @@ def elastic_share(
     y, v, F, u = (read_only(np.ascontiguousarray(signals[k])) for k in ("y", "v", "F", "u"))
     addresses = np.array(effect.addresses, dtype=np.int64)
     t, s = signals["t"] - signals["t"][0], np.zeros((len(c), 1))
-    bristle_kernel(addresses, q, h, t, y, v, F, u, c, s, PIECES, out)
+    bristle_kernel(addresses, q, h, t, y, v, F, u, c, s, BRISTLE_PIECES, out)
     return np.asarray(out / np.maximum(c, 1e-300))
 
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.library import built_in
 from identification.log import Log
-from identification.plant import Actuator, Motor, Plant
-from identification.simulate import FreeRun, force_slope, free_run, run_kernel
-from identification.stepping import STUCK
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.free_run import FreeRun, force_slope, free_run, run_kernel
+from identification.simulation.karnopp_step import STUCK
 from tests.identification.oracle import euler
 from tests.identification.plants import ACTUATOR, command, table
 

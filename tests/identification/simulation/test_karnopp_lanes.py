@@ -6,10 +6,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.block import WIDTH, march, march_held, place, prepare, work_space
-from identification.karnopp import Karnopp
-from identification.simulate import run_kernel
-from identification.stepping import kernel_parameters
+from identification.model.karnopp import Karnopp
+from identification.simulation.free_run import run_kernel
+from identification.simulation.karnopp_lanes import (
+    WIDTH,
+    march,
+    march_held,
+    place,
+    prepare_lanes,
+    work_space,
+)
+from identification.simulation.karnopp_step import kernel_parameters
 from tests.identification.plants import ACTUATOR, command, table
 
 H = 1e-3
@@ -32,7 +39,7 @@ def spread(nine: Karnopp, seed: int, size: float = 0.3) -> Array:
 def lanes(p: Array, start: tuple[float, float, float], u: Array) -> Array:
     """Positions and forces (n, 2, WIDTH) of a block driven by a command, in two chunks."""
     s, modes, tables = work_space()
-    prepare(p, H, tables, s)
+    prepare_lanes(p, H, tables, s)
     for lane in range(WIDTH):
         place(s, modes, tables, p, lane, *start)
     out, half = np.zeros((len(u), 2, WIDTH)), len(u) // 2
@@ -78,7 +85,7 @@ def test_held_lanes_are_the_scalar_run(coupling: float) -> None:
     y, force = truth[0], truth[2]
     slope_y, slope = (np.append(np.diff(a) / H, 0.0) for a in (y, force))
     s, modes, tables = work_space()
-    prepare(p, H, tables, s)
+    prepare_lanes(p, H, tables, s)
     for lane in range(WIDTH):
         place(s, modes, tables, p, lane, y[0], 0.0, force[0])
     out = np.zeros((len(u), 2, WIDTH))

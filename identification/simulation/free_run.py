@@ -6,8 +6,12 @@ import numpy as np
 
 from identification.arrays import Array, IntArray, read_only
 from identification.compiled import compiled
-from identification.effect_run import effect_run_kernel, effective_commands, shown_run
-from identification.effect_table import (
+from identification.errors import BadModel
+from identification.log import Log
+from identification.model.estimates import Drive
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.effect_run import effect_run_kernel, effective_commands, shown_run
+from identification.simulation.effect_table import (
     LONGEST_BRISTLE,
     effect_table,
     fewer,
@@ -15,11 +19,7 @@ from identification.effect_table import (
     pieces,
     signal_table,
 )
-from identification.errors import BadModel
-from identification.log import Log
-from identification.plant import Actuator, Motor, Plant
-from identification.result import Drive
-from identification.stepping import (
+from identification.simulation.karnopp_step import (
     COLUMNS,
     F_HI,
     F_LO,

@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array, IntArray
-from identification.karnopp import Karnopp, slip_friction
-from identification.simulate import run_kernel
-from identification.stepping import (
+from identification.model.karnopp import Karnopp, slip_friction
+from identification.simulation.free_run import run_kernel
+from identification.simulation.karnopp_step import (
     BAND_N,
     BAND_P,
     EDGE_P,

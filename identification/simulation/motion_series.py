@@ -91,7 +91,7 @@ def _quadratic_fall(value: float, slope: float, end: float, high: float) -> floa
 
 
 @compiled
-def fall(
+def time_of_fall(
     c: Series, at_0: float, g: float, k2: float, w: float, end: float, high: float
 ) -> tuple[float, float]:
     """Time in [0, high] at which at_0 + g t - k2 dy + w v falls through 0, and dy until then.

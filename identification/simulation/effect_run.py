@@ -1,25 +1,18 @@
-"""Free run of a plant with effects along a log (compiled): `simulate.run_kernel` with effects."""
+"""Free run of a plant with effects along a log (compiled): `free_run.run_kernel` with effects."""
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.compiled import call_value, compiled
-from identification.effect_step import (
+from identification.simulation.effect_step import (
     acting_command,
     delayed,
     effect_step,
     shown_position,
     start_states,
 )
-from identification.effect_table import ACTUATOR, BRISTLE, COMMAND, DELAY, INITIAL, VALUE
-from identification.stepping import (
-    K1,
-    K2,
-    SLIP_N,
-    SLIP_P,
-    STUCK,
-    parameters,
-)
+from identification.simulation.effect_table import ACTUATOR, BRISTLE, COMMAND, DELAY, INITIAL, VALUE
+from identification.simulation.karnopp_step import K1, K2, SLIP_N, SLIP_P, STUCK, parameters
 
 CALM = (STUCK, SLIP_P, SLIP_N)  # modes in which a sample may pass without a switch
 
@@ -112,7 +105,7 @@ def effect_run_kernel(
 ) -> None:
     """One plant p (1, 11) along one log: out (4, n) takes y, v, F and the position shown.
 
-    As `simulate.run_kernel`, with effects codes (k,), addresses (k, 3), q (k, P), signals
+    As `free_run.run_kernel`, with effects codes (k,), addresses (k, 3), q (k, P), signals
     s (k, n, S); k_a: a motor's, whose force is k_a times the command that reaches it, or 0.
     rough, count: sub-steps of a sample without a switch (one of a body that stays at rest), and of
     one with a switch in it.

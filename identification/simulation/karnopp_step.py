@@ -14,7 +14,14 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.compiled import compiled, compiled_inline
-from identification.series import fall, motion, power_sum, series, term, turning_point
+from identification.simulation.motion_series import (
+    motion,
+    power_sum,
+    series,
+    term,
+    time_of_fall,
+    turning_point,
+)
 
 STUCK, SLIP_P, SLIP_N, BAND_P, BAND_N, EDGE_P, EDGE_N = range(7)
 MODES = 7
@@ -29,7 +36,7 @@ Row = tuple[
     float, float, float, float, float, float, float, float, float, float, float, float, float
 ]
 RATE_STEP = 0.35  # longest stretch of one series, in units of the fastest rate: its rest is 1e-14
-BRIEF = 0.1  # the same, of a shorter series
+BRIEF_STEP = 0.1  # the same, of a shorter series
 # Within a quarter of an oscillation acceleration rises while it is negative, and the force in the
 # band does not fall below its limit and come back; in longer samples every step is followed.
 QUARTER = 1.5
@@ -110,17 +117,17 @@ def _sliding_exit(
             end = motion(c, high)[1]
         if end >= edge:
             return span, moved, v_end, 0
-        tau, moved = fall(c, -edge, 0.0, 0.0, 1.0, end - edge, high)
+        tau, moved = time_of_fall(c, -edge, 0.0, 0.0, 1.0, end - edge, high)
         return tau, moved, edge, 1
     # Force first: in the band velocity rises as long as the force is above the limit, no longer.
     tau, found = span, 0
     excess = force - stick
     end = excess + g * span - k2 * moved
     if end < 0.0:
-        tau, moved = fall(c, excess, g, k2, 0.0, end, span)
+        tau, moved = time_of_fall(c, excess, g, k2, 0.0, end, span)
         v_end, found = power_sum(c, tau), 2
     if v_end > edge:
-        tau, moved = fall(c, edge, 0.0, 0.0, -1.0, edge - v_end, tau)
+        tau, moved = time_of_fall(c, edge, 0.0, 0.0, -1.0, edge - v_end, tau)
         v_end, found = edge, 1
     return tau, moved, v_end, found
 
@@ -252,7 +259,7 @@ def glided(
     after = speed + h * (c1 + h * (c2 + h * (c3 + h * (c4 + h * (c5 + h * c6)))))
     moved = h * (c1 / 2 + h * (c2 / 3 + h * (c3 / 4 + h * (c4 / 5 + h * (c5 / 6 + h * c6 / 7)))))
     moved = h * (speed + moved)
-    brief = alpha * h < BRIEF and abs(beta) * h * h < BRIEF * BRIEF
+    brief = alpha * h < BRIEF_STEP and abs(beta) * h * h < BRIEF_STEP * BRIEF_STEP
     on = min(speed, speed + c1 * h, after) > edge and mode in (SLIP_P, SLIP_N)
     return side * moved, side * after, brief and on
 

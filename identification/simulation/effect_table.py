@@ -18,8 +18,8 @@ CODES = dict(
         range(9), strict=True,
     )
 )  # fmt: skip
-OUTSIDE = (COMMAND, DELAY, SENSOR)
-LONGEST = 1e-3  # s, sub-step of effects without memory
+OUTSIDE_CODES = (COMMAND, DELAY, SENSOR)
+LONGEST_STEP = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
 LONGEST_BRISTLE = 2e-4  # s
 VALUE, EVOLVE, INITIAL = range(3)
@@ -37,8 +37,8 @@ class EffectTable:
         """Longest sub-step [s]; bristle: of a plant with one."""
         if np.any(self.codes == BRISTLE):
             return bristle
-        states = (self.addresses[:, EVOLVE] != 0) & ~np.isin(self.codes, OUTSIDE)
-        return LONGEST_STATE if np.any(states) else LONGEST
+        states = (self.addresses[:, EVOLVE] != 0) & ~np.isin(self.codes, OUTSIDE_CODES)
+        return LONGEST_STATE if np.any(states) else LONGEST_STEP
 
 
 def effect_table(acting: tuple[Acting, ...]) -> EffectTable:
@@ -72,7 +72,7 @@ def signal_table(acting: tuple[Acting, ...], log: Log) -> Array:
 
 def outside(codes: IntArray) -> bool:
     """Whether the effects change only what reaches the actuator and what the transducer shows."""
-    return bool(np.all(np.isin(codes, OUTSIDE)))
+    return bool(np.all(np.isin(codes, OUTSIDE_CODES)))
 
 
 def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> int:
@@ -82,9 +82,9 @@ def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> in
 
 def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
     """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
-    if np.all(np.isin(table.codes, (STICTION, *OUTSIDE))):
+    if np.all(np.isin(table.codes, (STICTION, *OUTSIDE_CODES))):
         return 1  # it slides as the plain plant does
-    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (STICTION, *OUTSIDE))
-    longest = LONGEST_STATE if np.any(states) else LONGEST
+    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (STICTION, *OUTSIDE_CODES))
+    longest = LONGEST_STATE if np.any(states) else LONGEST_STEP
     short = min(table.longest(bristle) / longest, 1.0)
     return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))

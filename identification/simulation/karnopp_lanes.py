@@ -2,14 +2,14 @@
 
 A block holds WIDTH plants in one flat work array, entry `row * WIDTH + lane`, so that the inner
 loops have a constant length and vectorise. Every lane takes the affine step of its mode; lanes
-that left the region of their mode are then resolved from event to event (`stepping.resolve`).
+that left the region of their mode are then resolved from event to event (`karnopp_step.resolve`).
 """
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled, compiled_inline
-from identification.stepping import (
+from identification.simulation.karnopp_step import (
     A11,
     A12,
     B1,
@@ -102,7 +102,7 @@ def place(
 
 
 @compiled
-def prepare(p: Array, h: float, tables: Array, s: Array) -> None:
+def prepare_lanes(p: Array, h: float, tables: Array, s: Array) -> None:
     """Step tables of all lanes, their k1 and k2."""
     for lane in range(WIDTH):
         mode_table(parameters(p, lane), h, tables[lane])

@@ -1,10 +1,10 @@
 """Steps of the Karnopp plant with effects (compiled): any effects, no new compilation.
 
 Within a sub-step the effects' forces are those at its predicted middle, and the plant with these
-forces and levels is stepped exactly, switches included (`stepping`): second order in the step.
+forces and levels is stepped exactly, switches included (`karnopp_step`): second order in the step.
 States evolve half before it and half after, both times under what holds at the middle. With a
 bristle in place of sticking, mass, bristle and actuator are stepped by the trapezoidal rule, the
-bristle's own law by an exponential (`bristle`).
+bristle's own law by an exponential (`bristle_step`).
 """
 
 import math
@@ -12,9 +12,9 @@ import math
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.bristle import bristle_step
 from identification.compiled import call_evolve, call_value, compiled, compiled_inline
-from identification.effect_table import (
+from identification.simulation.bristle_step import bristle_step
+from identification.simulation.effect_table import (
     ACTUATOR,
     COMMAND,
     EVOLVE,
@@ -26,7 +26,7 @@ from identification.effect_table import (
     STICTION,
     VALUE,
 )
-from identification.stepping import (
+from identification.simulation.karnopp_step import (
     DV_N,
     DV_P,
     F_CN,
@@ -53,7 +53,7 @@ AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to 
 STATES = 1 << 9  # beside the bits of the codes
 ROUNDED = 1.0 + 1e-9  # of a sub-step, that the last one may be too long
 MOST_PIECES = 100  # of a sample, after which its switches are no longer told from each other
-SURE = 1e-3  # of a sub-step, after which its acceleration is sure
+SURE_AFTER = 1e-3  # of a sub-step, after which its acceleration is sure
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]
 
@@ -338,7 +338,7 @@ def effect_step(
         left -= dt
         if mode == STUCK and bristle < 0:
             a = 0.0
-        elif dt > SURE * longest:
+        elif dt > SURE_AFTER * longest:
             a = (v - before) / dt
         if not acts & STATES:
             continue

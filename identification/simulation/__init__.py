@@ -1,0 +1,1 @@
+"""Compiled runs of a plant, with effects or without: exact steps, along a log."""
