@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter, lfiltic
 
 from identification.arrays import Array, frozen
-from identification.arx_factor import SMALLEST_ANGLE, ArxAccumulator, Factor, Order
+from identification.arx.qr_factor import SMALLEST_ANGLE, ArxAccumulator, Factor, Order
 from identification.errors import BadLog, BadModel, NotIdentifiable
 
 Run = tuple[Array, Array]
@@ -76,7 +76,7 @@ def fit_arx(logs: Runs, na: int, nb: int, nk: int, h: float, *, offset: bool = F
     for exact in (False, True):
         factor = factor_of(runs, Order(na, nb, nk), exact=exact)
         try:
-            model = model_of(factor, factor.order, h, offset=offset)
+            model = arx_of_factor(factor, factor.order, h, offset=offset)
         except NotIdentifiable:
             if exact:
                 raise
@@ -96,7 +96,7 @@ def factor_of(runs: Sequence[Run], order: Order, *, exact: bool = True) -> Facto
     return accumulator.factor()
 
 
-def model_of(factor: Factor, order: Order, h: float, *, offset: bool = False) -> ArxModel:
+def arx_of_factor(factor: Factor, order: Order, h: float, *, offset: bool = False) -> ArxModel:
     """The model of `order` from a factor of it or of a larger one (on the larger one's samples).
 
     Raises BadLog where the samples are too few, NotIdentifiable where a regressor is zero or a

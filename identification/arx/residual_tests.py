@@ -20,7 +20,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array, IntArray, frozen
-from identification.arx import ArxModel, Runs, as_runs, one_step_errors
+from identification.arx.model import ArxModel, Runs, as_runs, one_step_errors
 from identification.errors import BadLog, BadModel
 
 WHITE = float(norm.ppf(0.995))
@@ -28,7 +28,7 @@ SMALLEST_VARIANCE = 0.05
 
 
 @dataclass(frozen=True)
-class Correlation:
+class LagCorrelation:
     """Correlations at some lags, each with the half-width of its band.
 
     lags, rho, band: shape (m,). p_value: of the chi-square over the tested lags. independent:
@@ -56,8 +56,8 @@ class ResidualTests:
     bands and verdicts.
     """
 
-    whiteness: Correlation
-    cross: Correlation | None
+    whiteness: LagCorrelation
+    cross: LagCorrelation | None
     level: float
     lag_step: int
     samples: int
@@ -201,13 +201,13 @@ def _fitted_away(model: ArxModel, max_lag: int) -> Array:
     return np.asarray(model.rows * (H @ covariance @ H.T), dtype=np.float64)
 
 
-def _whiteness(rho: Array, samples: int, step: int, z: float, taken: Array) -> Correlation:
+def _whiteness(rho: Array, samples: int, step: int, z: float, taken: Array) -> LagCorrelation:
     lags = step * np.arange(1, len(taken) + 1)
     independent = samples / (1.0 + 2.0 * float(np.sum(rho[1:step] ** 2)))
     shrink = np.sqrt((samples - lags) / (samples + 2.0))
     covariance = np.eye(len(taken)) - taken
     variance = np.maximum(np.diagonal(covariance), 0.0)
-    return Correlation(
+    return LagCorrelation(
         lags=lags.astype(np.int64),
         rho=frozen(rho[lags]),
         band=frozen(z * shrink * np.sqrt(variance / independent)),
@@ -232,7 +232,7 @@ def _cross(
     max_lag: int,
     z: float,
     known: int,
-) -> Correlation:
+) -> LagCorrelation:
     far = len(rho_e) - 1
     energy = sum(float(x @ x) for x in e) * sum(float(x @ x) for x in u)
     centre = slice(far - max_lag, far + max_lag + 1)
@@ -249,7 +249,7 @@ def _cross(
     lags = np.arange(-max_lag, max_lag + 1)
     shrink = (samples - np.abs(lags)) / samples
     causal = np.sqrt(samples) * rho[max_lag:]
-    return Correlation(
+    return LagCorrelation(
         lags=lags.astype(np.int64),
         rho=frozen(rho),
         band=frozen(z * np.sqrt(spread[0] * shrink / samples)),

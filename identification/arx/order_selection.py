@@ -18,28 +18,28 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array
-from identification.arx import (
+from identification.arx.model import (
     ArxModel,
     Run,
     Runs,
+    arx_of_factor,
     as_runs,
     factor_of,
-    model_of,
     one_step_errors,
     simulation_errors,
 )
-from identification.arx_factor import Factor, Order
+from identification.arx.qr_factor import Factor, Order
+from identification.arx.residual_tests import effective_samples
 from identification.errors import BadLog, BadModel, NotIdentifiable
-from identification.residual_tests import effective_samples
 
 Criterion = Literal["one-step", "simulation"]
 SIGMAS = 4.0
 # Errors below this part of y are rounding, not differences between models.
-ROUNDING = 1e-12
+ROUNDING_SHARE = 1e-12
 
 
 @dataclass(frozen=True)
-class Candidate:
+class ArxCandidate:
     """One model tried, its errors on the validation runs in units of y; NaN: not simulated."""
 
     model: ArxModel
@@ -65,7 +65,7 @@ class ArxChoice:
     one_step_rms: float
     simulation_rms: float
     criterion: Criterion
-    best_of_size: tuple[Candidate, ...]
+    best_of_size: tuple[ArxCandidate, ...]
     tried: int
     tolerance: float
     samples: int
@@ -109,14 +109,14 @@ def select_arx(
     best = min(found, key=lambda candidate: candidate.one_step_rms)
     errors = [one_step_errors(best.model, u, y) for u, y in held]
     independent = effective_samples(errors)
-    floor = (ROUNDING * float(np.linalg.norm(test.R[:, -1]))) ** 2 / test.rows
+    floor = (ROUNDING_SHARE * float(np.linalg.norm(test.R[:, -1]))) ** 2 / test.rows
     shortlist = _best_of_size(found, held)
     if criterion == "simulation":
         best = min(shortlist, key=lambda candidate: candidate.simulation_rms)
         independent = effective_samples([simulation_errors(best.model, u, y) for u, y in held])
     tolerance = SIGMAS**2 / independent
 
-    def error(candidate: Candidate) -> float:
+    def error(candidate: ArxCandidate) -> float:
         by_simulation = criterion == "simulation"
         return (candidate.simulation_rms if by_simulation else candidate.one_step_rms) ** 2
 
@@ -158,17 +158,17 @@ def _orders(largest: Order, max_nb: int) -> Iterator[Order]:
 
 def _candidates(
     fit: Factor, test: Factor, largest: Order, max_nb: int, h: float, offset: bool
-) -> Iterator[Candidate]:
+) -> Iterator[ArxCandidate]:
     refusal: NotIdentifiable | None = None
     count = 0
     for order in _orders(largest, max_nb):
         try:
-            model = model_of(fit, order, h, offset=offset)
+            model = arx_of_factor(fit, order, h, offset=offset)
         except NotIdentifiable as error:
             refusal = error
             continue
         count += 1
-        yield Candidate(model, _one_step_rms(test, order, model), float("nan"))
+        yield ArxCandidate(model, _one_step_rms(test, order, model), float("nan"))
     if not count:
         raise refusal or BadModel("no order to choose from; let max_na or max_nb be above 0")
 
@@ -181,12 +181,12 @@ def _one_step_rms(test: Factor, order: Order, model: ArxModel) -> float:
     return float(np.linalg.norm(errors) / np.sqrt(test.rows))
 
 
-def _best_of_size(found: Sequence[Candidate], held: Sequence[Run]) -> list[Candidate]:
+def _best_of_size(found: Sequence[ArxCandidate], held: Sequence[Run]) -> list[ArxCandidate]:
     out = []
     for size in sorted({candidate.size for candidate in found}):
         same = [candidate for candidate in found if candidate.size == size]
         best = min(same, key=lambda candidate: candidate.one_step_rms)
-        out.append(Candidate(best.model, best.one_step_rms, _simulation_rms(best.model, held)))
+        out.append(ArxCandidate(best.model, best.one_step_rms, _simulation_rms(best.model, held)))
     return out
 
 

@@ -5,15 +5,15 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.arx import fit_arx
-from identification.errors import BadLog, BadModel
-from identification.residual_tests import (
+from identification.arx.model import fit_arx
+from identification.arx.residual_tests import (
     ResidualTests,
     effective_samples,
     error_tests,
     plant_step,
     residual_tests,
 )
+from identification.errors import BadLog, BadModel
 
 RST_A = [1.0, -2.142, 1.688, -0.5459]
 RST_B = [0.0, 0.0, 0.0, 0.0001782, 0.0001322]

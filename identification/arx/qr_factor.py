@@ -18,11 +18,11 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.arx_kernels import ONES, U, Y, add_lagged_products, add_to_pair
+from identification.arx.lagged_products import ONES, U, Y, add_lagged_products, add_to_pair
 from identification.errors import BadLog, BadModel
 
 DIGITS = 40
-PIECE = 1 << 18
+PIECE_OF_RUN = 1 << 18
 CONVERTED = 1 << 19
 WORKERS = 4
 # Sine of the angle to the columns before it under which a column says nothing of its own.
@@ -135,13 +135,13 @@ class _Run:
         """Add to `high + low` what the samples after the first `lag` give, in threads."""
 
         def part(start: int) -> tuple[Array, Array]:
-            own = slice(start - self.lag, start + PIECE)
+            own = slice(start - self.lag, start + PIECE_OF_RUN)
             sums = np.zeros_like(high), np.zeros_like(low)
             views = _read_only(y[own]), _read_only(u[own])
             add_lagged_products(*views, self.lag, self.factors, self.wanted, self.exact, *sums)
             return sums
 
-        starts = range(self.lag, len(y), PIECE)
+        starts = range(self.lag, len(y), PIECE_OF_RUN)
         with ThreadPoolExecutor(max(min(len(starts), WORKERS), 1)) as pool:
             for more in (pool.map if len(starts) > 1 else map)(part, starts):
                 for row, k in np.ndindex(high.shape):

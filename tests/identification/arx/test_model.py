@@ -13,18 +13,18 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.arx import (
+from identification.arx.model import (
     ArxModel,
+    arx_of_factor,
     factor_of,
     fit_arx,
-    model_of,
     one_step_errors,
     predict_one_step,
     simulate_arx,
     simulation_errors,
 )
-from identification.arx_factor import ArxAccumulator, Order
-from identification.arx_select import select_arx
+from identification.arx.order_selection import select_arx
+from identification.arx.qr_factor import ArxAccumulator, Order
 from identification.errors import BadLog, BadModel, NotIdentifiable, UserError
 
 # The paper's RST model.
@@ -181,9 +181,9 @@ def test_plain_products_are_trusted_only_where_harmless(
     log = respond(RST_A, RST_B, 9000, 1e-4 * 10.0**noise, seed)
     order = Order(2 + more_na, 1 + more_nb, 2)
     plain = factor_of([log], order, exact=False)
-    exact = model_of(factor_of([log], order), order, H)
+    exact = arx_of_factor(factor_of([log], order), order, H)
     if plain.trusted(exact.condition, exact.residual_rms):
-        found = model_of(plain, order, H)
+        found = arx_of_factor(plain, order, H)
         assert found.noise_variance == pytest.approx(exact.noise_variance, rel=1e-4)
         scale = np.linalg.norm(regressors(*log, order, False)[0], axis=0)
         difference = np.linalg.norm((theta(found) - theta(exact)) * scale)
@@ -258,7 +258,9 @@ def test_any_order_is_the_same_regression_as_lstsq(na: int, nb: int, nk: int, ex
     order = Order(na, nb, nk)
     for offset in (False, True):
         X, target = regressors(u, y + 0.3, order, offset)
-        model = model_of(factor_of([(u, y + 0.3)], order, exact=exact), order, H, offset=offset)
+        model = arx_of_factor(
+            factor_of([(u, y + 0.3)], order, exact=exact), order, H, offset=offset
+        )
         np.testing.assert_allclose(theta(model), np.linalg.lstsq(X, target)[0], atol=1e-11)
         assert len(model.B) == (nk + nb if nb else 1)
 

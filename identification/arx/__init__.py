@@ -1,0 +1,1 @@
+"""ARX models: estimate, prediction, order and delay, tests of what they leave."""
