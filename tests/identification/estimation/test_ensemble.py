@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.ensemble import ensemble
+from identification.estimation.ensemble import ensemble
 
 SPREAD = np.array([1.0, 0.1, 5.0])
 

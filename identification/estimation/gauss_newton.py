@@ -9,11 +9,11 @@ import numpy as np
 from identification.arrays import Array, IntArray
 
 FOLLOWED = 2.0  # mean square up to which hardly more than noise is left
-STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
+WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
 # Near it: what tells the scale common to masses and forces is a small difference of large columns.
 FINE_STEP = 1e-7
-TRIES = 6  # of the damping in one step
-ENOUGH = 1e-5  # share of the cost below which a step is the last
+DAMPING_TRIES = 6  # of the damping in one step
+LAST_STEP = 1e-5  # share of the cost below which a step is the last
 LITTLE = 1e-3  # the same, where more than noise is left
 
 
@@ -53,7 +53,7 @@ class Minimum:
 
 
 def gauss_newton(
-    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = STEP,
+    fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = WIDE_STEP,
     reach: Array | float = np.inf, little: float = 0.0,
 ) -> Minimum:  # fmt: skip
     """Minimum of the square sum of `fun` near x, within this reach of it (k,).
@@ -70,7 +70,7 @@ def gauss_newton(
         if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
             break  # beyond what can be computed with: no direction is known
         size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
-        for _ in range(TRIES):
+        for _ in range(DAMPING_TRIES):
             step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
             step = np.clip(x + step, low, high) - x
             after = fun(x + step)
@@ -82,14 +82,14 @@ def gauss_newton(
             break
         x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
         # What is left of much more than noise need not be known to its last digits.
-        ends = ENOUGH if cost < FOLLOWED * len(r) else LITTLE
+        ends = LAST_STEP if cost < FOLLOWED * len(r) else LITTLE
         if gained < max(ends, little) * cost:
             break
     return Minimum(fun, x, cost / len(r))
 
 
 def jacobian(
-    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = STEP
+    fun: Callable[[Array], Array], x: Array, r: Array | None = None, step: float = WIDE_STEP
 ) -> Array:
     """Derivatives of `fun` (n, k), two at a time: from its value r here, or central differences."""
 

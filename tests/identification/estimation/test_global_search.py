@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.search import evolve
+from identification.estimation.global_search import evolve
 
 
 def rugged(z: Array) -> Array:
