@@ -6,12 +6,12 @@ from design.effect_loop import simulate_effect_loop
 from design.loop import ForcePI, LoopNoise
 from design.pid import pid_to_rst
 from identification.arrays import Array
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log, Rig
-from identification.plant import Actuator, Plant
-from identification.trace import trace
-from identification.trace_result import Trace
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
 
 H = 2e-3
 SIZE = {"k": 20.0, "n": 2.0}  # of nonlinear viscous friction

@@ -5,10 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.choice import first_stage
 from identification.errors import UserError
-from identification.evidence import moving
+from identification.estimation.regression.equation_rows import motion_log
 from identification.log import Log
+from identification.tracing.regression.stepwise import first_stage
 
 BELOW = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
@@ -31,14 +31,14 @@ def constant_force(logs: Sequence[Log], *, held: bool) -> float | None:
     """
     try:
         stage, _ = first_stage(
-            [moving(log, held=held, by_command=False) for log in logs], by_command=False
+            [motion_log(log, held=held, by_command=False) for log in logs], by_command=False
         )
     except (UserError, np.linalg.LinAlgError):
         return None
     return beyond_friction(stage.theta)
 
 
-def remark(force: float, unit: str) -> str:
+def constant_remark(force: float, unit: str) -> str:
     """What a user can do about it."""
     return (
         f"a constant force of about {force:.3g} {unit} acts beside the applied one and is larger"

@@ -6,10 +6,10 @@ from typing import Literal
 
 from identification.arrays import Array
 from identification.effects._base import Effect
-from identification.plant import Plant
-from identification.result import Estimate
+from identification.model.estimates import Estimate
+from identification.model.plant import Plant
 
-Verdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
+TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
-class Rival:
+class EffectRival:
     """An effect that was not taken: its error on stretches left out, and why not."""
 
     key: str
@@ -95,7 +95,7 @@ class Trace:
     each.
     """
 
-    verdict: Verdict
+    verdict: TraceVerdict
     before: Mapping[str, Errors]
     after: Mapping[str, Errors]
     noise_y: float
@@ -103,7 +103,7 @@ class Trace:
     noise_force: float
     noise_actuator: float | None
     effects: tuple[FoundEffect, ...]
-    rivals: tuple[Rival, ...]
+    rivals: tuple[EffectRival, ...]
     unknown: Dependence
     drift: tuple[Change, ...]
     next_experiment: str

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from identification import trace
 from identification.arrays import Array
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log, Rig
-from identification.plant import Actuator, Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import free_run
+from identification.tracing import trace
 
 NINE = Karnopp(3.5, 16.97, 18.13, 289.0, 287.4, 0.009, -0.01, 20.76, -21.8)
 H = 2e-3

@@ -5,33 +5,33 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.before_after import seen_by
-from identification.choice import Step
-from identification.evidence import (
+from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     FIVE,
     MECHANICAL,
-    Moving,
+    MotionLog,
     Rows,
     column_noise,
     stacked,
 )
-from identification.left_over import FEWEST_ROWS
 from identification.log import Rig
-from identification.outcome import Outcome
-from identification.plant import units_of
-from identification.stage import Stage
-from identification.structure import OVERLAP, Model, band
-from identification.trace_result import Change
+from identification.model.plant import units_of
+from identification.tracing.free_run.fitted_structure import OVERLAP, FittedStructure, band
+from identification.tracing.model_errors import seen_by
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit
+from identification.tracing.regression.stepwise import Step
+from identification.tracing.remaining_structure import FEWEST_ROWS
+from identification.tracing.result import Change
 
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed has to gain
 DRIFT_SHARE = 0.1  # of the test logs' square error that it has to take away
-SHOWN = 0.3  # share of a column's square that is motion and not noise, at least
+MOTION_SHARE = 0.3  # share of a column's square that is motion and not noise, at least
 DRIFT_LEAST = 0.01  # of its value, that it changes at least
 
 
-def drift(
-    after: Model, steps: Sequence[Step], seen: Sequence[Moving], rig: Rig
+def parameter_drift(
+    after: FittedStructure, steps: Sequence[Step], seen: Sequence[MotionLog], rig: Rig
 ) -> tuple[Change, ...]:
     """Parameters that differ between training and test logs, fewest that bring the error down."""
     stage = seen_by(after.stage, steps, seen)
@@ -53,7 +53,7 @@ def drift(
     return tuple(out)
 
 
-def _blur(stage: Stage, equation: str, rows: Rows, keep: BoolArray) -> Array:
+def _blur(stage: EffectRows, equation: str, rows: Rows, keep: BoolArray) -> Array:
     """Square sum (k,) that the position's noise makes of each whitened column.
 
     The plain columns come first; those of effects are taken as they are.
@@ -64,7 +64,7 @@ def _blur(stage: Stage, equation: str, rows: Rows, keep: BoolArray) -> Array:
 
 
 def changes(
-    mine: Outcome, rows: Rows, keep: BoolArray, names: Sequence[str], blur: Array
+    mine: RowFit, rows: Rows, keep: BoolArray, names: Sequence[str], blur: Array
 ) -> list[tuple[str, float, float, float]]:
     """Name, value before and after, and deviation of the parameters that have changed.
 
@@ -86,7 +86,7 @@ def changes(
     while len(free) < len(names):
         options = []
         for i in range(len(names)):
-            if i in free or gram[i, i] < SHOWN * (A[:, i] @ A[:, i]):
+            if i in free or gram[i, i] < MOTION_SHARE * (A[:, i] @ A[:, i]):
                 continue
             at = [*free, i]
             step = np.linalg.lstsq(gram[np.ix_(at, at)], slope[at], rcond=1e-8)[0]

@@ -1,4 +1,4 @@
-"""Trace of a body that a rig leads along a path: every stroke counts, however slow it is."""
+"""Trace of imposed motion: every stroke counts, however slow it is."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -8,19 +8,19 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.choice import first_stage
+from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
-from identification.evidence import MECHANICAL, Moving, moving
-from identification.held_out import left_out_error
-from identification.led import is_led
-from identification.library import built_in
+from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog, motion_log
 from identification.log import Log, Rig
-from identification.outcome import base_outcomes
-from identification.stage import Stage
-from identification.structure import led
-from identification.trace import trace
-from identification.trace_result import Trace
-from tests.identification.test_trace import PLAIN, made
+from identification.tracing.free_run.fitted_structure import inertia_is_lost
+from identification.tracing.imposed_motion import inertia_has_no_part
+from identification.tracing.regression.cross_validation import left_out_error
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import base_fits
+from identification.tracing.regression.stepwise import first_stage
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
+from tests.identification.tracing.test_trace import PLAIN, made
 
 H = 0.01
 RIG = Rig("force")
@@ -106,53 +106,54 @@ def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
 def test_runs_of_one_file_are_left_out_together() -> None:
     def error(*names: str) -> float:
         logs = [strokes(bar, [9e-3] * 3, bar) for bar in (1, 5, 5)]
-        parts: list[Moving] = [
-            moving(Log(name, log.signals), held=False, by_command=False, led=True)
+        parts: list[MotionLog] = [
+            motion_log(Log(name, log.signals), held=False, by_command=False, imposed=True)
             for name, log in zip(names, logs, strict=True)
         ]
         zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
-        return left_out_error(Stage(tuple(parts), *zeros, by_command=False), 0.0)
+        return left_out_error(EffectRows(tuple(parts), *zeros, by_command=False), 0.0)
 
     # Two runs at 5 bar tell of each other, unless they are one file's.
     assert error("a", "b", "b") > 1.3 * error("a", "b", "c")
     assert error("a", "a", "a") == pytest.approx(error("a", "b", "c"))
 
 
-@pytest.mark.parametrize("led", [True, False])
-def test_no_stroke_of_a_led_body_is_taken_for_rest(led: bool) -> None:
+@pytest.mark.parametrize("imposed", [True, False])
+def test_no_imposed_stroke_is_taken_for_rest(imposed: bool) -> None:
     # The slower half of the strokes has another friction than the faster, as a band would have.
     logs = [strokes(bar, [speed] * 4, bar) for bar, speed in ((1, 13e-3), (5, 9e-3))]
-    parts = [moving(log, held=False, by_command=False, led=led) for log in logs]
+    parts = [motion_log(log, held=False, by_command=False, imposed=imposed) for log in logs]
     zeros = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.zeros(3)
-    o = base_outcomes(Stage(tuple(parts), *zeros, by_command=False))[MECHANICAL]
-    assert bool(np.all(o.rows.speed >= o.slowest)) is led
+    o = base_fits(EffectRows(tuple(parts), *zeros, by_command=False))[MECHANICAL]
+    assert bool(np.all(o.rows.speed >= o.slowest)) is imposed
 
 
 @pytest.mark.parametrize("free", [True, False])
 def test_inertia_that_an_effect_hides_is_no_rig_s_motion(free: bool) -> None:
     effects = {"position_dependent_friction": {"c1": 150.0, "period": 0.1}}
     log = made(21, effects) if free else strokes(1, [9e-3] * 3, 1)
-    logs = [moving(log, held=False, by_command=False)]
+    logs = [motion_log(log, held=False, by_command=False)]
     _, first = first_stage(logs, False)
-    assert led(first[MECHANICAL])
-    assert is_led(logs) is not free
+    assert inertia_is_lost(first[MECHANICAL])
+    assert inertia_has_no_part(logs) is not free
 
 
 def test_inertia_that_a_lag_of_viscous_friction_cancels_is_no_rig_s_motion() -> None:
     damped = replace(PLAIN, F_vp=200.0, F_vn=200.0)
     effects = {"frictional_lag": {"tau": damped.m / damped.F_vp}}
-    logs = [moving(made(21, effects, damped), held=False, by_command=False)]
+    logs = [motion_log(made(21, effects, damped), held=False, by_command=False)]
     _, first = first_stage(logs, False)
-    assert led(first[MECHANICAL])
-    assert not is_led(logs)
+    assert inertia_is_lost(first[MECHANICAL])
+    assert not inertia_has_no_part(logs)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_noise_is_no_inertia(seed: int) -> None:
     logs = [strokes(bar, [9e-3] * 3, seed) for bar in (1, 5)]
-    assert is_led([moving(log, held=False, by_command=False) for log in logs])
+    assert inertia_has_no_part([motion_log(log, held=False, by_command=False) for log in logs])
     short = Log("short", {k: x[:200] for k, x in logs[0].signals.items()})
-    assert is_led([moving(short, held=False, by_command=False)])  # too little to tell
+    # Too little to tell
+    assert inertia_has_no_part([motion_log(short, held=False, by_command=False)])
 
 
 def bursts(rate: float, seed: int) -> Log:
@@ -167,7 +168,9 @@ def bursts(rate: float, seed: int) -> Log:
 @pytest.mark.parametrize("rate", [2.0, 4.0, 6.0])
 def test_rest_between_strokes_is_not_smoothed_away(rate: float) -> None:
     log = bursts(rate, 1)
-    free, imposed = (moving(log, held=False, by_command=False, led=led) for led in (False, True))
+    free, imposed = (
+        motion_log(log, held=False, by_command=False, imposed=imposed) for imposed in (False, True)
+    )
     assert len(imposed.sliding.start) == len(free.sliding.start)
     assert imposed.signals["v"] == pytest.approx(free.signals["v"])
 

@@ -4,29 +4,29 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identification.alike import alike
 from identification.arrays import Array
-from identification.candidates import Candidate
-from identification.choice import Choice, Step, explained_part
 from identification.effects._base import Param
-from identification.evidence import ACTUATOR, MECHANICAL, Moving
-from identification.held_out import left_out
-from identification.karnopp import NAMES
-from identification.left_over import signals_at
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.windowed_run.windows import position_errors
 from identification.log import Rig
-from identification.outcome import Outcome, rms
-from identification.plant import Actuator, units_of
-from identification.result import Drive, Estimate
-from identification.stage import Stage
-from identification.starts import position_errors
-from identification.structure import Model, untold
-from identification.trace_result import (
+from identification.model.estimates import Drive, Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, units_of
+from identification.tracing.free_run.fitted_structure import FittedStructure, untold
+from identification.tracing.free_run.rivals import equal_rivals
+from identification.tracing.regression.candidates import EffectCandidate
+from identification.tracing.regression.cross_validation import left_out_residual
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, rms
+from identification.tracing.regression.stepwise import Choice, Step, explained_part
+from identification.tracing.remaining_structure import signals_at
+from identification.tracing.result import (
     Change,
     Dependence,
+    EffectRival,
     FoundEffect,
     Residual,
-    Rival,
-    Verdict,
+    TraceVerdict,
 )
 
 RUNS = {
@@ -48,21 +48,21 @@ SAID = {
     "rest": "the time at rest (rest)",
 }
 POSITION = "position"  # the residual of the free run
-SHOWN = 6  # rivals of each effect
+RIVALS_SHOWN = 6  # rivals of each effect
 
 
-def verdict_of(choice: Choice, left: Dependence, drift: Sequence[Change]) -> Verdict:
+def verdict_of(choice: Choice, left: Dependence, drift: Sequence[Change]) -> TraceVerdict:
     """The verdict in one word: what is left comes first, then rivals, effects and drift."""
     if left.depends_on:
         return "unknown"
-    if any(alike(step) for step in choice.steps):
+    if any(equal_rivals(step) for step in choice.steps):
         return "inseparable"
     if choice.steps:
         return "effect"
     return "drift" if drift else "none"
 
 
-def found_effect(step: Step, after: Model, choice: Choice) -> FoundEffect:
+def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEffect:
     """An effect taken, with its sizes in the refined plant and the share it explains."""
     effect = step.candidate.effect
     acting = next(a for a in after.plant.effects if a.key == effect.key)
@@ -88,12 +88,12 @@ def _estimate(value: float, unit: str, sd: float | None) -> Estimate:
     return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
 
 
-def rivals_of(choice: Choice) -> tuple[Rival, ...]:
+def rivals_of(choice: Choice) -> tuple[EffectRival, ...]:
     """Rivals of each effect in the order of what they gain."""
     out = []
     for step in choice.steps:
-        equal = {c.effect.key for c in alike(step)}
-        for c in step.rivals[:SHOWN]:
+        equal = {c.effect.key for c in equal_rivals(step)}
+        for c in step.rivals[:RIVALS_SHOWN]:
             key = c.effect.key
             share = c.gain / step.candidate.gain if step.candidate.gain > 0 else 0.0
             why = (
@@ -103,24 +103,24 @@ def rivals_of(choice: Choice) -> tuple[Rival, ...]:
                 if key in step.apart
                 else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
             )
-            out.append(Rival(key, _left_out_rms(step, c), why))
+            out.append(EffectRival(key, _left_out_rms(step, c), why))
     return tuple(out)
 
 
-def _left_out_rms(step: Step, rival: Candidate) -> float | None:
+def _left_out_rms(step: Step, rival: EffectCandidate) -> float | None:
     """Force error of a rival [N] on stretches left out, over the rows that count for the best."""
     if MECHANICAL not in rival.outcomes:
         return None
     o = rival.outcomes[MECHANICAL]
-    return rms(left_out(o.rows, step.candidate.outcomes.get(MECHANICAL, o).slowest)[0])
+    return rms(left_out_residual(o.rows, step.candidate.outcomes.get(MECHANICAL, o).slowest)[0])
 
 
-def next_experiment(verdict: Verdict, choice: Choice, left: Dependence) -> str:
+def next_experiment(verdict: TraceVerdict, choice: Choice, left: Dependence) -> str:
     """The run that would tell rivals apart, or on what the rest depends."""
     if verdict == "inseparable":
-        step = next(s for s in choice.steps if alike(s))
+        step = next(s for s in choice.steps if equal_rivals(s))
         mine = step.candidate.effect
-        other = alike(step)[0].effect
+        other = equal_rivals(step)[0].effect
         apart = [s for s in (*mine.depends_on, *other.depends_on)
                  if (s in mine.depends_on) != (s in other.depends_on)]  # fmt: skip
         how = RUNS.get(apart[0] if apart else mine.depends_on[0], "a run with richer motion")
@@ -140,7 +140,7 @@ def listed(signals: Sequence[str]) -> str:
     return ", ".join(SAID.get(name, name) for name in signals)
 
 
-def parameters_of(model: Model, rig: Rig) -> dict[str, Estimate]:
+def parameters_of(model: FittedStructure, rig: Rig) -> dict[str, Estimate]:
     """The nine and the actuator of a model."""
     values = dict(zip(NAMES, model.plant.friction.array.tolist(), strict=True))
     if isinstance(model.plant.actuator, Actuator):
@@ -150,7 +150,7 @@ def parameters_of(model: Model, rig: Rig) -> dict[str, Estimate]:
 
 
 def residuals_of(
-    start: Stage, first: Mapping[str, Outcome], end: Stage, base: Mapping[str, Outcome]
+    start: EffectRows, first: Mapping[str, RowFit], end: EffectRows, base: Mapping[str, RowFit]
 ) -> tuple[Residual, ...]:
     """Rows for the pictures."""
     out = []
@@ -182,13 +182,13 @@ def residuals_of(
 
 
 def run_residual(
-    before: Model, after: Model, logs: Sequence[Moving], drive: Drive
+    before: FittedStructure, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
 ) -> Residual | None:
     """Error of the shown position in the free run, sample by sample, for the pictures.
 
     None where a model's inertia is of no account, or its run cannot be followed.
     """
-    if before.led or after.led:
+    if before.imposed or after.imposed:
         return None
     found: list[list[Array]] = []
     for model in (before,) if after is before else (before, after):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.constant import beyond_friction, constant_force, remark
+from identification.tracing.constant_force import beyond_friction, constant_force, constant_remark
 from tests.identification.motor_logs import NINE, made
 
 
@@ -13,7 +13,7 @@ def test_a_weight_larger_than_friction_is_found(force: float) -> None:
     pulled = log.with_signals(F=log["F"] - force)  # the force that the weight spares
     found = constant_force([pulled], held=True)
     assert found == pytest.approx(force, abs=0.5 * abs(NINE.F_cp - NINE.F_cn) + 0.5)
-    assert f"{force:.3g} N" in remark(force, "N")
+    assert f"{force:.3g} N" in constant_remark(force, "N")
 
 
 def test_what_unequal_levels_can_hold_is_not_spoken_of() -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array, IntArray
-from identification.dependence import SEPARATE, dependence
+from identification.tracing.dependence import SEPARATE, dependence
 
 
 def signals(n: int, rng: np.random.Generator) -> dict[str, Array]:

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.effects._library import Library, built_in
 from identification.errors import NotIdentifiable
-from identification.karnopp import Karnopp
-from identification.library import Library, built_in
 from identification.log import Log, Rig
-from identification.plant import Actuator, Plant
-from identification.simulate import free_run
-from identification.trace import trace
-from identification.trace_result import Trace
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import free_run
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
 
 H = 2e-3
 RIG = Rig("force")

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from identification.choice import first_stage
-from identification.drift import changes
-from identification.evidence import FIVE, MECHANICAL, Rows
-from identification.outcome import Outcome
+from identification.estimation.regression.equation_rows import FIVE, MECHANICAL, Rows
+from identification.tracing.parameter_drift import changes
+from identification.tracing.regression.row_fit import RowFit
+from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import made, seen
 
 
-def trained() -> tuple[Outcome, Rows]:
+def trained() -> tuple[RowFit, Rows]:
     """What a motor's log leaves, and the rows of another log of it."""
     _, first = first_stage([seen(made(3))], by_command=False)
     stage, _ = first_stage([seen(made(4))], by_command=False)
@@ -17,7 +17,7 @@ def trained() -> tuple[Outcome, Rows]:
     return first[MECHANICAL], rows
 
 
-def found(mine: Outcome, rows: Rows, more: float) -> list[tuple[str, float, float, float]]:
+def found(mine: RowFit, rows: Rows, more: float) -> list[tuple[str, float, float, float]]:
     """The changes, where the friction towards + is higher by so much [N]."""
     keep = rows.speed >= mine.slowest
     shifted = Rows(**{**vars(rows), "b": rows.b + more * (rows.X[:, 1] != 0)})

@@ -4,16 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.evidence import Moving, mechanical
+from identification.estimation.regression.equation_rows import MotionLog, mechanical
 
-SHOWN = 0.15  # of the force's quick changes, that inertia explains of a body that is free
-TOLD = 0.6  # of them, that inertia and damping explain of one that follows the force (led: 0.3)
+# Of the force's quick changes, that inertia explains of a body that is free
+SHOWN_BY_INERTIA = 0.15
+# Of them, that inertia and damping explain of one that follows the force (imposed: 0.3)
+TOLD_BY_FORCE = 0.6
 NEXT = 2.0  # times their length, that neighbouring windows begin apart at most
-LUCK = 25.0  # times what chance explains of noise
-FEWEST = 30  # pairs of neighbouring windows, without which nothing tells that a rig leads it
+CHANCE_FACTOR = 25.0  # times what chance explains of noise
+LEAST_PAIRS = 30  # pairs of neighbouring windows, without which nothing tells that a rig leads it
 
 
-def is_led(logs: Sequence[Moving]) -> bool:
+def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
     """Whether inertia has no part in how the force changes from one window to the next.
 
     Most of what a model lacks changes slowly (with place, pressure, time), and constant friction
@@ -33,7 +35,7 @@ def is_led(logs: Sequence[Moving]) -> bool:
         forces.append(rows.b[after[pairs]] - rows.b[pairs])
         noise += float(np.sum(rows.sd[after[pairs]] ** 2 + rows.sd[pairs] ** 2))
     X, b = np.concatenate(columns), np.concatenate(forces)
-    if len(b) < FEWEST:
+    if len(b) < LEAST_PAIRS:
         return False
     size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), 1e-300)
     theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
@@ -43,7 +45,7 @@ def is_led(logs: Sequence[Moving]) -> bool:
     def tells(square: float, part: float) -> bool:
         """Whether more than luck, and this part of what is no noise, is explained of a square."""
         gained = square - left
-        return gained > LUCK * noise / len(b) and gained > part * (square - noise)
+        return gained > CHANCE_FACTOR * noise / len(b) and gained > part * (square - noise)
 
-    inertia = theta[0] > 0.0 and tells(float(np.sum(others**2)), SHOWN)
-    return not (inertia or tells(float(np.sum(b**2)), TOLD))
+    inertia = theta[0] > 0.0 and tells(float(np.sum(others**2)), SHOWN_BY_INERTIA)
+    return not (inertia or tells(float(np.sum(b**2)), TOLD_BY_FORCE))

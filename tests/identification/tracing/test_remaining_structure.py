@@ -7,23 +7,23 @@ import pytest
 from scipy.signal import butter, lfilter
 
 from identification.arrays import Array
-from identification.choice import Choice, Step, choose, first_stage
-from identification.evidence import BREAKAWAY, MECHANICAL
-from identification.left_over import (
+from identification.effects._library import built_in
+from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
+from identification.log import Rig
+from identification.tracing.free_run.fitted_structure import FittedStructure, fitted_structure
+from identification.tracing.regression.row_fit import RowFit
+from identification.tracing.regression.stepwise import Choice, Step, choose, first_stage
+from identification.tracing.remaining_structure import (
     at_breakaway,
     before_pieces,
     in_run,
-    left_over,
     places,
+    remaining_structure,
     strongest,
     too_much,
     unrepeated,
     unsized,
 )
-from identification.library import built_in
-from identification.log import Rig
-from identification.outcome import Outcome
-from identification.structure import Model, model_of
 from tests.identification.motor_logs import K_A, H, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -31,18 +31,18 @@ SPRING = {"spring": {"k": 40.0}}
 
 
 @pytest.fixture(scope="module")
-def found() -> tuple[Choice, Model]:
+def found() -> tuple[Choice, FittedStructure]:
     """A motor's spring as the equations tell it, and a run that is not followed with it."""
     one = seen(made(4, SPRING))
     start, first = first_stage([one], False)
     library, rng = {"spring": built_in()["spring"]}, np.random.default_rng(0)
-    plain = model_of(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
     choice = choose(start, first, library, rng, lambda _stage, _share: None)
     assert [step.candidate.effect.key for step in choice.steps] == ["spring"]
     return choice, replace(plain, plant=plant(SPRING), misfit=40.0)
 
 
-def leaving(o: Outcome, share: float, noise: float = 1.0) -> Outcome:
+def leaving(o: RowFit, share: float, noise: float = 1.0) -> RowFit:
     """The outcome with this share of its residual [N], in rows of so much noise."""
     rows = replace(o.rows, sd=noise * o.rows.sd)
     return replace(o, rows=rows, fit=replace(o.fit, residual=share / noise * o.fit.residual))
@@ -50,11 +50,11 @@ def leaving(o: Outcome, share: float, noise: float = 1.0) -> Outcome:
 
 @pytest.mark.parametrize(("share", "much"), [(0.7, True), (0.4, False)])
 def test_beside_effects_an_imposed_motion_may_leave_less_than_a_third(
-    found: tuple[Choice, Model], share: float, much: bool
+    found: tuple[Choice, FittedStructure], share: float, much: bool
 ) -> None:
     choice, after = found
-    logs = tuple(replace(one, led=True) for one in after.stage.logs)
-    hidden = replace(after, led=True, misfit=np.inf)  # by what is missing: its body is free
+    logs = tuple(replace(one, imposed=True) for one in after.stage.logs)
+    hidden = replace(after, imposed=True, misfit=np.inf)  # by what is missing: its body is free
     imposed = replace(hidden, stage=replace(after.stage, logs=logs))
     for noise in (1.0, 3.0):  # what is left in newtons counts, whatever noise its rows have
         base = {MECHANICAL: leaving(choice.first[MECHANICAL], share, noise)}
@@ -66,18 +66,20 @@ def test_beside_effects_an_imposed_motion_may_leave_less_than_a_third(
 
 
 def test_structure_counts_by_its_share_of_the_force_that_was_missing(
-    found: tuple[Choice, Model],
+    found: tuple[Choice, FittedStructure],
 ) -> None:
     choice, after = found
     spring = choice.first[MECHANICAL]
     for noise in (1.0, 3.0):
         some = replace(choice, base={MECHANICAL: leaving(spring, 0.4, noise)})
-        assert left_over(some, after).depends_on
+        assert remaining_structure(some, after).depends_on
         least = replace(choice, base={MECHANICAL: leaving(spring, 0.05, noise)})
-        assert not left_over(least, after).depends_on
+        assert not remaining_structure(least, after).depends_on
 
 
-def test_an_effect_of_no_certain_size_explains_no_run(found: tuple[Choice, Model]) -> None:
+def test_an_effect_of_no_certain_size_explains_no_run(
+    found: tuple[Choice, FittedStructure],
+) -> None:
     choice, after = found
     base = {MECHANICAL: leaving(choice.first[MECHANICAL], 0.2)}
     rough = replace(choice, base=base)  # more than noise, but little of what was missing
@@ -88,7 +90,9 @@ def test_an_effect_of_no_certain_size_explains_no_run(found: tuple[Choice, Model
         assert not too_much(rough, replace(told, misfit=2.0))
 
 
-def test_three_effects_of_place_are_pieces_of_another(found: tuple[Choice, Model]) -> None:
+def test_three_effects_of_place_are_pieces_of_another(
+    found: tuple[Choice, FittedStructure],
+) -> None:
     choice, _ = found
     (spring,) = choice.steps
 
@@ -108,11 +112,13 @@ def test_three_effects_of_place_are_pieces_of_another(found: tuple[Choice, Model
     assert before_pieces(three).steps == three.steps[:3]
 
 
-def test_a_force_repeats_only_over_what_the_travel_shows(found: tuple[Choice, Model]) -> None:
+def test_a_force_repeats_only_over_what_the_travel_shows(
+    found: tuple[Choice, FittedStructure],
+) -> None:
     _, after = found
     travel = float(np.ptp(after.stage.logs[0].log["y"]))
 
-    def along(key: str, periods: float) -> Model:
+    def along(key: str, periods: float) -> FittedStructure:
         values = {"a": 1.0, "period": travel / periods}
         return replace(after, plant=plant({key: values}))
 
@@ -122,7 +128,7 @@ def test_a_force_repeats_only_over_what_the_travel_shows(found: tuple[Choice, Mo
 
 
 def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
-    found: tuple[Choice, Model],
+    found: tuple[Choice, FittedStructure],
 ) -> None:
     choice, after = found
     assert too_much(choice, replace(after, sd={"spring.k": 1.0}))
@@ -139,7 +145,7 @@ def test_a_run_that_is_not_followed_lacks_more_than_equations_that_leave_noise(
     ],
 )
 def test_the_run_tells_on_what_its_error_depends(
-    found: tuple[Choice, Model], missing: dict[str, dict[str, float]], signals: set[str]
+    found: tuple[Choice, FittedStructure], missing: dict[str, dict[str, float]], signals: set[str]
 ) -> None:
     _, after = found
     one = seen(made(4, missing))
@@ -158,12 +164,12 @@ def shaken(n: int = 10_000) -> Array:
 
 def lacking(
     effects: dict[str, dict[str, float]], *, fast: bool = False, seeds: tuple[int, ...] = (5,)
-) -> tuple[Choice, Model]:
+) -> tuple[Choice, FittedStructure]:
     """A motor with effects that no library has: the plain model's choice, and its run."""
     logs = [seen(made(seed, effects, command=shaken() if fast else None)) for seed in seeds]
     start, first = first_stage(logs, False)
     rng = np.random.default_rng(0)
-    plain = model_of(start, first, (), logs, "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), logs, "command", MOTOR, rng)
     return Choice(start, first, (), start, first), plain
 
 
@@ -180,14 +186,14 @@ def test_equations_tell_on_what_is_left_depends(
     missing: dict[str, dict[str, float]], signals: tuple[str, ...]
 ) -> None:
     choice, after = lacking(missing, fast="input_delay" in missing)
-    named = left_over(choice, after, any_size=True).depends_on
+    named = remaining_structure(choice, after, any_size=True).depends_on
     assert set(signals) <= set(named), named
     assert named[0] == signals[0] or signals == ("reversal",)
 
 
 def test_the_plain_machine_leaves_nothing_of_any_size() -> None:
     choice, after = lacking({})
-    assert left_over(choice, after, any_size=True).depends_on == ()
+    assert remaining_structure(choice, after, any_size=True).depends_on == ()
 
 
 def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() -> None:
@@ -195,7 +201,7 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
     o = choice.base[BREAKAWAY]
     noise = np.random.default_rng(1).standard_normal(len(o.fit.residual))
     wild = replace(o, fit=replace(o.fit, residual=3.0 * noise))
-    found = left_over(replace(choice, base={BREAKAWAY: wild}), after, any_size=True)
+    found = remaining_structure(replace(choice, base={BREAKAWAY: wild}), after, any_size=True)
     assert found.depends_on == ()
 
 

@@ -6,21 +6,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.choice import first_stage
-from identification.differentiate import resolution
+from identification.effects._library import Library, built_in
 from identification.errors import NotIdentifiable
-from identification.evidence import BREAKAWAY, MECHANICAL
-from identification.library import Library, built_in
+from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
+from identification.estimation.windowed_run.refinement import COMPLETE, Refit, misfit, refit
+from identification.estimation.windowed_run.windows import starts, walks
 from identification.log import Log, Rig
-from identification.outcome import base_outcomes
-from identification.plant import Plant
-from identification.refit import COMPLETE, Refit, misfit, refit
-from identification.stage import HOPELESS, joined
-from identification.starts import starts, walks
-from identification.structure import _limit, model_of
-from identification.trace import trace
-from identification.trace_result import Trace
-from identification.trials import driven_only
+from identification.model.plant import Plant
+from identification.signals.differentiate import resolution
+from identification.tracing.free_run.fitted_structure import _limit, fitted_structure
+from identification.tracing.free_run.trial_structures import driven_only
+from identification.tracing.regression.effect_rows import UNEXPLAINED, with_effect
+from identification.tracing.regression.row_fit import base_fits
+from identification.tracing.regression.stepwise import first_stage
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
 RIG = Rig("motor", force_per_command=K_A)
@@ -55,12 +55,12 @@ def test_a_dead_zone_that_leaves_a_motor_no_force_explains_nothing() -> None:
     stage, _ = first_stage([one], by_command=False)
     zone = built_in()["valve_dead_zone"]
     whole = {"u_d": 2.0 * float(np.max(np.abs(one.log["u"]))), "asymmetry": 0.0}
-    rows = joined(stage, MECHANICAL, zone, whole, 0, stage.parts[MECHANICAL][0])
-    assert np.max(np.abs(rows.b)) > 0.1 * HOPELESS  # not 0 = 0
+    rows = with_effect(stage, MECHANICAL, zone, whole, 0, stage.parts[MECHANICAL][0])
+    assert np.max(np.abs(rows.b)) > 0.1 * UNEXPLAINED  # not 0 = 0
     small = {"u_d": 1e-3, "asymmetry": 0.0}
-    kept = joined(stage, MECHANICAL, zone, small, 0, stage.parts[MECHANICAL][0])
+    kept = with_effect(stage, MECHANICAL, zone, small, 0, stage.parts[MECHANICAL][0])
     assert -0.01 < kept.lost < 100.0
-    assert MECHANICAL in base_outcomes(stage)
+    assert MECHANICAL in base_fits(stage)
 
 
 def test_a_spring_on_a_motor_is_no_dead_zone() -> None:
@@ -121,12 +121,12 @@ def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
         begun.append(start)
         return refit(start, *given, **how)
 
-    monkeypatch.setattr("identification.structure.refit", spied)
+    monkeypatch.setattr("identification.tracing.free_run.fitted_structure.refit", spied)
     high = replace(NINE, F_cp=8.0, F_cn=7.0, F_sp=22.0, F_sn=-19.0)
     one = seen(made(6, friction=high))
     start, first = first_stage([one], by_command=False)
     told = {key: found for key, found in first.items() if key != BREAKAWAY}
-    model = model_of(start, told, (), [one], "command", RIG, np.random.default_rng(0))
+    model = fitted_structure(start, told, (), [one], "command", RIG, np.random.default_rng(0))
     assert begun[0].friction.F_sp == pytest.approx(high.F_sp, rel=0.1)
     assert begun[0].friction.F_sn == pytest.approx(high.F_sn, rel=0.1)
     assert model.misfit <= COMPLETE

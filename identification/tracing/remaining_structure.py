@@ -7,19 +7,32 @@ from functools import partial
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.choice import FAR, MATERIAL, Choice, Step
-from identification.dependence import LEAST, MOST, OVERLAPPING, SEPARATE, dependence
-from identification.evidence import ACTUATOR, BLOCKS, BREAKAWAY, MECHANICAL, REST, Moving
-from identification.grids import fewest_periods
-from identification.needed import explained, leading
-from identification.outcome import Outcome, rms, spread
-from identification.refit import COMPLETE, OF_PERIOD, soft
-from identification.result import Drive
-from identification.stage import Stage, one_way
-from identification.starts import freed, position_rms, starts, window_of
-from identification.starts import left as left_in_run
-from identification.structure import MUCH, Model, band
-from identification.trace_result import Dependence
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    BLOCKS,
+    BREAKAWAY,
+    MECHANICAL,
+    REST,
+    MotionLog,
+)
+from identification.estimation.windowed_run.refinement import COMPLETE, PERIOD_REACH, soft
+from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
+from identification.estimation.windowed_run.windows import window_residual as left_in_run
+from identification.model.estimates import Drive
+from identification.tracing.dependence import (
+    LEAST_DEPENDENCE,
+    MOST_SIGNALS,
+    OVERLAPPING,
+    SEPARATE,
+    dependence,
+)
+from identification.tracing.free_run.backward_elimination import equations_explained, first_steps
+from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure, band
+from identification.tracing.regression.effect_rows import EffectRows, one_way
+from identification.tracing.regression.row_fit import RowFit, mean_square, rms
+from identification.tracing.regression.shape_grid import fewest_periods
+from identification.tracing.regression.stepwise import MATERIAL, MUCH_IS_LEFT, Choice, Step
+from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30
 SHARE_LEFT = 0.01  # of what was missing, that may be left with structure
@@ -31,27 +44,30 @@ RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as 
 ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
 DOUBTFUL = 1.5  # the same, if its error depends on a signal; of 200 clean logs none reaches it
-PLACES = 3  # effects of place in one machine, which rather are pieces of one that no library has
+# Effects of place in one machine, which rather are pieces of one that no library has
+MOST_PLACES = 3
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
-SLIGHTLY = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
-STRETCHES = 64  # of a log, every eighth of which is left out together
+SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
+LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
 LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
 
 
-def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Dependence:
+def remaining_structure(
+    choice: Choice, after: FittedStructure, *, any_size: bool = False
+) -> Dependence:
     """The strongest structure that is left in any equation, if there is any.
 
     any_size: however little of what was missing it is, as something surely is missing.
     """
     best, most = Dependence((), 0.0), 0.0
     # A body that creeps in short stops is no rest, and a run that is followed does it too.
-    calm = not after.led and after.misfit <= ASTRAY
+    calm = not after.imposed and after.misfit <= ASTRAY
     for equation, o in choice.base.items():
-        if o.robust and ((calm and not any_size) or spread(o) < RESTLESS):
+        if o.robust and ((calm and not any_size) or mean_square(o) < RESTLESS):
             continue
-        keep = judged(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
+        keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:
             keep = keep & np.concatenate([one_way(one) for one in choice.end.logs])
         found = _in_equation(choice, equation, keep)
@@ -63,7 +79,7 @@ def left_over(choice: Choice, after: Model, *, any_size: bool = False) -> Depend
         if not any_size:
             size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
             whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
-            rough = bool(choice.steps) and spread(o) > FAR
+            rough = bool(choice.steps) and mean_square(o) > MUCH_IS_LEFT
             part = ROUGH_LEFT if rough else SHARE_LEFT
             least = LEFT_LEAST.get(equation, 0.0) * _level(choice)
             if left < STRUCTURED or size**2 < part * whole or size < least:
@@ -107,12 +123,12 @@ def _in_equation(
     signals = {k: v[keep] for k, v in every.items()}
     r = o.fit.residual[keep]
     if o.robust:
-        limit = 3.0 * np.sqrt(max(spread(o), 1.0))
+        limit = 3.0 * np.sqrt(max(mean_square(o), 1.0))
         r = np.clip(r, -limit, limit)
         # Those far off draw on the mean, on which no signal has a part.
         r = r - np.where(way, _mean(r[way]), _mean(r[~way]))
     n = len(r)  # fine stretches in turn, or no function of time could be judged
-    found = dependence(r, signals, way, np.arange(n) * STRETCHES // n % BLOCKS, each)
+    found = dependence(r, signals, way, np.arange(n) * LEFT_OUT_STRETCHES // n % BLOCKS, each)
     names = found.depends_on
     if equation == REST and names:  # it is left since the body stands still, and not before
         names = (*names, "reversal")
@@ -120,7 +136,7 @@ def _in_equation(
     return named, found.explained * float(np.mean(r**2))
 
 
-def _upward(stage: Stage, equation: str, signals: Mapping[str, Array]) -> BoolArray:
+def _upward(stage: EffectRows, equation: str, signals: Mapping[str, Array]) -> BoolArray:
     """Whether each row of an equation moves, starts or is pushed in positive direction, (r,)."""
     if equation == BREAKAWAY:
         return np.concatenate([events.direction > 0 for events in stage.events])
@@ -136,17 +152,19 @@ def _with_command(names: tuple[str, ...], held: bool) -> tuple[str, ...]:
     """Signals named (k,), the command beside its rate and, where it makes the force, the force."""
     also = {"du": ("u",), "F": ("u",) if held else (), "u": ("F",) if held else ()}
     every = [each for name in names for each in (name, *also.get(name, ()))]
-    return tuple(dict.fromkeys(every))[:MOST]
+    return tuple(dict.fromkeys(every))[:MOST_SIGNALS]
 
 
-def _excess(o: Outcome) -> float:
+def _excess(o: RowFit) -> float:
     """Square beyond the noise itself [N**2], as the noise of rows changes with the structure."""
-    return max(spread(o) - 1.0, 0.0) * float(np.median(o.rows.sd[o.rows.speed >= o.slowest])) ** 2
+    return (
+        max(mean_square(o) - 1.0, 0.0) * float(np.median(o.rows.sd[o.rows.speed >= o.slowest])) ** 2
+    )
 
 
-def judged(o: Outcome, after: Model) -> BoolArray:
+def judged_rows(o: RowFit, after: FittedStructure) -> BoolArray:
     """Rows of sliding above the band of a free run that is followed, or else the regression's."""
-    followed = not after.led and after.misfit <= ASTRAY
+    followed = not after.imposed and after.misfit <= ASTRAY
     slowest = min(o.slowest, band(after)) if followed else o.slowest
     return np.asarray(o.rows.speed >= slowest)
 
@@ -156,7 +174,7 @@ def _level(choice: Choice) -> float:
     return 0.5 * float(np.sum(np.abs(choice.end.theta[1:3])))
 
 
-def too_much(choice: Choice, after: Model) -> bool:
+def too_much(choice: Choice, after: FittedStructure) -> bool:
     """Whether far more than the sensors' noise is left, of whatever structure.
 
     Beside effects that were found it is too much only where it is a good part of what was missing,
@@ -170,19 +188,19 @@ def too_much(choice: Choice, after: Model) -> bool:
         o = choice.base[equation]
         keep = o.rows.speed >= o.slowest
         if equation == MECHANICAL:
-            keep = keep & judged(o, after)
+            keep = keep & judged_rows(o, after)
         r = o.fit.residual[keep]
         left = float(np.mean(r**2)) if len(r) else 0.0
         scale = float(np.median(o.rows.sd[keep])) if len(r) else 0.0
-        part = IMPOSED_LEFT if after.stage.led else ROUGH_LEFT
+        part = IMPOSED_LEFT if after.stage.imposed else ROUGH_LEFT
         missing = part * _excess(choice.first[equation]) if choice.steps else 0.0
         if left > MUCH**2 and (left - 1.0) * scale**2 > missing:
             return True
-    if after.led or after.misfit <= ASTRAY:
+    if after.imposed or after.misfit <= ASTRAY:
         return False
     if not choice.steps:
         return _off(after) > OFF
-    return explained(choice.base) or unsized(choice, after)
+    return equations_explained(choice.base) or unsized(choice, after)
 
 
 def places(choice: Choice) -> int:
@@ -192,26 +210,26 @@ def places(choice: Choice) -> int:
 
 def before_pieces(choice: Choice) -> Choice:
     """The choice up to the effect of place that is one too many."""
-    many = [i for i, step in enumerate(choice.steps) if _of_place(step)][PLACES - 1 :]
-    return leading(choice, many[0]) if many else choice
+    many = [i for i, step in enumerate(choice.steps) if _of_place(step)][MOST_PLACES - 1 :]
+    return first_steps(choice, many[0]) if many else choice
 
 
 def _of_place(step: Step) -> bool:
     return step.candidate.effect.depends_on == ("y",)
 
 
-def unrepeated(after: Model) -> bool:
+def unrepeated(after: FittedStructure) -> bool:
     """Whether a force repeats over more than the travel shows: it stands in for another."""
     one = max(after.stage.logs, key=lambda each: float(np.ptp(each.log["y"])))
     travel = float(np.ptp(one.log["y"]))
     return any(
-        acting.values[period] * fewest_periods(acting.effect, one) > OF_PERIOD * travel
+        acting.values[period] * fewest_periods(acting.effect, one) > PERIOD_REACH * travel
         for acting in after.plant.effects
         if acting.effect.place.drives and (period := acting.effect.named("period"))
     )
 
 
-def unsized(choice: Choice, after: Model) -> bool:
+def unsized(choice: Choice, after: FittedStructure) -> bool:
     """Whether the logs leave every size of an effect as unsure as it is large."""
     for step in choice.steps:
         effect = step.candidate.effect
@@ -222,7 +240,7 @@ def unsized(choice: Choice, after: Model) -> bool:
     return False
 
 
-def _off(after: Model) -> float:
+def _off(after: FittedStructure) -> float:
     """Position error of the free run over the spread of the position."""
     drive: Drive = "force" if after.plant.actuator is None else "command"
     logs = after.stage.logs
@@ -232,11 +250,13 @@ def _off(after: Model) -> float:
     return np.inf if rms_y is None else rms_y / max(spread_y, 1e-300)
 
 
-def strongest(choice: Choice, after: Model, logs: Sequence[Moving], drive: Drive) -> Dependence:
+def strongest(
+    choice: Choice, after: FittedStructure, logs: Sequence[MotionLog], drive: Drive
+) -> Dependence:
     """The strongest of the structures left in the equations, at breakaways and in the free run,
     however little it is, as something surely is missing."""
-    found = left_over(choice, after, any_size=True)
-    if after.led:
+    found = remaining_structure(choice, after, any_size=True)
+    if after.imposed:
         return found
 
     def told(one: Dependence) -> float:
@@ -245,11 +265,11 @@ def strongest(choice: Choice, after: Model, logs: Sequence[Moving], drive: Drive
     found = max(found, in_run(after, logs, drive), key=told)
     few = at_breakaway(choice)
     found = few if told(few) > CLEARLY * told(found) else found
-    return found if found.depends_on else in_run(after, logs, drive, least=SLIGHTLY)
+    return found if found.depends_on else in_run(after, logs, drive, least=SLIGHT_SHARE)
 
 
 def in_run(
-    after: Model, logs: Sequence[Moving], drive: Drive, least: float = LEAST
+    after: FittedStructure, logs: Sequence[MotionLog], drive: Drive, least: float = LEAST_DEPENDENCE
 ) -> Dependence:  # fmt: skip
     """Signals on which the free run's position error depends, or its rate, or its curvature (the
     force that is missing); or else how large they are, where their sign is a matter of luck.
@@ -310,7 +330,7 @@ def _change(r: Array, at: IntArray, half: int, window: IntArray, order: int) -> 
     return np.asarray(np.where(window[low] == window[high], found, 0.0))
 
 
-def signals_at(stage: Stage, equation: str) -> dict[str, Array]:
+def signals_at(stage: EffectRows, equation: str) -> dict[str, Array]:
     """Signals that vary, at the middle of an equation's rows over all logs."""
     out: dict[str, list[Array]] = {}
     for i, one in enumerate(stage.logs):

@@ -1,8 +1,8 @@
 """From residual to missing effect: what the plain model leaves, which effect explains it, and the
 error before and after on data that neither the fit nor the choice has seen.
 
-The choice is made on the two equations in weak form and on rest and breakaway (`choice`); the
-plant with the effects found is then refined on its free run (`refit`).
+The choice is made on the two equations in weak form and on rest and breakaway (`stepwise`);
+the plant with the effects found is then refined on its free run (`refinement`).
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -11,31 +11,67 @@ from functools import partial
 
 import numpy as np
 
-from identification.alike import told_apart
-from identification.before_after import carries, errors_of, noise_of, share_left
-from identification.candidates import best_of
-from identification.check import check_driven
-from identification.choice import (
-    Choice,
-    choose,
-    first_stage,
-    rough,
-)
-from identification.constant import beyond_friction
-from identification.constant import remark as constant_remark
-from identification.drift import drift
+from identification.effects._library import Library
 from identification.errors import NotIdentifiable, UserError
-from identification.evidence import (
+from identification.estimation.output_error.karnopp_fit import searched_plant
+from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
     Fitted,
-    Moving,
+    MotionLog,
     actuator,
-    moving,
-    solve,
+    motion_log,
+    solve_rows,
     stacked,
 )
-from identification.findings import (
+from identification.estimation.windowed_run.refinement import COMPLETE, loose, misfit, refit
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.model.plant import units_of
+from identification.signals.check import check_driven
+from identification.tracing.constant_force import beyond_friction, constant_remark
+from identification.tracing.free_run.backward_elimination import (
+    DECISIVE,
+    Setting,
+    doubted,
+    equations_explained,
+    fewest,
+    first_alone,
+    suffices,
+)
+from identification.tracing.free_run.fitted_structure import (
+    MUCH,
+    FittedStructure,
+    band,
+    fitted_structure,
+    inertia_is_lost,
+)
+from identification.tracing.free_run.forward_selection import at_once, judged_forward
+from identification.tracing.free_run.rivals import told_apart
+from identification.tracing.free_run.trial_structures import driven_only
+from identification.tracing.imposed_motion import inertia_has_no_part
+from identification.tracing.model_errors import carries, errors_of, row_noise, share_left
+from identification.tracing.parameter_drift import parameter_drift
+from identification.tracing.regression.candidates import best_of
+from identification.tracing.regression.row_fit import base_fits, mean_square
+from identification.tracing.regression.stepwise import Choice, choose, first_stage, rough
+from identification.tracing.remaining_structure import (
+    ASTRAY,
+    DOUBTFUL,
+    FEWEST_ROWS,
+    IMPOSED_LEFT,
+    MOST_PLACES,
+    at_breakaway,
+    before_pieces,
+    in_run,
+    places,
+    remaining_structure,
+    strongest,
+    too_much,
+    unrepeated,
+)
+from identification.tracing.result import Dependence, Trace
+from identification.tracing.verdict import (
     found_effect,
     next_experiment,
     parameters_of,
@@ -44,52 +80,13 @@ from identification.findings import (
     run_residual,
     verdict_of,
 )
-from identification.forward import at_once, judged_forward
-from identification.led import is_led
-from identification.left_over import (
-    ASTRAY,
-    DOUBTFUL,
-    FEWEST_ROWS,
-    IMPOSED_LEFT,
-    PLACES,
-    at_breakaway,
-    before_pieces,
-    in_run,
-    left_over,
-    places,
-    strongest,
-    too_much,
-    unrepeated,
-)
-from identification.library import Library
-from identification.log import Log, Rig
-from identification.needed import (
-    DECISIVE,
-    Setting,
-    doubted,
-    explained,
-    fewest,
-    first_alone,
-    suffices,
-)
-from identification.outcome import base_outcomes, spread
-from identification.output_error import searched_plant
-from identification.plant import units_of
-from identification.refit import COMPLETE, loose, misfit, refit
-from identification.result import Drive
-from identification.structure import MUCH, Model, band, led, model_of
-from identification.trace_result import (
-    Dependence,
-    Trace,
-)
-from identification.trials import driven_only
 
 Progress = Callable[[str, float], None]
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
-SPEED = frozenset({"v", "reversal"})
+OF_SPEED = frozenset({"v", "reversal"})
 HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
 
 
@@ -110,43 +107,44 @@ def trace(
     remarks: list[str] = []
     by_command = _by_command(train, rig, library, remarks)
     held = rig.kind == "motor"
-    recorded = partial(moving, held=held, by_command=by_command, rotary=rig.motion == "rotary")
+    recorded = partial(motion_log, held=held, by_command=by_command, rotary=rig.motion == "rotary")
     drive: Drive = "command" if by_command or held else "force"
     logs, refused = _logs(train, recorded, drive)
     report("tracing", 0.0)
     start, first = first_stage(logs, by_command)
-    before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
-    imposed = before.led and is_led(logs)  # and the inertia not only hidden by what is missing
+    before = fitted_structure(start, first, (), logs, drive, rig, rng.spawn(1)[0])
+    # Imposed, and the inertia not only hidden by what is missing.
+    imposed = before.imposed and inertia_has_no_part(logs)
     if refused is not None and not imposed:
         raise refused
     if imposed:
-        recorded = partial(recorded, led=True)
+        recorded = partial(recorded, imposed=True)
         logs = [recorded(log) for log in train]
         _enough(logs)
         start, first = first_stage(logs, by_command)
-        before = model_of(start, first, (), logs, drive, rig, rng.spawn(1)[0])
+        before = fitted_structure(start, first, (), logs, drive, rig, rng.spawn(1)[0])
         library = _told_by_speed(library, logs, remarks)
-    free = not before.led and loose(before.plant, drive)
-    if not (before.led or free or rough(first)) and before.misfit > COMPLETE:
+    free = not before.imposed and loose(before.plant, drive)
+    if not (before.imposed or free or rough(first)) and before.misfit > COMPLETE:
         before = searched(before, train, logs, drive, rig, rng)
-    if not before.led:
+    if not before.imposed:
         logs = [replace(one, reference=before.plant.friction) for one in logs]
         # A run that is not followed may have swollen its band in place of what is missing.
         slow = band(before) if before.misfit <= ASTRAY else 0.0
         start = replace(start, band=slow, sliding=before.plant.friction)
-        first = base_outcomes(start)
-    if not before.led and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
+        first = base_fits(start)
+    if not before.imposed and misfit(before.plant, logs, drive, every=True) <= COMPLETE:
         library = {}  # the plain plant's run leaves nothing but noise
     setting = Setting(logs, logs, drive, rig, library, start, first, before, rng.spawn(1)[0])
     choice = begun = choose(start, first, library, rng, report, most=1)
     alone = first_alone(begun, setting)
     if begun.steps and not suffices(alone, begun, setting):
         choice = choose(start, first, library, rng, report, begun)
-    many = not before.led and places(choice) >= PLACES
+    many = not before.imposed and places(choice) >= MOST_PLACES
     choice = before_pieces(choice) if many else choice
     report("refitting", 0.5)
     sliding = choice.base[MECHANICAL]
-    hidden = before.led and (led(sliding) or spread(sliding) > MUCH**2)
+    hidden = before.imposed and (inertia_is_lost(sliding) or mean_square(sliding) > MUCH**2)
     unsure = start.band == 0.0 and not hidden
     after = before
     # Where the first effect leaves next to nothing of the equations, the run may tell the next.
@@ -167,30 +165,30 @@ def trace(
     seen = [recorded(log) for log in test]
     # A refinement may end short of its minimum.
     most = DECISIVE if choice.steps else COMPLETE
-    left = Dependence((), 0.0) if after.misfit <= most else left_over(choice, after)
-    changed = drift(after, choice.steps, seen, rig) if seen else ()
-    if not (left.depends_on or choice.steps or after.led) and after.misfit > DOUBTFUL:
+    left = Dependence((), 0.0) if after.misfit <= most else remaining_structure(choice, after)
+    changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
+    if not (left.depends_on or choice.steps or after.imposed) and after.misfit > DOUBTFUL:
         left = in_run(after, logs, drive)
         left = left if left.depends_on else at_breakaway(choice)
     verdict = verdict_of(choice, left, changed)
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(before, slowest, (), logs, seen, drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, drive)
-    if after.stage.led:
+    if after.stage.imposed:
         carried = share_left(errors_before, errors_after) <= IMPOSED_LEFT
     else:
-        carried = not explained(choice.base) or carries(errors_before, errors_after)
+        carried = not equations_explained(choice.base) or carries(errors_before, errors_after)
     stands_in = bool(choice.steps) and not changed and not carried
-    pieced = places(choice) >= PLACES
+    pieced = places(choice) >= MOST_PLACES
     pieced = pieced or (many and places(choice) > 1 and after.misfit > COMPLETE)
-    longer = not after.led and unrepeated(after)
+    longer = not after.imposed and unrepeated(after)
     if verdict != "unknown" and (stands_in or pieced or longer or too_much(choice, after)):
         verdict = "unknown"
         another = pieced or longer  # a law of place, which is told from what the plain model leaves
         left = Dependence((), 0.0) if another else strongest(choice, after, logs, drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             plain = Choice(start, first, (), start, first, choice.tried)
-            left = left_over(plain, before, any_size=True)
+            left = remaining_structure(plain, before, any_size=True)
     remarks += _remarks(choice, after, left, logs, seen, rig)
     if pieced:
         remarks.append(
@@ -212,8 +210,8 @@ def trace(
         after=errors_after,
         noise_y=float(np.mean([one.noise_y for one in logs])),
         noise_F=float(np.mean([one.noise_F for one in logs])),
-        noise_force=noise_of(choice.base, MECHANICAL) or 0.0,
-        noise_actuator=noise_of(choice.base, ACTUATOR),
+        noise_force=row_noise(choice.base, MECHANICAL) or 0.0,
+        noise_actuator=row_noise(choice.base, ACTUATOR),
         effects=tuple(found_effect(s, after, choice) for s in choice.steps),
         rivals=rivals_of(choice),
         unknown=left,
@@ -229,13 +227,17 @@ def trace(
 
 
 def _remarks(
-    choice: Choice, after: Model, left: Dependence, logs: Sequence[Moving], seen: Sequence[Moving],
+    choice: Choice,
+    after: FittedStructure,
+    left: Dependence,
+    logs: Sequence[MotionLog],
+    seen: Sequence[MotionLog],
     rig: Rig,
-) -> Iterator[str]:  # fmt: skip
+) -> Iterator[str]:
     """What whoever reads the trace has to know of it."""
-    if after.led and after.stage.led:
+    if after.imposed and after.stage.imposed:
         yield "the motion is imposed (inertia is of no account): no free run is judged"
-    elif after.led:
+    elif after.imposed:
         yield "inertia does not show beside what is left: no free run is judged"
     elif choice.steps and after.misfit > ASTRAY:
         yield (
@@ -250,7 +252,7 @@ def _remarks(
             f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"
             " outside, or another loop"
         )
-    if not after.led and driven_only(logs):
+    if not after.imposed and driven_only(logs):
         motor = (
             " nor a dead zone of the command be told from friction" if rig.kind == "motor" else ""
         )
@@ -264,28 +266,29 @@ def _remarks(
         yield "no test log: the test errors are those of stretches left out in turn"
 
 
-def useless(choice: Choice, before: Model, after: Model) -> bool:
+def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> bool:
     """Whether effects explain neither the run nor, to the sensors' noise, the equations.
 
     Where no effect of the library is the right one, the nearest stands in for it: it lowers what
     the equations leave (though not to a hundredth), bends the other parameters, and hides on what
     the rest depends.
     """
-    if after.led or not choice.steps:
+    if after.imposed or not choice.steps:
         return False
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
-    lacked = any(spread(choice.first[e]) > MUCH**2 for e in told)
+    lacked = any(mean_square(choice.first[e]) > MUCH**2 for e in told)
     if lacked and all(
-        spread(choice.base[e]) <= max(MUCH**2, HUNDREDTH * spread(choice.first[e])) for e in told
+        mean_square(choice.base[e]) <= max(MUCH**2, HUNDREDTH * mean_square(choice.first[e]))
+        for e in told
     ):
         return False
     return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
 
 
 def searched(
-    model: Model, train: Sequence[Log], logs: Sequence[Moving], drive: Drive, rig: Rig,
+    model: FittedStructure, train: Sequence[Log], logs: Sequence[MotionLog], drive: Drive, rig: Rig,
     rng: np.random.Generator,
-) -> Model:  # fmt: skip
+) -> FittedStructure:  # fmt: skip
     """The plain model from a global search, where that follows the logs better."""
     try:
         plant = searched_plant(train, rng.spawn(1)[0], rig=rig, drive=drive)
@@ -302,9 +305,9 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
     some effect of the library makes linear."""
     if rig.kind == "motor" or not all("u" in log and np.ptp(log["u"]) > 0 for log in train):
         return False
-    logs = [moving(log, held=False, by_command=True) for log in train]
+    logs = [motion_log(log, held=False, by_command=True) for log in train]
     rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in logs])
-    found = solve(rows)
+    found = solve_rows(rows)
 
     def left_by(one: Fitted) -> float:
         left = float(np.std(one.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
@@ -327,9 +330,9 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
 
 
 def _logs(
-    train: Sequence[Log], recorded: Callable[..., Moving], drive: Drive
-) -> tuple[list[Moving], NotIdentifiable | None]:
-    """The logs with their motion; as led where only a rig's slow motion may hold enough, and then
+    train: Sequence[Log], recorded: Callable[..., MotionLog], drive: Drive
+) -> tuple[list[MotionLog], NotIdentifiable | None]:
+    """The logs with their motion; imposed where only a rig's slow motion may hold enough, and then
     the error that they are otherwise."""
     logs = [recorded(log) for log in train]
     try:
@@ -337,7 +340,7 @@ def _logs(
     except NotIdentifiable as error:
         if drive != "force":
             raise
-        logs = [recorded(log, led=True) for log in train]
+        logs = [recorded(log, imposed=True) for log in train]
         try:
             _enough(logs)
         except NotIdentifiable:
@@ -346,8 +349,8 @@ def _logs(
     return logs, None
 
 
-def _told_by_speed(library: Library, logs: Sequence[Moving], remarks: list[str]) -> Library:
-    """The library without effects of speed alone, where a rig led the body at much the same speed.
+def _told_by_speed(library: Library, logs: Sequence[MotionLog], remarks: list[str]) -> Library:
+    """The library without effects of speed alone, where a rig kept to much the same speed.
 
     There they would stand in for whatever makes one stroke differ from another.
     """
@@ -356,7 +359,9 @@ def _told_by_speed(library: Library, logs: Sequence[Moving], remarks: list[str])
         speed = np.concatenate([one.speed[one.up == way] for one in logs])
         low, high = np.quantile(speed, RANGE)
         ratios.append(float(high / low))
-    of_speed = [k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= SPEED]
+    of_speed = [
+        k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= OF_SPEED
+    ]
     if max(ratios) >= VARIED or not of_speed:
         return library
     remarks.append(
@@ -367,7 +372,7 @@ def _told_by_speed(library: Library, logs: Sequence[Moving], remarks: list[str])
     return {key: effect for key, effect in library.items() if key not in of_speed}
 
 
-def _enough(logs: Sequence[Moving]) -> None:
+def _enough(logs: Sequence[MotionLog]) -> None:
     rows = sum(len(one.sliding.start) for one in logs)
     if rows < FEWEST_ROWS:
         raise NotIdentifiable(

@@ -6,23 +6,28 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.choice import Step, absorb
-from identification.evidence import ACTUATOR, MECHANICAL, Moving, stacked
-from identification.held_out import left_out, residual
-from identification.outcome import Outcome, rms
-from identification.result import Drive
-from identification.stage import Stage
-from identification.starts import position_rms
-from identification.structure import Model
-from identification.trace_result import Errors
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    MECHANICAL,
+    MotionLog,
+    stacked,
+)
+from identification.estimation.windowed_run.windows import position_rms
+from identification.model.estimates import Drive
+from identification.tracing.free_run.fitted_structure import FittedStructure
+from identification.tracing.regression.cross_validation import left_out_residual, row_residual
+from identification.tracing.regression.effect_rows import EffectRows
+from identification.tracing.regression.row_fit import RowFit, rms
+from identification.tracing.regression.stepwise import Step, absorb
+from identification.tracing.result import Errors
 
 CARRIED = 2.0  # times the training logs' force error, up to which a structure carries over
 OF_MISSING = 0.05  # of the square that was missing, that may be left beyond that
 
 
 def errors_of(
-    model: Model, slowest: float, steps: Sequence[Step], logs: Sequence[Moving],
-    seen: Sequence[Moving], drive: Drive,
+    model: FittedStructure, slowest: float, steps: Sequence[Step], logs: Sequence[MotionLog],
+    seen: Sequence[MotionLog], drive: Drive,
 ) -> dict[str, Errors]:  # fmt: skip
     """Errors of a model on the training and the test logs; `slowest` [m/s]: rows that count."""
     own, found = model.stage, model.outcomes
@@ -35,16 +40,16 @@ def errors_of(
                 continue
             low = slowest if equation == MECHANICAL else 0.0
             if name == "test" and not seen:
-                errors[equation] = left_out(stacked(stage.parts[equation]), low)
+                errors[equation] = left_out_residual(stacked(stage.parts[equation]), low)
             else:
-                errors[equation] = residual(stage, equation, found[equation].fit.theta, low)
+                errors[equation] = row_residual(stage, equation, found[equation].fit.theta, low)
         force = errors[MECHANICAL]
         whole = rms(force[1])
         size = rms(force[0]) if len(force[0]) else None  # nothing slides
         out[name] = Errors(
             force_rms=size,
             force_relative=size / whole if size is not None and whole else None,
-            position_rms=None if model.led else position_rms(model.plant, over, drive),
+            position_rms=None if model.imposed else position_rms(model.plant, over, drive),
             actuator_rms=rms(errors[ACTUATOR][0]) if ACTUATOR in errors else None,
         )
     return out
@@ -68,7 +73,7 @@ def share_left(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> flo
     return 0.0 if left is None or not missing else (left / missing) ** 2
 
 
-def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stage:
+def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:
     """The stage of other logs with the same structure and effects taken out of their signals."""
     own = replace(stage, logs=tuple(logs), chosen=(), taken=(), scales={})
     for step in steps:
@@ -77,6 +82,6 @@ def seen_by(stage: Stage, steps: Sequence[Step], logs: Sequence[Moving]) -> Stag
     return replace(own, chosen=stage.chosen)
 
 
-def noise_of(base: Mapping[str, Outcome], equation: str) -> float | None:
+def row_noise(base: Mapping[str, RowFit], equation: str) -> float | None:
     """What the sensors alone leave in an equation's rows (one sigma, root mean square)."""
     return float(np.sqrt(np.mean(base[equation].rows.sd ** 2))) if equation in base else None

@@ -7,26 +7,27 @@ import numpy as np
 from scipy.fft import rfft
 
 from identification.arrays import Array, BoolArray, IntArray
-from identification.trace_result import Dependence
+from identification.tracing.result import Dependence
 
 BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
-FEW = 8  # values of a signal (a switch, a gear) that are told apart each by itself
-LEAST = 0.08  # share of the residual, on blocks left out, from which it depends on a signal
-MOST = 3  # signals named
+FEW_VALUES = 8  # values of a signal (a switch, a gear) that are told apart each by itself
+# Share of the residual, on blocks left out, from which it depends on a signal
+LEAST_DEPENDENCE = 0.08
+MOST_SIGNALS = 3  # signals named
 OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
-ADDED = 0.15  # share of what is left that a second signal must explain
+SECOND_SIGNAL = 0.15  # share of what is left that a second signal must explain
 APART = 0.1  # of the residual, that a swing in time must explain beyond any signal: a periodic
 # motion makes all that depends on place or speed swing as well
-FINER = 4.0  # trial frequencies in each step that a log's length tells apart
-PLACES = 4  # of the even grid, on which rows are put, to a row
+FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length tells apart
+GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
 SWINGS = 200  # rows; of fewer, the frequency that fits best does so by luck
-FEWEST = 4.0  # rows in a period
+ROWS_IN_PERIOD = 4.0  # rows in a period
 
 
 def hats(x: Array, levels: int) -> Array:
     """Piecewise linear functions of `x` over its quantiles, (n, k)."""
     values = np.unique(x)
-    if len(values) <= FEW:
+    if len(values) <= FEW_VALUES:
         return np.asarray(x[:, np.newaxis] == values, dtype=np.float64)
     knots = np.unique(np.quantile(x, np.linspace(0.0, 1.0, levels)))
     if len(knots) < 3:
@@ -53,7 +54,7 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 def dependence(
     r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray,
-    each: int = OVERLAPPING, least: float = LEAST,
+    each: int = OVERLAPPING, least: float = LEAST_DEPENDENCE,
 ) -> Dependence:  # fmt: skip
     """Signals on which a whitened residual (n,) depends, most of all first.
 
@@ -76,9 +77,11 @@ def dependence(
     named = [order[0]]
     for name in order[1:]:
         again = smooth_share(left, signals[name], up, block, each)
-        if best[name][0] > least / 2 and again[0] > ADDED:
+        if best[name][0] > least / 2 and again[0] > SECOND_SIGNAL:
             named.append(name)
-    return Dependence(tuple(named[:MOST]), best[order[0]][0], rate if named[0] == "t" else 0.0)
+    return Dependence(
+        tuple(named[:MOST_SIGNALS]), best[order[0]][0], rate if named[0] == "t" else 0.0
+    )
 
 
 def frequency(r: Array, t: Array) -> float:
@@ -90,15 +93,15 @@ def frequency(r: Array, t: Array) -> float:
     longest = max(float(np.ptp(t[one])) for one in logs)
     if longest == 0.0:
         return 0.0
-    step = longest / max(map(len, logs)) / PLACES
-    size = round(FINER * longest / step)
+    step = longest / max(map(len, logs)) / GRID_PLACES
+    size = round(FINER_FREQUENCIES * longest / step)
     power = np.zeros(size // 2 + 1)
     for one in logs:
         place = np.rint((t[one] - t[one[0]]) / step).astype(np.int64)
         line = np.bincount(place, r[one] - np.mean(r[one]), size)
         power += np.abs(np.asarray(rfft(line, size))) ** 2
     trial = np.arange(len(power)) / (size * step)
-    told = (trial > 1.0 / longest) & (trial < 1.0 / (FEWEST * PLACES * step))
+    told = (trial > 1.0 / longest) & (trial < 1.0 / (ROWS_IN_PERIOD * GRID_PLACES * step))
     return float(trial[told][np.argmax(power[told])]) if np.any(told) else 0.0
 
 

@@ -2,8 +2,8 @@
 
 import pytest
 
-from identification.before_after import carries, share_left
-from identification.trace_result import Errors
+from identification.tracing.model_errors import carries, share_left
+from identification.tracing.result import Errors
 
 
 def of(train: float | None, test: float | None) -> dict[str, Errors]:

@@ -1,0 +1,1 @@
+"""From residual to missing effect: choice, run, verdict."""
