@@ -1,9 +1,10 @@
 """Drift test of one new log against the model in force: has the machine changed, and in what?
 
-The log's own parameters come from a local refit (`log_estimate`). Their change counts by how far
+The log's own parameters come from a local refit (`karnopp_estimate`, with effects
+`effect_estimate`). Their change counts by how far
 it lies beyond a practical margin, in the covariance of everything that is unsure: the log's fit,
 the model's fit, and how much the machine varies from log to log anyhow. A second statistic over
-the logs since the model was put in force (`drift_chart`) finds what changes slowly. A log that no
+the logs since the model was put in force (`mewma`) finds what changes slowly. A log that no
 parameters bring the model to follow is said to have another structure; that is no drift.
 """
 
@@ -15,29 +16,29 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array
-from identification.drift_chart import (
+from identification.drift.effect_estimate import estimate_with_effects
+from identification.drift.karnopp_estimate import LogEstimate, estimate_log
+from identification.drift.mewma import (
     DriftState,
     Mean,
+    chart_limit,
     fresh_state,
-    limit,
     mean_change,
     taken_in,
     variation,
 )
-from identification.effect_estimate import estimate_with_effects
+from identification.drift.practical_margin import explained_change, moved
+from identification.drift.reference_model import InForce
 from identification.errors import BadSpecification, NotIdentifiable
-from identification.in_force import InForce
 from identification.log import Log
-from identification.log_estimate import LogEstimate, estimate_log
-from identification.margin import explained, moved
 
-Verdict = Literal["none", "drift", "structure", "not_judged"]
+DriftVerdict = Literal["none", "drift", "structure", "not_judged"]
 FoundBy = Literal["log", "mean"]
 Z_95 = float(norm.isf(0.025))
 
 
 @dataclass(frozen=True)
-class Settings:
+class DriftSettings:
     """What counts as drift.
 
     margin: relative change that does not matter; run_length: logs without drift up to a false
@@ -113,7 +114,7 @@ class DriftTest:
     """
 
     log: str
-    verdict: Verdict
+    verdict: DriftVerdict
     moved: tuple[Shift, ...]
     shifts: Mapping[str, Shift]
     not_judged: Mapping[str, str]
@@ -132,14 +133,14 @@ def drift_test(
     rng: np.random.Generator,
     *,
     state: DriftState | None = None,
-    settings: Settings | None = None,
+    settings: DriftSettings | None = None,
 ) -> DriftTest:
     """The verdict on a new log, and the state to be given with the next one.
 
     state: what the log before gave; None, or of another model, begins anew. Raises BadLog where
     a signal is missing.
     """
-    settings = settings or Settings()
+    settings = settings or DriftSettings()
     if state is None or state.model != model.key or state.names != model.names:
         state = fresh_state(model.key, model.names)
     try:
@@ -153,11 +154,11 @@ def drift_test(
             f" {found.chi_square:.3g}, at most {found.allowed:.3g} allowed); trace it"
         )
         return _silent(log.name, "structure", reason, {}, found, state)
-    return judged(model, found, log.name, state, settings)
+    return judged_estimate(model, found, log.name, state, settings)
 
 
-def judged(
-    model: InForce, found: LogEstimate, log: str, state: DriftState, settings: Settings
+def judged_estimate(
+    model: InForce, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""
     change, own = _relative(model, found)
@@ -177,7 +178,9 @@ def judged(
     single = _statistic(here, float(chi2.isf(0.5 / settings.run_length, len(at))))
     after = taken_in(state, change, own, told, settings.smoothing, varied)
     over = mean_change(after, in_force, settings.margin)
-    mean = _statistic(over, limit(len(over.at), settings.smoothing, 2.0 * settings.run_length))
+    mean = _statistic(
+        over, chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
+    )
     by: FoundBy | None = "log" if single.alarm else ("mean" if mean.alarm else None)
     which = _moved(model, over if by == "mean" else here, here) if by else ()
     return DriftTest(
@@ -216,7 +219,7 @@ def _relative(model: InForce, found: LogEstimate) -> tuple[Array, Array]:
 
 
 def _not_judged(
-    model: InForce, found: LogEstimate, log: str, covariance: Array, settings: Settings
+    model: InForce, found: LogEstimate, log: str, covariance: Array, settings: DriftSettings
 ) -> dict[str, str]:
     """Parameters that this log cannot be judged by, with the reason."""
     out: dict[str, str] = {}
@@ -252,7 +255,7 @@ def _moved(model: InForce, found: Mean, here: Mean) -> tuple[Shift, ...]:
     size_mean = dict(zip(found.at, np.abs(found.change).tolist(), strict=True))
     sized = here if all(size_here.get(i, 0.0) >= size_mean[i] for i in names) else found
     chosen = tuple(k for k, i in enumerate(sized.at) if i in names)
-    size, covariance = explained(sized.change, sized.covariance, sized.margin, chosen)
+    size, covariance = explained_change(sized.change, sized.covariance, sized.margin, chosen)
     out = [
         _shift(model, sized.at[k], float(size[n]), float(np.sqrt(covariance[n, n])))
         for n, k in enumerate(chosen)
@@ -289,7 +292,7 @@ def _shift(model: InForce, i: int, change: float, sd: float) -> Shift:
 
 
 def _silent(
-    log: str, verdict: Verdict, reason: str, not_judged: Mapping[str, str],
+    log: str, verdict: DriftVerdict, reason: str, not_judged: Mapping[str, str],
     found: LogEstimate | None, state: DriftState,
 ) -> DriftTest:  # fmt: skip
     """A verdict without changes; the state stays as it was."""

@@ -15,8 +15,8 @@ from scipy.optimize import brentq
 from scipy.stats import chi2, ncx2
 
 from identification.arrays import Array, BoolArray
+from identification.drift.practical_margin import Distance, beyond_margin
 from identification.errors import BadModel
-from identification.margin import Distance, beyond
 
 RINGS = 60  # states of the Markov chain
 CAUTION = 2.0  # deviations by which a learnt variance is taken larger
@@ -123,7 +123,7 @@ class Mean:
     @property
     def distance(self) -> Distance:
         """How far the mean lies beyond the margin."""
-        return beyond(self.change, self.covariance, self.margin)
+        return beyond_margin(self.change, self.covariance, self.margin)
 
 
 def mean_change(state: DriftState, in_force: Array, margin: float) -> Mean:
@@ -143,7 +143,7 @@ def mean_change(state: DriftState, in_force: Array, margin: float) -> Mean:
     )  # fmt: skip
 
 
-def limit(parameters: int, smoothing: float, run_length: float) -> float:
+def chart_limit(parameters: int, smoothing: float, run_length: float) -> float:
     """Square distance that the chart passes once in `run_length` logs on average without a change.
 
     parameters: number of them; smoothing: the weight of the newest log. Of a chart whose logs have

@@ -8,8 +8,8 @@ import numpy as np
 from identification.arrays import Array, frozen
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.plant import Actuator, Plant, units_of
-from identification.result import Drive, KarnoppFit
+from identification.model.estimates import Drive, KarnoppFit
+from identification.model.plant import Actuator, Plant, units_of
 
 VISCOUS = ("F_vp", "F_vn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.drift_chart import (
+from identification.drift.mewma import (
+    chart_limit,
     fresh_state,
-    limit,
     mean_change,
     mean_run,
     taken_in,
@@ -29,7 +29,7 @@ def test_run_length_is_that_of_the_printed_tables(parameters: int, square: float
 
 def test_limit_gives_the_asked_run_length_in_simulation() -> None:
     d, smoothing, asked = 3, 0.2, 100.0
-    square = limit(d, smoothing, asked)
+    square = chart_limit(d, smoothing, asked)
     rng = np.random.default_rng(3)
     z, spread, alarms = np.zeros((500, d)), np.zeros(500), 0
     for _ in range(600):

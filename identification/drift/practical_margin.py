@@ -13,7 +13,8 @@ from scipy.stats import chi2
 
 from identification.arrays import Array
 
-SURE = 0.01  # chance of a gain as large without a change, shared by the parameters that are tried
+# Chance of a gain as large without a change, shared by the parameters that are tried
+GAIN_CHANCE = 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +25,9 @@ class Distance:
     nearest: Array
 
 
-def beyond(change: Array, covariance: Array, margin: Array, free: tuple[int, ...] = ()) -> Distance:
+def beyond_margin(
+    change: Array, covariance: Array, margin: Array, free: tuple[int, ...] = ()
+) -> Distance:
     """Least (change - x)' covariance^-1 (change - x) over x with |x| <= margin.
 
     change, margin (d,), covariance (d, d); free: indices of x without a bound. Without any true
@@ -53,12 +56,12 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
     makes needless. Parameters that a log cannot tell apart do not all move.
     """
     d = len(change)
-    sure = float(chi2.isf(SURE / max(d, 1), 1))
+    sure = float(chi2.isf(GAIN_CHANCE / max(d, 1), 1))
     chosen: list[int] = []
-    left = beyond(change, covariance, margin).square
+    left = beyond_margin(change, covariance, margin).square
     while left > 0.0 and len(chosen) < d:
         tried = {
-            i: beyond(change, covariance, margin, (*chosen, i)).square
+            i: beyond_margin(change, covariance, margin, (*chosen, i)).square
             for i in range(d)
             if i not in chosen
         }
@@ -69,17 +72,17 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
         left = tried[best]
     for i in tuple(chosen):
         without = tuple(j for j in chosen if j != i)
-        if without and beyond(change, covariance, margin, without).square - left < sure:
+        if without and beyond_margin(change, covariance, margin, without).square - left < sure:
             chosen.remove(i)
-            left = beyond(change, covariance, margin, without).square
+            left = beyond_margin(change, covariance, margin, without).square
     return tuple(chosen)
 
 
-def explained(
+def explained_change(
     change: Array, covariance: Array, margin: Array, chosen: tuple[int, ...]
 ) -> tuple[Array, Array]:
     """Change (k,) of the chosen parameters and its covariance (k, k), the others in the margin."""
     at = list(chosen)
-    found = beyond(change, covariance, margin, chosen).nearest[at]
+    found = beyond_margin(change, covariance, margin, chosen).nearest[at]
     precision = np.linalg.inv(covariance)[np.ix_(at, at)]
     return found, np.linalg.inv(precision)

@@ -12,31 +12,38 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.box import Box
-from identification.climb import ATTEMPTS as CLIMBS
-from identification.climb import climb
-from identification.experiment import total_cost
-from identification.identifiability import estimates, events_of
-from identification.imposed import fit_imposed
-from identification.in_force import InForce
-from identification.karnopp import NAMES
+from identification.arx.residual_tests import effective_samples
+from identification.drift.reference_model import InForce
+from identification.estimation.global_search import evolve
+from identification.estimation.output_error.cost import START_V, START_Y
+from identification.estimation.output_error.fitted_runs import total_cost
+from identification.estimation.output_error.growing_windows import CLIMB_ATTEMPTS as CLIMBS
+from identification.estimation.output_error.growing_windows import climb
+from identification.estimation.output_error.identifiability import estimates, events_of
+from identification.estimation.output_error.imposed_motion import fit_imposed
+from identification.estimation.output_error.karnopp_fit import searched_plant
+from identification.estimation.output_error.local_search import Optimum, refine, robust_covariance
+from identification.estimation.output_error.problem import ADEQUATE, Problem, pose, simulated
+from identification.estimation.output_error.search_bounds import Box
+from identification.estimation.output_error.short_windows import stretches
+from identification.estimation.output_error.uncertainty import (
+    BETWEEN,
+    OUTLIER_BOUND,
+    ROUGH,
+    SCATTER_PARTS,
+)
 from identification.log import Log
-from identification.objective import START_V, START_Y
-from identification.output_error import searched_plant
-from identification.plant import Actuator, Plant
-from identification.problem import ADEQUATE, Problem, pose, simulated
-from identification.refine import Optimum, refine, robust_covariance
-from identification.residual_tests import effective_samples
-from identification.search import evolve
-from identification.stepping import K2, kernel_parameters
-from identification.stretches import stretches
-from identification.weighing import BETWEEN, OUTLIER, ROUGH, STRETCHES
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Plant
+from identification.simulation.karnopp_step import K2, kernel_parameters
 
-PIECES = (4.0, 1.5)  # s; stretches in which a log is followed that is not followed as a whole
-LOST = 0.1  # of the stretches, at least one, that may be spoiled by a lost stop
-CLOSE = 0.1  # relative range of a search close by
-POPULATION, GENERATIONS = 64, 60
-MISFIT = 2.0  # chi-square from which a log is not followed; a stop lost here or there leaves less
+# S; stretches in which a log is followed that is not followed as a whole
+STRETCH_SECONDS = (4.0, 1.5)
+LOST_STRETCHES = 0.1  # of the stretches, at least one, that may be spoiled by a lost stop
+CLOSE_SHARE = 0.1  # relative range of a search close by
+REFIT_POPULATION, REFIT_GENERATIONS = 64, 60
+# Chi-square from which a log is not followed; a stop lost here or there leaves less
+NOT_FOLLOWED = 2.0
 LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
 STIFF = 10.0  # of a body's rate times the sampling period
 DRAWN = 512
@@ -88,8 +95,8 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     problem = pose([log], model.rig, drive)
     if model.imposed or _stiff(model, log.h):
         return _imposed(model, problem, rng)
-    allowed = MISFIT if model.chi_square <= problem.adequate else LIKE * model.chi_square
-    enough = allowed * ADEQUATE / MISFIT
+    allowed = NOT_FOLLOWED if model.chi_square <= problem.adequate else LIKE * model.chi_square
+    enough = allowed * ADEQUATE / NOT_FOLLOWED
     best: _Fit | None = None
     searched = False
     for found, by_search in _fits(model, problem, rng):
@@ -118,7 +125,7 @@ def _fits(
         yield whole, False
         best = min((straight, near, whole), key=lambda one: one.chi_square)
         rows += [row, best.optimum.p]
-        for seconds in PIECES:
+        for seconds in STRETCH_SECONDS:
             yield _in_pieces(problem, row, seconds), False
             yield _in_pieces(problem, best.optimum.p, seconds), False
     for row in (rows[0], rows[3]):
@@ -126,7 +133,7 @@ def _fits(
     row = _searched(model, problem, rng)
     near, whole = _local(problem, row)
     yield whole, True
-    yield _in_pieces(problem, near.optimum.p, PIECES[-1]), True
+    yield _in_pieces(problem, near.optimum.p, STRETCH_SECONDS[-1]), True
 
 
 def _row(model: InForce, problem: Problem, plant: Plant) -> Array:
@@ -165,13 +172,13 @@ def _in_pieces(problem: Problem, row: Array, seconds: float) -> _Fit:
     for free, cap in ((problem.free[:0], problem.cap), (problem.free, problem.cap)):
         near = refine(cut.all, row, free, cap=cap)
         cut, row = cut.begun(near.starts), near.p
-    optimum = refine(cut.all, row, problem.free, cap=OUTLIER)
+    optimum = refine(cut.all, row, problem.free, cap=OUTLIER_BOUND)
     cut = cut.begun(optimum.starts)
     runs = tuple(cut.restarted())
     costs = [float(total_cost([part], optimum.p[None], 0.0)[0]) for part in cut.all]
     counts = np.array([part.measured.count for part in cut.all])
     order = np.argsort(np.array(costs) / counts)
-    kept = order[: max(1, len(order) - max(1, int(LOST * len(order))))]
+    kept = order[: max(1, len(order) - max(1, int(LOST_STRETCHES * len(order))))]
     chi_square = float(np.sum(np.array(costs)[kept]) / np.sum(counts[kept]))
     shared = len(optimum.free)
     optimum = replace(
@@ -184,15 +191,17 @@ def _in_pieces(problem: Problem, row: Array, seconds: float) -> _Fit:
 
 def _near_by(problem: Problem, row: Array, rng: np.random.Generator) -> _Fit:
     """The best of a search close to a row over short stretches, from which a gradient goes on."""
-    runs = stretches(problem.runs, PIECES[-1]).restarted()
+    runs = stretches(problem.runs, STRETCH_SECONDS[-1]).restarted()
     free = problem.box.free[:9]
     size = np.abs(row[free])
-    box = Box(free, size * (1.0 - CLOSE), size * (1.0 + CLOSE), row)
-    first = box.around(row, POPULATION, 0.2, rng)
-    found = evolve(lambda z: total_cost(runs, box.rows(z), OUTLIER), first, GENERATIONS, rng)
+    box = Box(free, size * (1.0 - CLOSE_SHARE), size * (1.0 + CLOSE_SHARE), row)
+    first = box.around(row, REFIT_POPULATION, 0.2, rng)
+    found = evolve(
+        lambda z: total_cost(runs, box.rows(z), OUTLIER_BOUND), first, REFIT_GENERATIONS, rng
+    )
     best = box.rows(found.members[:1])[0]
     whole = _straight(problem, best)
-    pieces = _in_pieces(problem, best, PIECES[-1])
+    pieces = _in_pieces(problem, best, STRETCH_SECONDS[-1])
     return min((whole, pieces), key=lambda one: one.chi_square)
 
 
@@ -241,7 +250,7 @@ def _covariance(found: _Fit) -> Array:
         return np.asarray(plain)
     if not problem.stretched:
         runs = optimum.runs(problem.long_runs)
-        scattered = robust_covariance(runs, optimum, OUTLIER, STRETCHES)[:shared, :shared]
+        scattered = robust_covariance(runs, optimum, OUTLIER_BOUND, SCATTER_PARTS)[:shared, :shared]
         if np.all(np.isfinite(scattered)):
             plain = _bounded(found, scattered, plain)
     if problem.drive == "force" and not problem.hold:
@@ -277,7 +286,7 @@ def _stiff(model: InForce, h: float) -> bool:
 
 
 def _imposed(model: InForce, problem: Problem, rng: np.random.Generator) -> LogEstimate:
-    """Sliding friction of a body led along a path, from the force equation."""
+    """Sliding friction under imposed motion, from the force equation."""
     fit = fit_imposed(problem, rng, model.rig, "as the model in force")
     every = fit.friction
     values = np.array([float(getattr(every, name)) for name in fit.free])

@@ -6,17 +6,17 @@ windows, from where it is; and once more with the band looked for, where that le
 
 import numpy as np
 
+from identification.drift.karnopp_estimate import DRAWN, LIKE, NOT_FOLLOWED, LogEstimate
+from identification.drift.reference_model import InForce
 from identification.errors import BadLog, NotIdentifiable
-from identification.evidence import moving
-from identification.identifiability import estimates, events_of
-from identification.in_force import InForce
-from identification.karnopp import NAMES
+from identification.estimation.output_error.identifiability import estimates, events_of
+from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.windowed_run.refinement import RESCUES, refit, values_of
+from identification.estimation.windowed_run.windows import starts, window_run
 from identification.log import Log
-from identification.log_estimate import DRAWN, LIKE, MISFIT, LogEstimate
-from identification.plant import Motor
-from identification.refit import RESCUES, refit, values_of
-from identification.result import Drive
-from identification.starts import starts, window_run
+from identification.model.estimates import Drive
+from identification.model.karnopp import NAMES
+from identification.model.plant import Motor
 
 
 def estimate_with_effects(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
@@ -35,10 +35,10 @@ def estimate_with_effects(model: InForce, log: Log, rng: np.random.Generator) ->
     for name in ("F", "u") if drive == "command" else ("F",):
         if name not in log:
             raise BadLog(f"{log.name}: no signal {name!r}, by which the model is driven; log it")
-    one = moving(log, held=held, by_command=drive == "command" and not held)
+    one = motion_log(log, held=held, by_command=drive == "command" and not held)
     if not np.any(one.signals["d"]):
         raise NotIdentifiable(f"{log.name}: no motion above the noise; record a run that moves")
-    allowed = MISFIT if model.chi_square <= MISFIT else LIKE * model.chi_square
+    allowed = NOT_FOLLOWED if model.chi_square <= NOT_FOLLOWED else LIKE * model.chi_square
     found = refit(model.plant, [one], drive, prior={}, effort="near")
     searched = found.misfit > allowed
     if searched:

@@ -7,17 +7,17 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.drift_chart import fresh_state
-from identification.drift_test import DriftTest, Settings, drift_test, judged
+from identification.drift.drift_test import DriftSettings, DriftTest, drift_test, judged_estimate
+from identification.drift.karnopp_estimate import LogEstimate
+from identification.drift.mewma import fresh_state
+from identification.drift.reference_model import InForce, in_force
+from identification.effects._library import built_in
 from identification.errors import BadSpecification
-from identification.in_force import InForce, in_force
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.log_estimate import LogEstimate
-from identification.output_error import fit_karnopp
-from identification.plant import Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.simulation.free_run import free_run
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, made_log, table
 
 FORCE = Rig("force")
@@ -71,7 +71,7 @@ def test_table_2_to_table_3_is_found_from_one_log() -> None:
 
 
 def test_a_change_within_the_margin_is_no_drift_however_sure() -> None:
-    sure = Settings(variation=0.0)
+    sure = DriftSettings(variation=0.0)
     log = made_log(scaled(1.015, "F_cp", "F_cn"), seed=6)
     found = drift_test(model(), log, np.random.default_rng(2), settings=sure)
     assert found.verdict == "none"
@@ -139,18 +139,18 @@ def two(correlation: float) -> tuple[InForce, LogEstimate]:
 
 
 def test_errors_that_go_together_are_one_accident_and_not_two() -> None:
-    settings = Settings(variation=0.001)
+    settings = DriftSettings(variation=0.001)
     for correlation, verdict in ((0.98, "none"), (0.0, "drift")):
         known, log = two(correlation)
-        found = judged(known, log, "log", fresh_state("", known.names), settings)
+        found = judged_estimate(known, log, "log", fresh_state("", known.names), settings)
         assert found.verdict == verdict
 
 
 def test_the_models_own_error_counts() -> None:
     known, log = two(0.0)
-    settings = Settings(variation=0.001)
+    settings = DriftSettings(variation=0.001)
     unsure = replace(known, covariance=np.diag((0.03 * known.values) ** 2))
-    found = judged(unsure, log, "log", fresh_state("", known.names), settings)
+    found = judged_estimate(unsure, log, "log", fresh_state("", known.names), settings)
     assert found.verdict == "none"
 
 
@@ -159,4 +159,4 @@ def test_the_models_own_error_counts() -> None:
 )
 def test_wrong_settings_are_refused(wrong: dict[str, float]) -> None:
     with pytest.raises(BadSpecification, match=next(iter(wrong))):
-        Settings(**wrong)
+        DriftSettings(**wrong)

@@ -1,0 +1,1 @@
+"""Whether a machine has changed since its model: one log, and the mean over many."""
