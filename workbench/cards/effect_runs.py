@@ -11,12 +11,12 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Acting, Effect
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
 from identification.log import Log
-from identification.plant import Actuator, Motor, Plant
-from identification.simulate import FreeRun, free_run
-from identification.stepping import SLIP_N, SLIP_P
-from workbench.effect_contract import (
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.free_run import FreeRun, free_run
+from identification.simulation.karnopp_step import SLIP_N, SLIP_P
+from workbench.cards.effect_contract import (
     Broken,
     check_declaration,
     check_depends_on,

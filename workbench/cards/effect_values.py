@@ -5,11 +5,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from identification.effects._base import Acting, Effect
+from identification.effects._library import Library
 from identification.errors import BadCard, BadModel
-from identification.library import Library
-from identification.result import Estimate
-from workbench.parameter_units import in_unit
-from workbench.units import Motion, conversion
+from identification.model.estimates import Estimate
+from workbench.cards.nearest import nearest
+from workbench.cards.parameter_units import in_unit
+from workbench.cards.units import Motion, conversion
 
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
 _EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
@@ -25,8 +26,6 @@ def effect_units(effect: Effect, motion: Motion) -> dict[str, str]:
 
 def known_effect(key: str, library: Library) -> Effect:
     """The effect of that key; raises BadModel with the nearest one where there is none."""
-    from workbench.card import nearest
-
     if key not in library:
         raise BadModel(
             f"unknown effect {key!r}{nearest(key, library)}; one of your own needs its folder:"
@@ -103,8 +102,6 @@ def exact(acting: Acting, motion: Motion) -> dict[str, Estimate]:
 
 
 def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
-    from workbench.card import nearest
-
     for name in given:
         if name not in effect.names:
             raise BadModel(f"{key}: unknown parameter {name!r}{nearest(name, effect.names)}")

@@ -5,10 +5,10 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from identification.errors import BadCard, BadModel
-from identification.karnopp import ROTARY_UNITS, UNITS
-from identification.plant import ACTUATOR_UNITS, ROTARY_ACTUATOR_UNITS
-from identification.result import Estimate
-from workbench.units import Motion, conversion
+from identification.model.estimates import Estimate
+from identification.model.karnopp import ROTARY_UNITS, UNITS
+from identification.model.plant import ACTUATOR_UNITS, ROTARY_ACTUATOR_UNITS
+from workbench.cards.units import Motion, conversion
 
 
 class Shown(NamedTuple):

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from identification.errors import BadCard
-from identification.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
-from identification.plant import Actuator, Motor
-from workbench.card import load_card
-from workbench.recipe import PD, PID, RST, ForcePI, Recipe
+from identification.model.plant import Actuator, Motor
+from identification.signals.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
+from workbench.cards.card import load_card
+from workbench.cards.recipe import Recipe, RecipeForcePI, RecipePD, RecipePID, RecipeRST
 
 HEAD = '[card]\nname = "a"\n[rig]\nkind = "force"\n'
 RECIPE = """
@@ -43,8 +43,8 @@ def test_a_recipe_is_read_whole(tmp_path: Path) -> None:
     ]
     assert found.reference == Steps((0.0, 0.1), 0.5)
     assert found.loop is not None
-    assert found.loop.position == PD(200.0, 0.1, 0.2)
-    assert found.loop.force == ForcePI(0.02, 0.05)
+    assert found.loop.position == RecipePD(200.0, 0.1, 0.2)
+    assert found.loop.force == RecipeForcePI(0.02, 0.05)
     assert (found.seed, found.noise_F, found.noise_y) == (7, 0.01, 0.0)
     assert len(found.t) == 2001
     assert found.t[-1] == pytest.approx(2.0)
@@ -87,8 +87,8 @@ def test_every_reference(tmp_path: Path, text: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ('{ kind = "PID", k_R = 9, T_d = 0.1, T_i = 1, eps = 0.2 }', PID(9.0, 0.1, 1.0, 0.2)),
-        ('{ kind = "RST", R = [1, 2], S = [1], T = [3] }', RST((1.0, 2.0), (1.0,), (3.0,))),
+        ('{ kind = "PID", k_R = 9, T_d = 0.1, T_i = 1, eps = 0.2 }', RecipePID(9.0, 0.1, 1.0, 0.2)),
+        ('{ kind = "RST", R = [1, 2], S = [1], T = [3] }', RecipeRST((1.0, 2.0), (1.0,), (3.0,))),
     ],
 )
 def test_every_position_controller(tmp_path: Path, text: str, value: object) -> None:

@@ -10,32 +10,32 @@ Beyond the contract's example a card may say (all optional, all additive):
              rows = "data"       # json key, HDF5 group or MAT struct ("a.b") that holds the signals
     [signals] a column number counts from 0; column = gain * signal + offset, the offset in the
              column's unit; gain = "80 V/m" beside the column's unit = "V", or a number: see
-             workbench/sensors.py; bits = 16, signed = true reads a column logged as unsigned as
-             two's complement; a scalar beside the rows is a constant signal
+             workbench/cards/sensors.py; bits = 16, signed = true reads a column logged as
+             unsigned as two's complement; a scalar beside the rows is a constant signal
     [rig]    kind = "force": areas and pressures given as well make F_e = F + S_p p_p - S_n p_n
     [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
     [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
-    [recipe] see workbench/recipe.py
+    [recipe] see workbench/cards/recipe.py
 """
 
 import re
 import tomllib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, ValidationError, model_validator
 
+from identification.effects._library import Library
 from identification.errors import BadCard, BadModel
-from identification.library import Library
 from identification.log import Rig, RigKind
+from workbench.cards.nearest import nearest
+from workbench.cards.recipe import CardTable, Positive, Recipe, RecipeSection
+from workbench.cards.sensors import column_scale, parse_gain
+from workbench.cards.units import Motion, Scale, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
-from workbench.recipe import Positive, Recipe, RecipeSection, Section
-from workbench.sensors import column_scale, parse_gain
-from workbench.units import Motion, Scale, si_unit
 
 Format = Literal["csv", "parquet", "mat", "hdf5", "json"]
 
@@ -49,7 +49,7 @@ _NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
 _CANONICAL = ("t", "y", "F", "p_p", "p_n", "u")
 
 
-class About(Section):
+class About(CardTable):
     """`[card]`: name of the set and where it comes from."""
 
     name: str = Field(pattern=r"^[\w.-]+$")
@@ -61,7 +61,7 @@ class About(Section):
     notes: tuple[str, ...] = ()
 
 
-class FileSpec(Section):
+class FileSpec(CardTable):
     """`[file]`: how the bytes are laid out; `None` means found by looking."""
 
     format: Format | None = None
@@ -74,8 +74,8 @@ class FileSpec(Section):
     encoding: str = "utf-8"
 
 
-class SignalSpec(Section):
-    """One signal: column = gain * signal + offset (see workbench/sensors.py)."""
+class SignalSpec(CardTable):
+    """One signal: column = gain * signal + offset (see workbench/cards/sensors.py)."""
 
     column: str | int
     unit: str
@@ -97,7 +97,7 @@ class SignalSpec(Section):
         return column_scale(self.unit, self.gain if given else None, signal, motion)
 
 
-class RigSection(Section):
+class RigSection(CardTable):
     """`[rig]` as a card writes it."""
 
     kind: RigKind
@@ -133,7 +133,7 @@ class RigSection(Section):
         )
 
 
-class FileEntry(Section):
+class FileEntry(CardTable):
     """`[[files]]`: one file of the set, where to fetch it, and what of the rig differs for it."""
 
     name: str
@@ -142,7 +142,7 @@ class FileEntry(Section):
     rig: dict[str, Any] = Field(default_factory=dict)
 
 
-class _CardFile(Section):
+class _CardFile(CardTable):
     card: About
     rig: RigSection
     signals: dict[str, SignalSpec] = Field(default_factory=dict)
@@ -289,19 +289,9 @@ def _shown(found: object) -> str:
     return " ".join(repr(found).split())[:60]
 
 
-def nearest(key: str, known: Iterable[str]) -> str:
-    """The end of a message on an unknown name: the nearest known one, and what there is."""
-    names = [str(name) for name in known]
-    lowered = {name.lower(): name for name in reversed(names)}
-    close = get_close_matches(key.lower(), lowered, n=1, cutoff=0.5)
-    guess = f"; did you mean {lowered[close[0]]!r}?" if close else ";"
-    listed = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
-    return f"{guess} (there is: {listed or 'nothing'})"
-
-
 def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
     """Keys of the section that stands at `loc`, found by walking the sections' fields."""
-    sections: list[type[Section]] = [_CardFile]
+    sections: list[type[CardTable]] = [_CardFile]
     for part in loc:
         found = [s.model_fields[str(part)].annotation for s in sections if part in s.model_fields]
         if found:
@@ -311,14 +301,14 @@ def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
     return [key for section in sections for key in section.model_fields]
 
 
-def _sections_in(annotation: Any) -> list[type[Section]]:
-    if isinstance(annotation, type) and issubclass(annotation, Section):
+def _sections_in(annotation: Any) -> list[type[CardTable]]:
+    if isinstance(annotation, type) and issubclass(annotation, CardTable):
         return [annotation]
     parts = getattr(annotation, "__args__", ())
     return [section for part in parts for section in _sections_in(part)]
 
 
-def _tag(section: type[Section]) -> str | None:
+def _tag(section: type[CardTable]) -> str | None:
     field = section.model_fields.get("kind")
     tags = [str(tag) for tag in getattr(field.annotation, "__args__", ())] if field else []
     return tags[0] if len(tags) == 1 else None

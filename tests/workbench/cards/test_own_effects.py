@@ -11,21 +11,21 @@ from typing import Any
 
 import pytest
 
-import workbench.own_effects
+import workbench.cards.own_effects
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.library import built_in
-from workbench.own_effects import GROUP, library, load_effect
+from workbench.cards.own_effects import GROUP, library, load_effect
 
 MAGNET = (
     "\n".join(
         line.removeprefix("    ")
-        for line in (workbench.own_effects.__doc__ or "").split("it can too:")[1].splitlines()
+        for line in (workbench.cards.own_effects.__doc__ or "").split("it can too:")[1].splitlines()
     )
     .split("`identification/")[0]
     .strip()
     + "\n"
 )
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def written(folder: Path, text: str = MAGNET, name: str = "magnet.py") -> Path:
@@ -120,7 +120,7 @@ def test_without_a_place_for_a_cache_it_works_all_the_same(
 
 def test_kernels_are_cached_for_the_next_process(tmp_path: Path) -> None:
     path = written(tmp_path / "own")
-    code = "import sys, pathlib; from workbench.own_effects import library\n"
+    code = "import sys, pathlib; from workbench.cards.own_effects import library\n"
     code += "effect = library([pathlib.Path(sys.argv[1])])['magnet']\n"
     code += "print(effect.pointers[0].cache_hits)"
     hits = [
@@ -152,7 +152,7 @@ def test_effects_of_installed_packages_join_too(
             assert group == GROUP
             return [pointing(loaded)]
 
-        monkeypatch.setattr(workbench.own_effects, "entry_points", points)
+        monkeypatch.setattr(workbench.cards.own_effects, "entry_points", points)
 
     with_point(effect)
     assert library()["magnet"] is effect

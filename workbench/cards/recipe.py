@@ -31,22 +31,29 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from identification.arrays import Array
-from identification.check import SHORTEST
 from identification.effects._base import Acting
+from identification.effects._library import Library, built_in
 from identification.errors import BadModel
-from identification.excitation import Multisine, Ramps, RandomSteps, ReferenceSpec, Steps, Sum
-from identification.karnopp import Karnopp
-from identification.library import Library, built_in
-from identification.plant import Actuator, Motor, Plant
-from workbench.effect_values import written_effect
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.signals.check import SHORTEST_LOG
+from identification.signals.excitation import (
+    Multisine,
+    Ramps,
+    RandomSteps,
+    ReferenceSpec,
+    Steps,
+    Sum,
+)
+from workbench.cards.effect_values import written_effect
+from workbench.cards.units import Motion
 from workbench.files import ABSURD
-from workbench.units import Motion
 
 LONGEST = 1e8  # samples of a recipe: a gigabyte a signal
 
 
 @dataclass(frozen=True)
-class PD:
+class RecipePD:
     """k_d (1 + T_d s/(eps s + 1)); k_d [N/m], times [s]."""
 
     k_d: float
@@ -55,7 +62,7 @@ class PD:
 
 
 @dataclass(frozen=True)
-class PID:
+class RecipePID:
     """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)); k_R [N/m], times [s]."""
 
     k_R: float
@@ -65,7 +72,7 @@ class PID:
 
 
 @dataclass(frozen=True)
-class RST:
+class RecipeRST:
     """Polynomials in z^-1: S(z^-1) F_ref = T(z^-1) r - R(z^-1) y."""
 
     R: tuple[float, ...]
@@ -74,7 +81,7 @@ class RST:
 
 
 @dataclass(frozen=True)
-class ForcePI:
+class RecipeForcePI:
     """The force loop C_F = k_i (1 + 1/(T_i s)); k_i [V/N], T_i [s]."""
 
     k_i: float
@@ -85,8 +92,8 @@ class ForcePI:
 class LoopSpec:
     """Position controller, force controller (`None` for a motor) and limit of the command [V]."""
 
-    position: PD | PID | RST
-    force: ForcePI | None = None
+    position: RecipePD | RecipePID | RecipeRST
+    force: RecipeForcePI | None = None
     control_limit: float | None = None
 
 
@@ -117,7 +124,7 @@ class Recipe:
         return self.h * np.arange(round(self.duration / self.h) + 1, dtype=np.float64)
 
 
-class Section(BaseModel):
+class CardTable(BaseModel):
     """A table of a card: unknown keys are refused with the nearest right one."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
@@ -144,7 +151,7 @@ def _refuse_absurd(key: str, value: object) -> None:
             )
 
 
-def _takes_bool(section: type[Section], key: str) -> bool:
+def _takes_bool(section: type[CardTable], key: str) -> bool:
     annotation = section.model_fields[key].annotation
     return annotation is bool or bool in getattr(annotation, "__args__", ())
 
@@ -153,7 +160,7 @@ Positive = Annotated[float, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 
 
-class StepsSection(Section):
+class StepsSection(CardTable):
     """`Steps` as a card writes it."""
 
     kind: Literal["steps"]
@@ -165,7 +172,7 @@ class StepsSection(Section):
         return Steps(self.levels, self.dwell_s)
 
 
-class RandomStepsSection(Section):
+class RandomStepsSection(CardTable):
     """`RandomSteps` as a card writes it."""
 
     kind: Literal["random_steps"]
@@ -177,7 +184,7 @@ class RandomStepsSection(Section):
         return RandomSteps(self.amplitude, self.dwell_s)
 
 
-class RampsSection(Section):
+class RampsSection(CardTable):
     """`Ramps` as a card writes it."""
 
     kind: Literal["ramps"]
@@ -189,7 +196,7 @@ class RampsSection(Section):
         return Ramps(self.amplitude, self.rate)
 
 
-class MultisineSection(Section):
+class MultisineSection(CardTable):
     """`Multisine` as a card writes it."""
 
     kind: Literal["multisine"]
@@ -209,7 +216,7 @@ class MultisineSection(Section):
         return Multisine(self.amplitude, self.low_hz, self.high_hz, self.lines)
 
 
-class SumSection(Section):
+class SumSection(CardTable):
     """`Sum` as a card writes it."""
 
     kind: Literal["sum"]
@@ -233,21 +240,21 @@ def _multisines(reference: ReferenceSection) -> list[MultisineSection]:
     return [reference] if isinstance(reference, MultisineSection) else []
 
 
-class PDSection(Section):
-    """`PD` as a card writes it."""
+class PDSection(CardTable):
+    """`RecipePD` as a card writes it."""
 
     kind: Literal["PD"]
     k_d: Positive
     T_d: NotNegative
     eps: Positive
 
-    def value(self) -> PD:
+    def value(self) -> RecipePD:
         """The controller."""
-        return PD(self.k_d, self.T_d, self.eps)
+        return RecipePD(self.k_d, self.T_d, self.eps)
 
 
-class PIDSection(Section):
-    """`PID` as a card writes it."""
+class PIDSection(CardTable):
+    """`RecipePID` as a card writes it."""
 
     kind: Literal["PID"]
     k_R: Positive
@@ -255,32 +262,32 @@ class PIDSection(Section):
     T_i: Positive
     eps: Positive
 
-    def value(self) -> PID:
+    def value(self) -> RecipePID:
         """The controller."""
-        return PID(self.k_R, self.T_d, self.T_i, self.eps)
+        return RecipePID(self.k_R, self.T_d, self.T_i, self.eps)
 
 
-class RSTSection(Section):
-    """`RST` as a card writes it."""
+class RSTSection(CardTable):
+    """`RecipeRST` as a card writes it."""
 
     kind: Literal["RST"]
     R: tuple[float, ...] = Field(min_length=1)
     S: tuple[float, ...] = Field(min_length=1)
     T: tuple[float, ...] = Field(min_length=1)
 
-    def value(self) -> RST:
+    def value(self) -> RecipeRST:
         """The controller."""
-        return RST(self.R, self.S, self.T)
+        return RecipeRST(self.R, self.S, self.T)
 
 
-class ForceSection(Section):
-    """`ForcePI` as a card writes it."""
+class ForceSection(CardTable):
+    """`RecipeForcePI` as a card writes it."""
 
     k_i: Positive
     T_i: Positive
 
 
-class LoopSection(Section):
+class LoopSection(CardTable):
     """`LoopSpec` as a card writes it."""
 
     position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")]
@@ -289,11 +296,11 @@ class LoopSection(Section):
 
     def value(self) -> LoopSpec:
         """The loop."""
-        force = ForcePI(self.force.k_i, self.force.T_i) if self.force else None
+        force = RecipeForcePI(self.force.k_i, self.force.T_i) if self.force else None
         return LoopSpec(self.position.value(), force, self.control_limit_v)
 
 
-class FrictionSection(Section):
+class FrictionSection(CardTable):
     """The nine parameters; signs are checked by `Karnopp`."""
 
     m: float
@@ -307,20 +314,20 @@ class FrictionSection(Section):
     F_sn: float
 
 
-class ActuatorSection(Section):
+class ActuatorSection(CardTable):
     """The linear electro-pneumatic actuator."""
 
     k1: Positive
     k2: NotNegative
 
 
-class MotorSection(Section):
+class MotorSection(CardTable):
     """The motor without dynamics."""
 
     k_a: float
 
 
-class RecipeSection(Section):
+class RecipeSection(CardTable):
     """`[recipe]` of a card."""
 
     duration_s: Positive
@@ -347,10 +354,10 @@ class RecipeSection(Section):
         if self.loop and (self.loop.force is None) != (self.actuator is None):
             raise ValueError("needs loop.force with an actuator, and none with a motor")
         samples = self.duration_s / self.h_s
-        if not SHORTEST <= samples <= LONGEST:
+        if not SHORTEST_LOG <= samples <= LONGEST:
             raise ValueError(
                 f"duration_s = {self.duration_s:g} at h_s = {self.h_s:g} makes {samples:.4g}"
-                f" samples, {SHORTEST} to {LONGEST:.0e} needed"
+                f" samples, {SHORTEST_LOG} to {LONGEST:.0e} needed"
             )
         for part in _multisines(self.reference):
             if part.high_hz >= 0.5 / self.h_s:
@@ -395,6 +402,6 @@ class RecipeSection(Section):
 
 
 def _installed() -> Library:
-    from workbench.own_effects import library
+    from workbench.cards.own_effects import library
 
     return library()

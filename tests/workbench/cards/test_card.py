@@ -6,7 +6,7 @@ import pytest
 
 from identification.errors import BadCard
 from identification.log import Rig
-from workbench.card import load_card
+from workbench.cards.card import load_card
 
 CONTRACT = """
 [card]

@@ -11,7 +11,7 @@ import re
 from typing import NamedTuple
 
 from identification.errors import BadCard
-from workbench.units import LONGEST, Motion, Scale, conversion, kind, scale_or_none, si_unit
+from workbench.cards.units import LONGEST, Motion, Scale, conversion, kind, scale_or_none, si_unit
 
 _GAIN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)?\s*(.*?)\s*", re.DOTALL)
 _OUTPUTS = ("V", "A", "1")  # what sensors give; a number as gain is taken for these only

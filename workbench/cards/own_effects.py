@@ -55,8 +55,8 @@ from typing import Any
 import numba
 
 from identification.effects._base import Effect
+from identification.effects._library import Library, built_in, declared, joined_library
 from identification.errors import BadModel, UserError
-from identification.library import Library, built_in, declared, joined
 from workbench.links import broken_link
 
 GROUP = "workbench.effects"
@@ -103,7 +103,7 @@ def _with(found: Library, origin: dict[str, str], effect: Effect, where: str) ->
             f"{where}: its key {effect.key!r} is taken by {origin[effect.key]}; rename one"
         )
     origin[effect.key] = where
-    return joined([effect], found)
+    return joined_library([effect], found)
 
 
 def _of_package(point: EntryPoint, where: str) -> Effect:

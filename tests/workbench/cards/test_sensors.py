@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from identification.errors import BadCard
 from tests.workbench.log_files import CARD, card, signals, write_csv
-from workbench.logs import read_log
-from workbench.recording import as_columns
-from workbench.sensors import Gain, column_scale, parse_gain
-from workbench.units import Motion
+from workbench.cards.sensors import Gain, column_scale, parse_gain
+from workbench.cards.units import Motion
+from workbench.logs.runs import read_log
+from workbench.steps.simulate import as_columns
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,8 @@
 """What every effect must hold to, checked on its declaration and its kernels alone.
 
-Each check raises `Broken` with what it found; `workbench/effect_runs.py` has those that need a run.
-The equation is read by a computer-algebra package, so it is no copy of the kernel: where the two
-differ, one of them is wrong.
+Each check raises `Broken` with what it found; `workbench/cards/effect_runs.py` has those that
+need a run. The equation is read by a computer-algebra package, so it is no copy of the kernel:
+where the two differ, one of them is wrong.
 """
 
 import ctypes
@@ -14,14 +14,9 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.effects._base import (
-    AT_REST,
-    MAX_PARAMS,
-    MAX_SIGNALS,
-    Effect,
-)
+from identification.effects._base import AT_REST, MAX_PARAMS, MAX_SIGNALS, Effect
 from identification.errors import UserError
-from workbench.units import si_unit
+from workbench.cards.units import si_unit
 
 STATE = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
 UNITS = dict(t="s", y="m", v="m/s", F="N", u="V", d="1", c="N", f="N")
@@ -46,7 +41,7 @@ class Draw:
     dt: float
 
 
-def draw(effect: Effect, rng: np.random.Generator) -> Draw:
+def drawn_arguments(effect: Effect, rng: np.random.Generator) -> Draw:
     """Every argument at random, parameters within their bounds, around what is typical."""
     y = float(rng.normal(0.0, 0.1))
     near = y + float(rng.normal(0.0, 2e-4))
@@ -68,14 +63,14 @@ def draw(effect: Effect, rng: np.random.Generator) -> Draw:
     return Draw({k: float(a) for k, a in x.items()}, s, p, float(rng.uniform(1e-5, 1e-2)))
 
 
-def compiled(effect: Effect, part: str, one: Draw) -> float:
+def compiled_answer(effect: Effect, part: str, one: Draw) -> float:
     """The compiled kernel's answer."""
     pointer = effect.pointers[PARTS.index(part)].ctypes
     at = [a.ctypes.data_as(ctypes.POINTER(ctypes.c_double)) for a in (one.s, one.p)]
     return float(pointer(*([one.dt] if part == "evolve" else []), *one.x.values(), *at))
 
 
-def plain(effect: Effect, part: str, one: Draw) -> float:
+def python_answer(effect: Effect, part: str, one: Draw) -> float:
     """The same kernel run by Python."""
     kernel = {"value": effect.value, "evolve": effect.evolve, "initial": effect.initial}[part]
     assert kernel is not None
@@ -102,12 +97,12 @@ def check_equation(effect: Effect) -> None:
     """Compiled kernel, plain Python and written equation give the same at random arguments."""
     rng, equation = np.random.default_rng(7), _written(effect)
     for _ in range(DRAWS):
-        one = draw(effect, rng)
+        one = drawn_arguments(effect, rng)
         expected = equation(one)
         size = SAME * max(1.0, abs(expected), abs(one.x["y"]))
         for how, found in (
-            ("run by Python", plain(effect, "value", one)),
-            ("compiled", compiled(effect, "value", one)),
+            ("run by Python", python_answer(effect, "value", one)),
+            ("compiled", compiled_answer(effect, "value", one)),
         ):
             if not abs(found - expected) <= size:
                 raise Broken(
@@ -116,7 +111,10 @@ def check_equation(effect: Effect) -> None:
                 )
         for part in PARTS[1:]:
             if getattr(effect, part) is not None:
-                by_hand, found = plain(effect, part, one), compiled(effect, part, one)
+                by_hand, found = (
+                    python_answer(effect, part, one),
+                    compiled_answer(effect, part, one),
+                )
                 if not abs(found - by_hand) <= SAME * max(1.0, abs(by_hand)):
                     raise Broken(
                         f"{part} gives {by_hand:.6g} run by Python and {found:.6g} compiled at"
@@ -129,14 +127,14 @@ def check_linear(effect: Effect) -> None:
     rng = np.random.default_rng(8)
     where = [i for i, p in enumerate(effect.params) if p.linear]
     for _ in range(DRAWS if where else 0):
-        one, other = draw(effect, rng), draw(effect, rng)
+        one, other = drawn_arguments(effect, rng), drawn_arguments(effect, rng)
         first, second, middle, nought = one.p, one.p.copy(), one.p.copy(), one.p.copy()
         share = float(rng.uniform(-2.0, 3.0))
         second[where] = other.p[where]
         middle[where] = share * first[where] + (1.0 - share) * second[where]
         nought[where] = 0.0
         a, b, c, none = (
-            plain(effect, "value", Draw(one.x, one.s, p, one.dt))
+            python_answer(effect, "value", Draw(one.x, one.s, p, one.dt))
             for p in (first, second, middle, nought)
         )
         size = 1e-9 * (abs(a) + abs(b) + abs(none)) + 1e-300  # a number may lose its digits
@@ -217,9 +215,9 @@ def _moves(effect: Effect, part: str, change: Callable[[Draw, Draw], Draw]) -> b
     own = "y" if place.shows else "u" if place.on_command and not place.delays else None
     base = own if part == "value" else None
     for _ in range(DRAWS):
-        one = draw(effect, rng)
-        two = change(one, draw(effect, rng))
-        a, b = (plain(effect, part, k) - (k.x[base] if base else 0.0) for k in (one, two))
+        one = drawn_arguments(effect, rng)
+        two = change(one, drawn_arguments(effect, rng))
+        a, b = (python_answer(effect, part, k) - (k.x[base] if base else 0.0) for k in (one, two))
         if abs(a - b) > 1e-9 * max(abs(a), abs(b), 1e-9):
             return True
     return False

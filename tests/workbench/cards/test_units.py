@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.errors import BadCard
-from workbench.units import Motion, scale
+from workbench.cards.units import Motion, scale
 
 
 @pytest.mark.parametrize(
