@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 
 from identification.errors import BadCard, BadLog
-from workbench.card import Card, FileEntry, nearest
+from workbench.cards.card import Card, FileEntry
+from workbench.cards.nearest import nearest
 from workbench.files import refuse_special
 from workbench.links import broken_link
 
@@ -15,7 +16,7 @@ VARIABLE = "WORKBENCH_DATA"
 
 def shipped_cards() -> dict[str, Path]:
     """Paths of the shipped cards by name, from the wheel or else from the checkout."""
-    here = Path(__file__).resolve().parent
+    here = Path(__file__).resolve().parents[1]
     for root in (here / "_datasets", here.parent / "datasets"):
         found = {path.parent.name: path for path in sorted(root.glob("*/card.toml"))}
         if found:

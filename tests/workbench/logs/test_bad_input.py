@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from identification.errors import UserError
 from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv
-from workbench.card import load_card
-from workbench.logs import read_log, read_runs
+from workbench.cards.card import load_card
+from workbench.logs.runs import read_log, read_runs
 
 
 def refusal(path: Path, text: str = CARD) -> str:

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from identification.errors import BadCard, BadLog
-from workbench.card import Card, load_card
-from workbench.fetch import VARIABLE, card_path, find_data, shipped_cards
+from workbench.cards.card import Card, load_card
+from workbench.logs.fetch import VARIABLE, card_path, find_data, shipped_cards
 
 BYTES = b"t,y,F\n0,0,0\n"
 

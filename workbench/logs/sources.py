@@ -7,11 +7,20 @@ from pathlib import Path
 
 from identification.errors import BadLog
 from identification.log import Log, Rig
-from workbench.card import Card, load_card
-from workbench.fetch import card_path, find_data
-from workbench.identifying import Source
-from workbench.logs import fingerprint, read_runs
-from workbench.plausible import log_remarks
+from workbench.cards.card import Card, load_card
+from workbench.documents.plausible import log_remarks
+from workbench.logs.fetch import card_path, find_data
+from workbench.logs.runs import fingerprint, read_runs
+
+
+@dataclass(frozen=True)
+class Source:
+    """One run of a file: its log on an even clock, the file's name, hash and rows."""
+
+    log: Log
+    file: str
+    sha256: str
+    rows: int
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import BadLog
-from workbench.card import FileSpec, Format, nearest
+from workbench.cards.card import FileSpec, Format
+from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger, refuse_special
 from workbench.links import broken_link
-from workbench.mat import tags_are_sound
-from workbench.text import read_text_table
+from workbench.logs.mat import tags_are_sound
+from workbench.logs.text import read_text_table
 
 RawColumn = NDArray[Any]
 MOST_ROWS = 20_000_000  # of which a gigabyte of signals can be made

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array, frozen
-from identification.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.errors import BadCard, BadLog
 from identification.log import Log
-from identification.thin import LARGEST, thinned
-from workbench.card import Card, SignalSpec
+from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
+from identification.signals.thin import LARGEST, thinned
+from workbench.cards.card import Card, SignalSpec
 from workbench.files import ABSURD
-from workbench.tables import damaged, read_table
+from workbench.logs.tables import damaged, read_table
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import BadLog
-from workbench.card import FileSpec
+from workbench.cards.card import FileSpec
 from workbench.files import refuse_larger
 
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)

@@ -14,7 +14,7 @@ from hypothesis.extra.numpy import arrays
 
 from identification.arrays import Array
 from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv, write_parquet
-from workbench.logs import fingerprint, read_log, read_runs
+from workbench.logs.runs import fingerprint, read_log, read_runs
 
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)
 

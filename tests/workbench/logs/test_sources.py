@@ -6,7 +6,7 @@ import pytest
 
 from identification.errors import BadLog
 from tests.workbench.log_files import CARD, signals
-from workbench.sources import read_sources
+from workbench.logs.sources import read_sources
 
 
 def files(folder: Path, *names: str) -> list[str]:

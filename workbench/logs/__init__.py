@@ -1,0 +1,1 @@
+"""Log files: found, read in any format, as runs in SI."""
