@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
-from workbench.card import nearest
+from workbench.cards.nearest import nearest
 from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 from workbench.links import broken_link
 

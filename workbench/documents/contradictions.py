@@ -9,10 +9,10 @@ from math import sqrt
 from typing import TYPE_CHECKING
 
 from identification.errors import BadModel
-from identification.result import Estimate
+from identification.model.estimates import Estimate
 
 if TYPE_CHECKING:
-    from workbench.model import ModelFile
+    from workbench.documents.model import ModelFile
 
 # Parameters that no machine has this far apart: directions, and breakaway over sliding friction.
 # The widest of the shipped recipes and measured sets are 8.

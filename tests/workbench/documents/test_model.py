@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
-from identification.library import built_in
-from identification.plant import Actuator, Motor
-from identification.result import Estimate
+from identification.model.estimates import Estimate
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, identified, model_of
-from workbench.effect_values import effect_units, relabelled
-from workbench.model import Model, model_document, read_model
+from workbench.cards.effect_values import effect_units, relabelled
+from workbench.documents.model import Model, model_document, read_model
 from workbench.output import dumps
 
 ACTUATOR = Actuator(19530.0, 10405.0)

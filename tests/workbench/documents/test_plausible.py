@@ -8,18 +8,23 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from identification.karnopp import Karnopp
 from identification.log import Log, Rig
-from identification.plant import Actuator
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
-from workbench.card import SignalSpec, load_card
+from workbench.cards.card import SignalSpec, load_card
 from workbench.cli import main
-from workbench.fetch import card_path
-from workbench.model import Model, model_document
+from workbench.documents.model import Model, model_document
+from workbench.documents.plausible import (
+    bandwidth_remarks,
+    log_remarks,
+    model_remarks,
+    stored_remarks,
+)
+from workbench.logs.fetch import card_path
+from workbench.logs.sources import read_sources
 from workbench.output import dumps
-from workbench.plausible import bandwidth_remarks, log_remarks, model_remarks, stored_remarks
-from workbench.sources import read_sources
-from workbench.tuning import design
+from workbench.steps.design import design
 
 UNITS = {"t": "s", "y": "m", "F": "N", "p_p": "bar", "u": "V"}
 SIGNALS = {name: SignalSpec(column=name, unit=unit) for name, unit in UNITS.items()}

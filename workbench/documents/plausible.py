@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.log import Log, Rig
-from workbench.card import SignalSpec
-from workbench.model import LogEntry, Model
+from workbench.cards.card import SignalSpec
+from workbench.documents.model import LogEntry, Model
 
 Slips = tuple[tuple[float, str], ...]
 _TIME: Slips = ((1e-3, "ms"), (1e-6, "us"), (60.0, "min"))

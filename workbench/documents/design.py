@@ -15,13 +15,13 @@ from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
 from identification.errors import BadModel
-from identification.karnopp import NAMES, Karnopp
-from identification.result import Estimate
-from workbench.contradictions import refuse_apart, refuse_unequal
-from workbench.model import as_number, used
-from workbench.parameter_units import converted, friction_units, in_unit, shown
-from workbench.reading import read_result
-from workbench.units import Motion
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES, Karnopp
+from workbench.cards.parameter_units import converted, friction_units, in_unit, shown
+from workbench.cards.units import Motion
+from workbench.documents.contradictions import refuse_apart, refuse_unequal
+from workbench.documents.model import as_number, used
+from workbench.documents.reading import read_result
 
 SCHEMA = "design/2"
 From = Literal["physical", "arx"]

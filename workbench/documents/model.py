@@ -7,16 +7,17 @@ from pathlib import Path
 from typing import Any, Literal
 
 from identification.effects._base import Acting
+from identification.effects._library import Library, built_in
 from identification.errors import BadModel
-from identification.karnopp import NAMES, Karnopp
-from identification.library import Library, built_in
 from identification.log import Rig
-from identification.plant import Actuator, Motor, Plant
-from identification.result import Drive, Estimate
-from workbench.contradictions import refuse_changed_units
-from workbench.effect_values import estimates_in_si, known_effect
-from workbench.parameter_units import actuator_units, all_converted, friction_units, in_unit
-from workbench.reading import read_result
+from identification.model.estimates import Drive, Estimate
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from workbench.cards.effect_values import estimates_in_si, known_effect
+from workbench.cards.nearest import nearest
+from workbench.cards.parameter_units import actuator_units, all_converted, friction_units, in_unit
+from workbench.documents.contradictions import refuse_changed_units
+from workbench.documents.reading import read_result
 
 SCHEMA = "model/1"
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
@@ -117,7 +118,7 @@ class FitSummary:
 
 
 @dataclass(frozen=True)
-class Correlation:
+class ParameterCorrelation:
     """How the errors of the parameters `names` (d,) go together: `matrix` (d, d).
 
     With the standard deviations that stand with the parameters it is their covariance. Raises
@@ -152,7 +153,7 @@ class ModelFile:
     versions: Mapping[str, str]
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     posterior: Mapping[str, Any] | None = None
-    correlation: Correlation | None = None
+    correlation: ParameterCorrelation | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -160,8 +161,6 @@ class ModelFile:
             raise BadModel("[log] is empty; at least one run needed")
         for name in self.friction:
             if name not in NAMES:
-                from workbench.card import nearest
-
                 raise BadModel(f"[friction] unknown key {name!r}{nearest(name, NAMES)}")
         for name in NAMES:
             if name not in self.friction:
@@ -306,7 +305,7 @@ def read_model(path: Path, library: Library | None = None) -> Model:
 
 
 def _installed() -> Library:
-    from workbench.own_effects import library
+    from workbench.cards.own_effects import library
 
     return library()
 

@@ -10,12 +10,12 @@ from typing import Any
 import pytest
 
 from identification.errors import BadModel
-from identification.plant import Actuator
-from identification.result import Estimate
+from identification.model.estimates import Estimate
+from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, model_of
-from workbench.design_values import Design, design_document, read_design
+from workbench.documents.design import Design, design_document, read_design
 from workbench.output import dumps
-from workbench.tuning import design
+from workbench.steps.design import design
 
 BARE = {"sd": None, "low": None, "high": None}
 

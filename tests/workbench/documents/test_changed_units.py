@@ -10,14 +10,14 @@ from typing import Any
 import pytest
 
 from identification.errors import BadModel
-from identification.plant import Actuator
-from identification.result import Estimate
+from identification.model.estimates import Estimate
+from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
 from workbench.cli import main
-from workbench.design_values import design_document, read_design
-from workbench.model import model_document, read_model
+from workbench.documents.design import design_document, read_design
+from workbench.documents.model import model_document, read_model
 from workbench.output import dumps
-from workbench.tuning import design
+from workbench.steps.design import design
 
 Document = dict[str, Any]
 NUMBERS = ("value", "sd", "low", "high")

@@ -1,0 +1,1 @@
+"""What is written and read back: model.json and design.json."""
