@@ -9,18 +9,24 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identification.drift_chart import DriftState
-from identification.drift_test import DriftTest, Settings, Shift, Statistic, Verdict, drift_test
+from identification.drift.drift_test import (
+    DriftSettings,
+    DriftTest,
+    DriftVerdict,
+    Shift,
+    Statistic,
+    drift_test,
+)
+from identification.drift.mewma import DriftState
+from identification.drift.reference_model import InForce
 from identification.errors import BadModel
-from identification.in_force import InForce
-from identification.karnopp import NAMES
-from identification.plant import Motor
-from identification.result import Estimate
-from workbench.identifying import Source
-from workbench.model import Model, as_number, model_document, used, versions
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import Motor
+from workbench.documents.model import Model, as_number, model_document, used, versions
+from workbench.documents.reading import read_result
+from workbench.logs.sources import Source, Sources
 from workbench.output import BadOutput, dumps
-from workbench.reading import read_result
-from workbench.sources import Sources
 
 SCHEMA, STREAM = "drift/1", "drift_stream/1"
 
@@ -31,7 +37,7 @@ class Seen:
 
     file: str
     sha256: str
-    verdict: Verdict
+    verdict: DriftVerdict
     single: float | None
     mean: float | None
 
@@ -60,16 +66,16 @@ class Drifted:
 
     model: Model
     key: str
-    settings: Settings
+    settings: DriftSettings
     tests: tuple[Tested, ...]
     stream: Stream
     remarks: tuple[str, ...]
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> DriftVerdict:
         """The worst of the runs' verdicts; "not_judged" only where none could be judged."""
         found = {one.test.verdict for one in self.tests}
-        order: tuple[Verdict, ...] = ("structure", "drift", "none", "not_judged")
+        order: tuple[DriftVerdict, ...] = ("structure", "drift", "none", "not_judged")
         return next(verdict for verdict in order if verdict in found)
 
 
@@ -122,14 +128,14 @@ def _covariance(model: Model, told: Mapping[str, Estimate]) -> Any:
 
 def drift_of(
     model: Model, key: str, sources: Sources, *, stream: Stream | None = None,
-    settings: Settings | None = None, seed: int = 0,
+    settings: DriftSettings | None = None, seed: int = 0,
 ) -> Drifted:  # fmt: skip
     """The runs tested one after the other against the model.
 
     stream: of the same model, what was stored after earlier logs; one of another model is left
     aside with a remark. Raises BadModel where model and card are not of one kind of machine.
     """
-    settings = settings or Settings()
+    settings = settings or DriftSettings()
     _same_machine(model, sources)
     in_force = replace(model_in_force(model, key), rig=sources.rig)
     remarks = [*model.read, *sources.remarks]

@@ -15,9 +15,9 @@ from identification.arrays import Array, frozen
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.plant import Actuator, Motor, Plant
-from workbench.design_values import Controller, Design
-from workbench.model import Model
+from identification.model.plant import Actuator, Motor, Plant
+from workbench.documents.design import Controller, Design
+from workbench.documents.model import Model
 
 
 def run_loop(
@@ -75,7 +75,7 @@ def in_the_loop(machine: Model) -> tuple[Acting, ...]:
     return tuple(one for one in machine.acting if set(one.effect.signals) <= set(made))
 
 
-def left_out(machine: Model) -> str | None:
+def effects_left_out(machine: Model) -> str | None:
     """Remark on the machine's effects that its simulated loop has not; None where it has all."""
     inside = {one.key for one in in_the_loop(machine)}
     missing = [one.key for one in machine.acting if one.key not in inside]

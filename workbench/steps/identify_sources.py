@@ -5,11 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from identification.result import KarnoppFit
-from workbench.identifying import Options, Progress, Source, identify
-from workbench.model import Model
-from workbench.plausible import model_remarks
-from workbench.sources import Sources
+from identification.model.estimates import KarnoppFit
+from workbench.documents.model import Model
+from workbench.documents.plausible import model_remarks
+from workbench.logs.sources import Source, Sources
+from workbench.steps.identify import Options, Progress, identify
 
 __all__ = ["Identified", "Options", "identify_sources"]
 
@@ -53,7 +53,7 @@ def _posterior(
     sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
 ) -> dict[str, Any]:
     """What the walkers found, as model.json holds it."""
-    from identification.posterior import sample_posterior
+    from identification.estimation.output_error.posterior import sample_posterior
 
     report = on_progress or (lambda _stage, _share: None)
     found = sample_posterior(

@@ -8,26 +8,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.effects._library import built_in
 from identification.errors import BadLog
-from identification.karnopp import NAMES
-from identification.library import built_in
-from identification.trace_result import Dependence, Errors, Residual, Verdict
-from tests.workbench.test_report import checked
+from identification.model.karnopp import NAMES
+from identification.tracing.result import Dependence, Errors, Residual, TraceVerdict
+from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
-from workbench import tracing
-from workbench.model import model_document, read_model
+from workbench.documents.model import model_document, read_model
 from workbench.output import dumps
 from workbench.report.trace import trace_report
 from workbench.report.trace_friction import sliding_friction
 from workbench.report.trace_pictures import (
     along_rows,
     axis_label,
-    inside,
     log_starts,
     pictures,
     running_median,
+    share_inside,
 )
-from workbench.trace_views import (
+from workbench.report.trace_tables import (
     change_head,
     change_rows,
     drift_rows,
@@ -35,10 +34,11 @@ from workbench.trace_views import (
     error_rows,
     percent,
     rival_rows,
-    sentence,
+    trace_sentence,
     trace_view,
 )
-from workbench.tracing import model_of, named_logs, trace_document, trace_sources
+from workbench.steps import trace as tracing
+from workbench.steps.trace import named_logs, trace_document, trace_sources, traced_model
 
 CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
@@ -89,7 +89,7 @@ def test_the_model_after_is_read_back_with_its_effects(tmp_path: Path) -> None:
 
 
 def test_a_force_without_noise_is_no_fault() -> None:
-    model = model_of(replace(trace_of(), noise_force=0.0), sources(), built_in())
+    model = traced_model(replace(trace_of(), noise_force=0.0), sources(), built_in())
     assert model.fit.chi_square == 1.0
 
 
@@ -106,7 +106,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad",
         "N m/rad**3",
     ]
-    assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in sentence(found)
+    assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in trace_sentence(found)
     html = checked(trace_report(found), 4)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[m/s]" not in html
 
@@ -163,9 +163,9 @@ def test_logs_that_are_not_named_are_the_cards() -> None:
     ],
 )
 def test_the_verdict_is_a_plain_sentence(
-    verdict: Verdict, keys: tuple[str, ...], said: str
+    verdict: TraceVerdict, keys: tuple[str, ...], said: str
 ) -> None:
-    text = sentence(traced(trace_of(verdict, keys)))
+    text = trace_sentence(traced(trace_of(verdict, keys)))
     assert said in text
     errors = "Held-out force error 1.83 N -> 0.07 N (sensors' noise 0.069 N)."
     assert (errors in text) == bool(keys)
@@ -173,26 +173,26 @@ def test_the_verdict_is_a_plain_sentence(
 
 def test_signals_that_no_log_has_are_said_in_words() -> None:
     found = replace(trace_of("unknown", ()), unknown=Dependence(("du", "u"), 0.4))
-    text = sentence(traced(found))
+    text = trace_sentence(traced(found))
     assert "depends on the command's rate (du), u (which" in text
 
 
 def test_what_is_left_without_structure_is_not_called_noise() -> None:
-    text = sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
+    text = trace_sentence(traced(replace(trace_of("none", ()), noise_force=0.01)))
     assert text.startswith("No effect is missing that these logs show: what is left (0.07 N")
 
 
 def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     found = replace(trace_of("unknown", ()), unknown=Dependence((), 0.0))
-    text = sentence(traced(replace(found, noise_force=0.01)))
+    text = trace_sentence(traced(replace(found, noise_force=0.01)))
     assert text.startswith("Unknown: the model leaves 0.07 N of force")
     assert "depends on none of the signals" in text
-    text = sentence(traced(found))  # no more force than the sensors' noise: it is in the run
+    text = trace_sentence(traced(found))  # no more force than the sensors' noise: it is in the run
     assert text.startswith("Unknown: the free run is off by") and "m in 2 s" in text
 
 
 def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:
-    text = sentence(traced(replace(trace_of("none", ()), noise_actuator=None)))
+    text = trace_sentence(traced(replace(trace_of("none", ()), noise_actuator=None)))
     assert text.startswith("Nothing is missing in the equation of motion: the model leaves 0.07 N")
 
 
@@ -200,10 +200,12 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
     found = trace_of("effect", ("valve_dead_zone",), actuator=True)
     before = {"train": Errors(0.07, 0.002, 1e-5, 90.0), "test": Errors(0.07, 0.002, 1e-5, 90.0)}
     shown = replace(found, before=before)
-    assert "Held-out error of the actuator equation 90 N/s -> 5 N/s" in sentence(traced(shown))
-    assert "On stretches left out, error of" in sentence(traced(shown, tested=False))
+    assert "Held-out error of the actuator equation 90 N/s -> 5 N/s" in trace_sentence(
+        traced(shown)
+    )
+    assert "On stretches left out, error of" in trace_sentence(traced(shown, tested=False))
     none = {where: Errors(None, None, None, None) for where in before}
-    assert sentence(traced(replace(found, before=none))).endswith("(valve overlap).")
+    assert trace_sentence(traced(replace(found, before=none))).endswith("(valve overlap).")
 
 
 def test_rows_of_the_tables() -> None:
@@ -263,10 +265,10 @@ def test_the_view_for_a_terminal() -> None:
     [("effect", ("stribeck",), 3), ("effect", ("stribeck", "spring"), 4), ("none", (), 3),
      ("drift", (), 3), ("unknown", ("stribeck",), 4), ("inseparable", ("stribeck",), 3)],
 )  # fmt: skip
-def test_the_report(verdict: Verdict, keys: tuple[str, ...], figures: int) -> None:
+def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) -> None:
     found = traced(trace_of(verdict, keys))
     html = checked(trace_report(found), figures)
-    assert re.sub("[<>'&]", "", sentence(found))[:20] in html
+    assert re.sub("[<>'&]", "", trace_sentence(found))[:20] in html
     wanted = ["residual [N]", "95 % of its points in the band", "moving towards +", "Parameters"]
     if keys:
         wanted += ["Rivals, by the force", "Armstrong-Helouvry", "fitted: stribeck"]
@@ -323,7 +325,7 @@ def test_the_running_median_is_not_drawn_across_a_gap() -> None:
 
 
 def test_shares_starts_and_labels() -> None:
-    assert inside(np.array([0.0, 1.9, -2.1, 5.0]), np.ones(4)) == 50.0
+    assert share_inside(np.array([0.0, 1.9, -2.1, 5.0]), np.ones(4)) == 50.0
     assert log_starts(residual("mechanical", ()))[0] == 0.1
     assert axis_label("temperature", False) == "temperature"
     assert axis_label("v", True) == "velocity [rad/s]"

@@ -11,29 +11,29 @@ import pytest
 from design.loop import LoopRun
 from design.tune import Asked, Goals
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
-from identification.karnopp import NAMES
 from identification.log import Log, Rig
-from identification.plant import Actuator
-from identification.result import Estimate
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of, short_recipe
-from workbench import validating
-from workbench.closed_loop import run_loop
-from workbench.design_values import design_document, read_design
-from workbench.identifying import (
+from workbench.cards.recipe import RecipePID
+from workbench.documents.design import design_document, read_design
+from workbench.documents.model import Model
+from workbench.output import dumps
+from workbench.report.model_tables import fit_lines
+from workbench.steps import validate as validating
+from workbench.steps.closed_loop import run_loop
+from workbench.steps.design import corners, design, effort_limit, linear_of
+from workbench.steps.identify import (
     arx_plant,
     closed_loop_remarks,
     common_period,
     decimated,
     decimation,
 )
-from workbench.model import Model
-from workbench.output import dumps
-from workbench.predicting import COLUMNS, predict, prediction_csv
-from workbench.recipe import PID
-from workbench.recording import record, truth
-from workbench.tuning import corners, design, effort_limit, linear_of
-from workbench.validating import Limits, validate, validation_document
-from workbench.views import fit_lines
+from workbench.steps.predict import COLUMNS, predict, prediction_csv
+from workbench.steps.simulate import record, truth
+from workbench.steps.validate import Limits, validate, validation_document
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 
@@ -263,7 +263,7 @@ def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
 def test_a_loop_that_runs_away_is_no_log() -> None:
     _, recipe = short_recipe(1.0)
     assert recipe.loop is not None
-    wild = replace(recipe.loop, position=PID(1e9, 0.018, 0.072, 0.2), control_limit=None)
+    wild = replace(recipe.loop, position=RecipePID(1e9, 0.018, 0.072, 0.2), control_limit=None)
     with pytest.raises(BadCard, match=r"runs away after 0\.0\d+ s"):
         record("wild", replace(recipe, loop=wild))
 

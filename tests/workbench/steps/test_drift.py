@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from identification.errors import BadModel
-from identification.karnopp import NAMES
+from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
 from workbench.cli import main
-from workbench.drifting import model_in_force, model_key, read_stream
-from workbench.model import Correlation, model_document, read_model
+from workbench.documents.model import ParameterCorrelation, model_document, read_model
 from workbench.output import dumps
+from workbench.steps.drift import model_in_force, model_key, read_stream
 
 
 @pytest.fixture(scope="module")
@@ -183,6 +183,6 @@ def test_an_older_model_file_without_a_correlation_is_read() -> None:
 
 def test_a_correlation_that_is_none_is_refused() -> None:
     with pytest.raises(BadModel, match="square"):
-        Correlation(("m", "F_cp"), ((1.0,), (1.0,)))
+        ParameterCorrelation(("m", "F_cp"), ((1.0,), (1.0,)))
     with pytest.raises(BadModel, match="-1 to 1"):
-        Correlation(("m", "F_cp"), ((1.0, 2.0), (2.0, 1.0)))
+        ParameterCorrelation(("m", "F_cp"), ((1.0, 2.0), (2.0, 1.0)))

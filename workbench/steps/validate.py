@@ -13,12 +13,12 @@ from design.rst import closed_loop_poles
 from design.tune import worst_modulus
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from workbench.closed_loop import left_out, loop_period, run_loop
-from workbench.design_values import Controller, Design, Linear, MarginValues, margin_values
-from workbench.limit_cycle import LimitCycle, limit_cycle
-from workbench.model import Model, versions
-from workbench.parameter_units import shown
-from workbench.tuning import corners, linear_plant_of
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Controller, Design, Linear, MarginValues, margin_values
+from workbench.documents.model import Model, versions
+from workbench.steps.closed_loop import effects_left_out, loop_period, run_loop
+from workbench.steps.design import corners, linear_plant_of
+from workbench.steps.limit_cycle import LimitCycle, limit_cycle
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -51,7 +51,7 @@ class Limits:
 
 
 @dataclass(frozen=True)
-class Figures:
+class LoopFigures:
     """A controller on a plant: errors in m, relative ones to step and amplitude; force in N.
 
     standstill: largest error in the last half of a dwell. overshoot: relative to the step.
@@ -96,7 +96,7 @@ class Validation:
     judged: Literal["rst", "pid"]
     passed: bool
     limits: Limits
-    figures: Mapping[str, Mapping[str, Figures]]
+    figures: Mapping[str, Mapping[str, LoopFigures]]
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
     schema: Literal["validation/1"] = "validation/1"
@@ -127,7 +127,7 @@ def validate(
     limits = limits or Limits()
     reference = references(model, found)
     plants = {"model": model} | ({"plant": plant} if plant else {})
-    figures: dict[str, dict[str, Figures]] = {}
+    figures: dict[str, dict[str, LoopFigures]] = {}
     traces: dict[tuple[str, str], Traces] = {}
     cases = [
         (name + suffix, controller, compensator)
@@ -207,7 +207,7 @@ def judged_of(found: Design) -> Literal["rst", "pid"]:
 
 def _figures(
     machine: Model, found: Design, one: Controller, run: Traces, limits: Limits
-) -> Figures:
+) -> LoopFigures:
     step = float(np.max(run.step.r))
     amplitude = float(np.max(np.abs(run.smooth.r)))
     stable = _stays(run.step, step) and _stays(run.smooth, amplitude)
@@ -217,7 +217,7 @@ def _figures(
     margin = _linear_margins(machine, found, one)
     runs = (run.step, run.smooth)
     volts = machine.simulated.actuator is not None
-    result = Figures(
+    result = LoopFigures(
         stable=stable,
         margins=margin,
         step=step,
@@ -237,10 +237,10 @@ def _figures(
         limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
         missed=(),
     )
-    return Figures(**{**_shallow(result), "missed": _missed(result, limits, found, machine)})
+    return LoopFigures(**{**_shallow(result), "missed": _missed(result, limits, found, machine)})
 
 
-def _shallow(value: Figures) -> dict[str, Any]:
+def _shallow(value: LoopFigures) -> dict[str, Any]:
     return {name: getattr(value, name) for name in value.__dataclass_fields__}
 
 
@@ -302,7 +302,7 @@ def _worst(machine: Model, found: Design, one: Controller, plant: Linear) -> flo
     return worst_modulus([(np.array(plant.A), np.array(plant.B)), *others], one.rst)
 
 
-def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> tuple[str, ...]:
+def _missed(result: LoopFigures, limits: Limits, found: Design, machine: Model) -> tuple[str, ...]:
     """What a controller does not keep, in words."""
     unit = shown(machine.rotary).position
     if not result.stable:
@@ -336,7 +336,7 @@ def _missed(result: Figures, limits: Limits, found: Design, machine: Model) -> t
     return (*missed, *_too_much(result, limits, machine.rotary))
 
 
-def _too_much(result: Figures, limits: Limits, rotary: bool) -> Iterator[str]:
+def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str]:
     """Force beyond what the logs have shown, command at its limit, in words."""
     units, seen = shown(rotary), result.force_seen
     if seen > 0 and not (result.force_peak <= limits.force * seen):
@@ -350,7 +350,7 @@ def _too_much(result: Figures, limits: Limits, rotary: bool) -> Iterator[str]:
 
 
 def _remarks(
-    figures: Mapping[str, Mapping[str, Figures]],
+    figures: Mapping[str, Mapping[str, LoopFigures]],
     judged: str,
     found: Design,
     machines: Sequence[Model | None],
@@ -363,7 +363,9 @@ def _remarks(
         f"{'' if one.stable else ', unstable'}"
         for place, one in figures[judged + COMPENSATED].items()
     ]
-    out += dict.fromkeys(said for machine in machines if machine and (said := left_out(machine)))
+    out += dict.fromkeys(
+        said for machine in machines if machine and (said := effects_left_out(machine))
+    )
     for place, one in figures[judged].items():
         if one.limit_cycle:
             weak = one.margins is None or one.margins.modulus < WEAK

@@ -11,9 +11,10 @@ from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
-from identification.plant import Actuator, Motor
-from identification.result import Estimate
-from workbench.design_values import (
+from identification.model.estimates import Estimate
+from identification.model.plant import Actuator, Motor
+from workbench.cards.parameter_units import Shown, shown
+from workbench.documents.design import (
     CompensatorValues,
     Controller,
     Design,
@@ -22,10 +23,9 @@ from workbench.design_values import (
     Linear,
     margin_values,
 )
-from workbench.identifying import check_period
-from workbench.model import Model, used, versions
-from workbench.parameter_units import Shown, shown
-from workbench.plausible import bandwidth_remarks, stored_remarks
+from workbench.documents.model import Model, used, versions
+from workbench.documents.plausible import bandwidth_remarks, stored_remarks
+from workbench.steps.identify import check_period
 
 NORMAL_95 = 1.96  # standard deviations to either side that hold 95 %
 DEFAULT_PERIOD = 10e-3  # s, the paper's rig

@@ -7,16 +7,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array, IntArray
-from identification.clean import applied_force
-from identification.differentiate import differentiate
 from identification.errors import BadLog, BadModel
-from identification.inverse_model import SURE, Smoothing
 from identification.log import Log
-from identification.result import Drive
-from identification.simulate import FreeRun, free_run
-from identification.start import measured_start
-from workbench.model import Model
-from workbench.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
+from identification.model.estimates import Drive
+from identification.model.inverse_model import SURE_SLIDING, Smoothing
+from identification.signals.clean import applied_force
+from identification.signals.differentiate import differentiate
+from identification.signals.initial_state import measured_start
+from identification.simulation.free_run import FreeRun, free_run
+from workbench.documents.model import Model
+from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
 COLUMNS = (
@@ -154,7 +154,7 @@ def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:
     step = max(1, round(window / log.h))
     at = np.arange(step, len(log), step, dtype=np.int64)
     motion = differentiate(log["y"], log.h)
-    v = np.where(np.abs(motion.v) > SURE * motion.v_noise, motion.v, 0.0)
+    v = np.where(np.abs(motion.v) > SURE_SLIDING * motion.v_noise, motion.v, 0.0)
     return at, motion.y[at], v[at]
 
 

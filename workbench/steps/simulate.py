@@ -12,20 +12,20 @@ from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
 from identification.errors import BadCard, BadModel
-from identification.excitation import reference_signal
-from identification.karnopp import NAMES
 from identification.log import Log, Rig
-from identification.plant import Actuator, Motor
-from identification.result import Estimate
-from identification.simulate import FreeRun, free_run
-from workbench import recipe as recipes
-from workbench.card import Card
-from workbench.effect_values import exact
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Motor
+from identification.signals.excitation import reference_signal
+from identification.simulation.free_run import FreeRun, free_run
+from workbench.cards import recipe as recipes
+from workbench.cards.card import Card
+from workbench.cards.effect_values import exact
+from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.cards.recipe import Recipe
+from workbench.cards.units import Motion
+from workbench.documents.model import as_number
 from workbench.files import ABSURD
-from workbench.model import as_number
-from workbench.parameter_units import actuator_units, friction_units
-from workbench.recipe import Recipe
-from workbench.units import Motion
 
 PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 SETTLED = 1e-9  # relative change of the force from which it has settled
@@ -221,11 +221,11 @@ def _position(recipe: Recipe) -> RST:
     """The recipe's position controller as RST at the recipe's period; volts for a motor."""
     assert recipe.loop is not None
     match recipe.loop.position:
-        case recipes.PD(k_d, T_d, eps):
+        case recipes.RecipePD(k_d, T_d, eps):
             found = pd_to_rst(k_d, T_d, eps, recipe.h)
-        case recipes.PID(k_R, T_d, T_i, eps):
+        case recipes.RecipePID(k_R, T_d, T_i, eps):
             found = pid_to_rst(k_R, T_i, T_d, eps, recipe.h)
-        case recipes.RST(R, S, T):
+        case recipes.RecipeRST(R, S, T):
             found = RST(np.array(R), np.array(S), np.array(T), recipe.h)
     actuator = recipe.plant.actuator
     if isinstance(actuator, Motor):

@@ -8,23 +8,23 @@ import numpy as np
 import pytest
 
 from identification.effects._base import Acting
+from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog
-from identification.library import built_in
 from identification.log import Log, Rig
-from identification.plant import Motor
+from identification.model.plant import Motor
 from tests.chain import EMPS, model_of, short_recipe
-from workbench.card import load_card
-from workbench.closed_loop import in_the_loop, left_out, run_loop
-from workbench.demonstration import recipe_of, simulated_log
-from workbench.effect_values import exact
-from workbench.fetch import card_path
-from workbench.logs import read_log
-from workbench.model import Model
-from workbench.predicted_force import of_body
-from workbench.predicting import Prediction, predict
-from workbench.recipe import LoopSpec, Recipe
-from workbench.recording import record, truth
-from workbench.tuning import design
+from workbench.cards.card import load_card
+from workbench.cards.effect_values import exact
+from workbench.cards.recipe import LoopSpec, Recipe
+from workbench.documents.model import Model
+from workbench.logs.fetch import card_path
+from workbench.logs.runs import read_log
+from workbench.steps.closed_loop import effects_left_out, in_the_loop, run_loop
+from workbench.steps.demo import recipe_of, simulated_log
+from workbench.steps.design import design
+from workbench.steps.predict import Prediction, predict
+from workbench.steps.predicted_force import of_body
+from workbench.steps.simulate import record, truth
 
 PRESSURES = Rig("electro-pneumatic", area_p=12.6e-4, area_n=10e-4, supply_pressure=5e5)
 CARD, RECIPE = short_recipe()
@@ -208,7 +208,7 @@ def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     spring = built_in()["spring"].acting({"k": 2000.0})
     whole = replace(plain, effects={"spring": exact(spring, "linear")})
     assert [one.key for one in in_the_loop(whole)] == ["spring"]
-    assert left_out(whole) is None
+    assert effects_left_out(whole) is None
     r = np.repeat([0.0, 0.05], 200)
     one, other = (
         run_loop(machine, found, found.rst, r, np.random.default_rng(0))
@@ -225,8 +225,8 @@ def test_a_loop_of_two_rates_has_the_model_s_effects() -> None:
     assert found.rst.h > found.force.h
     effects = {"stribeck": exact(acting("stribeck"), "linear")}
     whole = replace(plain, effects=effects)
-    assert left_out(plain) is None
-    assert left_out(whole) is None
+    assert effects_left_out(plain) is None
+    assert effects_left_out(whole) is None
     r = np.repeat([0.0, 0.05], 2000)
     one, other = (
         run_loop(machine, found, found.rst, r, np.random.default_rng(0))
@@ -241,4 +241,7 @@ def test_effects_whose_signals_no_simulation_makes_are_left_out_with_a_word() ->
         "pressure_dependent_friction": exact(acting("pressure_dependent_friction"), "linear")
     }
     whole = replace(plain, effects=effects)
-    assert left_out(whole) == "simulated without the model's effects pressure_dependent_friction"
+    assert (
+        effects_left_out(whole)
+        == "simulated without the model's effects pressure_dependent_friction"
+    )

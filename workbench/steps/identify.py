@@ -13,21 +13,29 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.arrays import Array
-from identification.arx import ArxModel, fit_arx, one_step_errors, simulation_errors
-from identification.arx_select import select_arx
-from identification.constant import constant_force
-from identification.constant import remark as constant_remark
-from identification.differentiate import differentiate
+from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulation_errors
+from identification.arx.order_selection import select_arx
+from identification.arx.residual_tests import residual_tests
 from identification.errors import BadLog, BadModel, NotIdentifiable
-from identification.inverse_model import ForceError, Smoothing, force_error
-from identification.karnopp import NAMES
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Actuator, Motor, units_of
-from identification.residual_tests import residual_tests
-from identification.result import Drive, Estimate, KarnoppFit
-from workbench.model import ArxPlant, ArxTests, Correlation, FitSummary, LogEntry, Model, versions
-from workbench.parameter_units import actuator_units, friction_units
+from identification.model.estimates import Drive, Estimate, KarnoppFit
+from identification.model.inverse_model import ForceError, Smoothing, force_error
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Motor, units_of
+from identification.signals.differentiate import differentiate
+from identification.tracing.constant_force import constant_force, constant_remark
+from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.documents.model import (
+    ArxPlant,
+    ArxTests,
+    FitSummary,
+    LogEntry,
+    Model,
+    ParameterCorrelation,
+    versions,
+)
+from workbench.logs.sources import Source
 
 Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
@@ -39,16 +47,6 @@ FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
 TRACKS = 0.5  # correlation of r and y above which a log with r counts as closed-loop
-
-
-@dataclass(frozen=True)
-class Source:
-    """One run of a file: its log on an even clock, the file's name, hash and rows."""
-
-    log: Log
-    file: str
-    sha256: str
-    rows: int
 
 
 @dataclass(frozen=True)
@@ -119,13 +117,13 @@ def identify(
     )
 
 
-def _correlation(fit: KarnoppFit) -> Correlation:
+def _correlation(fit: KarnoppFit) -> ParameterCorrelation:
     """How the errors of the fitted parameters go together."""
     sd = np.sqrt(np.maximum(np.diag(fit.covariance), 0.0))
     size = np.where(sd > 0, sd, 1.0)
     matrix = np.clip(fit.covariance / np.outer(size, size), -1.0, 1.0)
     np.fill_diagonal(matrix, 1.0)
-    return Correlation(fit.free, tuple(tuple(row) for row in matrix.tolist()))
+    return ParameterCorrelation(fit.free, tuple(tuple(row) for row in matrix.tolist()))
 
 
 def speed_of(log: Log) -> float:

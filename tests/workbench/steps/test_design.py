@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from design.tune import Asked, Goals
-from identification.plant import Actuator, Motor
+from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, model_of
-from workbench.closed_loop import run_loop
-from workbench.design_values import Design
-from workbench.model import Model
-from workbench.tuning import design, reference_demand
-from workbench.validating import validate
+from workbench.documents.design import Design
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import run_loop
+from workbench.steps.design import design, reference_demand
+from workbench.steps.validate import validate
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODELS = {name: model_of(p, ACTUATOR) for name, p in TABLES.items()}

@@ -6,20 +6,20 @@ from typing import Any
 
 import numpy as np
 
+from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, NotIdentifiable
-from identification.karnopp import NAMES
-from identification.library import Library
-from identification.result import Estimate
-from identification.trace import trace
-from identification.trace_result import Errors, FoundEffect, Trace
-from workbench.card import load_card
-from workbench.effect_values import relabelled
-from workbench.fetch import card_path
-from workbench.identifying import Source, arx_plant, speed_of
-from workbench.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
-from workbench.plausible import model_remarks
-from workbench.sources import Sources
-from workbench.units import Motion
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.tracing.result import Errors, FoundEffect, Trace
+from identification.tracing.trace import trace
+from workbench.cards.card import load_card
+from workbench.cards.effect_values import relabelled
+from workbench.cards.units import Motion
+from workbench.documents.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
+from workbench.documents.plausible import model_remarks
+from workbench.logs.fetch import card_path
+from workbench.logs.sources import Source, Sources
+from workbench.steps.identify import arx_plant, speed_of
 
 SCHEMA = "trace/1"
 Progress = Callable[[str, float], None]
@@ -84,7 +84,7 @@ def trace_sources(
         on_progress=on_progress,
     )
     remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
-    model = model_of(found, train, library)
+    model = traced_model(found, train, library)
     return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)))
 
 
@@ -106,7 +106,7 @@ def _no_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
             )
 
 
-def model_of(found: Trace, sources: Sources, library: Library) -> Model:
+def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
     """The model after the trace, as model.json holds it."""
     rig = sources.rig
     actuator = {k: v for k, v in found.parameters_after.items() if k not in NAMES}

@@ -4,17 +4,17 @@ from collections.abc import Callable, Iterable, Mapping
 
 import numpy as np
 
-from identification.along import contribution, elastic_share
 from identification.arrays import Array
-from identification.differentiate import differentiate
-from identification.effect_run import effective_commands
-from identification.effect_table import effect_table, signal_table
 from identification.effects._base import Acting
 from identification.effects._places import Place
 from identification.errors import BadLog
-from identification.inverse_model import Smoothing, force_predicted
 from identification.log import Log
-from identification.plant import Motor, Plant
+from identification.model.inverse_model import Smoothing, force_predicted
+from identification.model.plant import Motor, Plant
+from identification.signals.differentiate import differentiate
+from identification.simulation.effect_along_motion import contribution, elastic_share
+from identification.simulation.effect_run import effective_commands
+from identification.simulation.effect_table import effect_table, signal_table
 
 REVERSALS = 2  # substitutions by which a transducer's reading is inverted
 
