@@ -17,8 +17,8 @@ import numpy as np
 from scipy.signal import lfilter
 
 from identification.arrays import Array
-from identification.arx import factor_of, fit_arx, model_of
-from identification.arx_factor import Order
+from identification.arx.model import arx_of_factor, factor_of, fit_arx
+from identification.arx.qr_factor import Order
 
 ORDER = Order(3, 2, 3)
 RST_A = [1.0, -2.142, 1.688, -0.5459]
@@ -67,7 +67,7 @@ def ours(u: Array, y: Array) -> Array:
 
 def exact(u: Array, y: Array) -> Array:
     """The same by exact products, as for ill-conditioned logs."""
-    model = model_of(factor_of([(u, y)], ORDER), ORDER, H)
+    model = arx_of_factor(factor_of([(u, y)], ORDER), ORDER, H)
     return np.concatenate([model.A[1:], model.B[ORDER.nk :]])
 
 

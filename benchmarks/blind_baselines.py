@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 from scipy.signal import savgol_filter
 
-from identification.along import contribution
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Effect, Param
-from identification.karnopp import Karnopp
-from identification.library import Library
+from identification.effects._library import Library
 from identification.log import Log
+from identification.model.karnopp import Karnopp
+from identification.simulation.effect_along_motion import contribution
 
 WINDOW, ORDER = 31, 3  # samples, degree of the Savitzky-Golay filter
 SLOW = 0.01  # m/s, below which a sample is not sliding

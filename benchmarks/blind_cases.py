@@ -21,7 +21,7 @@ from benchmarks.blind_machines import (
     usable,
 )
 from identification.effects._base import Acting
-from identification.library import built_in
+from identification.effects._library import built_in
 
 Mode = Literal["clean", "single", "two", "removed", "drift"]
 

@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.blind_baselines import baselines
+from identification.effects._library import Library, built_in
 from identification.errors import UserError
-from identification.library import Library, built_in
 from identification.log import Log, Rig
-from identification.trace import trace
-from identification.trace_result import Errors, Trace
+from identification.tracing.result import Errors, Trace
+from identification.tracing.trace import trace
 
 SEED = 0  # of the tracer's own draws, the same in every run
 ROOT = Path(__file__).resolve().parent.parent

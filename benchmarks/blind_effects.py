@@ -34,10 +34,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from benchmarks.blind_machines import H, Machine, Run
-from identification.along import contribution
 from identification.arrays import Array
 from identification.effects._base import Acting
-from identification.library import Library, built_in
+from identification.effects._library import Library, built_in
+from identification.simulation.effect_along_motion import contribution
 
 REFERENCE_STIFFNESS = 1e4  # N/m
 ABSORBED = frozenset({"constant_force"})

@@ -25,9 +25,9 @@ from design.pid import pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
 from identification.effects._base import Acting
-from identification.karnopp import Karnopp
 from identification.log import Log, Rig, RigKind
-from identification.plant import Actuator, Motor, Plant
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
 
 H, SECONDS = 2e-3, 60.0
 NOISE_Y, NOISE_F, NOISE_P = 1e-5, 1e-2, 10.0

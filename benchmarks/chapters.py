@@ -18,15 +18,15 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.effects._library import built_in
 from identification.errors import UserError
-from identification.library import built_in
 from identification.log import Log
-from identification.trace_result import Errors, FoundEffect, Trace
-from workbench.card import load_card
-from workbench.fetch import VARIABLE, card_path
-from workbench.sources import Sources, read_sources
-from workbench.tracing import Traced, effect_estimates, trace_sources
-from workbench.units import Motion
+from identification.tracing.result import Errors, FoundEffect, Trace
+from workbench.cards.card import load_card
+from workbench.cards.units import Motion
+from workbench.logs.fetch import VARIABLE, card_path
+from workbench.logs.sources import Sources, read_sources
+from workbench.steps.trace import Traced, effect_estimates, trace_sources
 
 ROOT = Path(__file__).parents[1]
 HEAD = (

@@ -18,9 +18,9 @@ from design.loop import ForcePI, LoopNoise, loop_costs, prepared_loop, simulate_
 from design.loop_kernels import RECORDS, loop_kernel, loops_kernel
 from design.pid import pid_to_rst
 from identification.arrays import Array, IntArray
-from identification.karnopp import Karnopp
-from identification.plant import Actuator, Plant
-from identification.stepping import COLUMNS, MODES, mode_table
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.simulation.karnopp_step import COLUMNS, MODES, mode_table
 
 TABLE_1 = Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0)
 ACTUATOR = Actuator(19530.0, 10405.0)

@@ -29,14 +29,14 @@ from scipy.stats import chi2
 
 from benchmarks.blind_effects import SIZES, acting, place_of, shows
 from benchmarks.blind_machines import MACHINES, Machine, drifted, machine, simulated, stream
-from identification.drift_test import DriftTest, drift_test
+from identification.drift.drift_test import DriftTest, drift_test
+from identification.drift.reference_model import InForce, in_force
 from identification.effects._base import Acting
+from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
-from identification.in_force import InForce, in_force
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log
-from identification.output_error import fit_karnopp
+from identification.model.karnopp import Karnopp
 
 PARTS = ("stable", "jump", "slow", "structure", "length")
 LENGTHS = (10.0, 20.0, 40.0)  # s

@@ -15,8 +15,8 @@ from typing import Any
 
 from scipy.io import loadmat
 
-from identification.inverse_model import Smoothing, Viscous, fit_inverse, force_error
 from identification.log import Log
+from identification.model.inverse_model import Smoothing, Viscous, fit_inverse, force_error
 
 ROOT = Path(__file__).parents[1]
 EMPS = Path(os.environ.get("WORKBENCH_DATA") or ROOT.parent / "shared" / "data") / "emps"

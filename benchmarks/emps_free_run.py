@@ -14,13 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.output_error import fit_karnopp
-from identification.plant import Plant
-from identification.simulate import free_run
-from identification.start import measured_start
-from workbench.card import load_card
-from workbench.fetch import card_path, find_data
-from workbench.logs import read_runs
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.model.plant import Plant
+from identification.signals.initial_state import measured_start
+from identification.simulation.free_run import free_run
+from workbench.cards.card import load_card
+from workbench.logs.fetch import card_path, find_data
+from workbench.logs.runs import read_runs
 
 
 def main(seeds: int) -> None:

@@ -24,16 +24,16 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from identification.karnopp import NAMES, Karnopp
-from workbench.card import Card, load_card
-from workbench.fetch import card_path
+from identification.model.karnopp import NAMES, Karnopp
+from workbench.cards.card import Card, load_card
 from workbench.fleet.cluster import local_cluster
 from workbench.fleet.finding import find_logs
 from workbench.fleet.recording import InRegistry, NoRegistry
-from workbench.fleet.run import Report, Run, Settings
+from workbench.fleet.run import FleetRun, FleetSettings, Report
 from workbench.fleet.store import ResultStore
-from workbench.recording import as_columns, record
+from workbench.logs.fetch import card_path
 from workbench.registry.store import Registry
+from workbench.steps.simulate import as_columns, record
 
 CARD = "paper_table1_rich"
 H = 2e-3  # s
@@ -71,19 +71,19 @@ def made(folder: Path, machines: range, seconds: float, card: Card) -> dict[str,
 def run(folder: Path, workers: int, card: Card, out: Path, registry: Path | None = None) -> Report:
     """One run over the logs in the folder, by workers that have compiled before."""
     text = card.path.read_text(encoding="utf-8")
-    settings = Settings(str(folder), text)
+    settings = FleetSettings(str(folder), text)
     logs = find_logs(str(folder))
     with local_cluster(workers, 3) as cluster:
         warm(cluster, logs[:1], settings, workers)
         with ResultStore(out) as store:
             if registry is None:
-                return Run(cluster, store, NoRegistry(), settings, clock)(logs)
+                return FleetRun(cluster, store, NoRegistry(), settings, clock)(logs)
             with Registry(str(registry)) as there:
                 recorder = InRegistry(there, "benchmark", clock)
-                return Run(cluster, store, recorder, settings, clock)(logs)
+                return FleetRun(cluster, store, recorder, settings, clock)(logs)
 
 
-def warm(cluster, logs, settings: Settings, workers: int) -> None:  # type: ignore[no-untyped-def]
+def warm(cluster, logs, settings: FleetSettings, workers: int) -> None:  # type: ignore[no-untyped-def]
     """Every worker has loaded its libraries and kernels, which a long run does once."""
     from workbench.fleet.work import work
 

@@ -14,16 +14,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.karnopp import NAMES, Karnopp
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Actuator, Plant
-from identification.result import KarnoppFit
-from identification.simulate import free_run
-from workbench.card import load_card
-from workbench.fetch import card_path
-from workbench.recipe import Recipe
-from workbench.recording import record
+from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import free_run
+from workbench.cards.card import load_card
+from workbench.cards.recipe import Recipe
+from workbench.logs.fetch import card_path
+from workbench.steps.simulate import record
 
 CARDS = ("paper_table1", "paper_table1_rich", "paper_table2", "paper_table3")
 STEP = 1e-7  # relative, of a central difference; exact steps carry it

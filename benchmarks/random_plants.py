@@ -20,12 +20,12 @@ import numpy as np
 from benchmarks.euler_loop import closed_loop
 from identification.arrays import Array
 from identification.errors import UserError
-from identification.karnopp import NAMES, Karnopp
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Actuator, Motor, Plant
-from identification.result import KarnoppFit
-from identification.simulate import free_run
+from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.free_run import free_run
 
 KINDS = ("electro-pneumatic", "motor", "force")
 REFERENCES = ("steps", "sine", "multisine", "ramps", "sine and steps")

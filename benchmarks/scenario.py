@@ -20,17 +20,17 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from identification.karnopp import NAMES, Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log
-from workbench.card import Card, load_card
-from workbench.fetch import card_path
-from workbench.jobs.passes import Pass, Settings
-from workbench.judging import Chain
-from workbench.recording import as_columns, record
+from identification.model.karnopp import NAMES, Karnopp
+from workbench.cards.card import Card, load_card
+from workbench.jobs.judge import Chain
+from workbench.jobs.passes import Pass, PassSettings
+from workbench.logs.fetch import card_path
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Outcome
+from workbench.registry.values import LogOutcome
+from workbench.steps.simulate import as_columns, record
 
 START = datetime(2026, 3, 2, 6, 0, tzinfo=UTC)
 STEP = timedelta(days=3.5)
@@ -76,7 +76,7 @@ class Told:
     """A day's log, what became of it, and the model's F_cp [N] in force after it."""
 
     day: Day
-    outcome: Outcome
+    outcome: LogOutcome
     true: float
     in_force: float | None
 
@@ -106,7 +106,7 @@ def story(
     with Registry(str(root / "registry.db")) as registry:
         for day in list(days())[:count]:
             write(machine / "logs", day, seed)
-            settings = Settings("scenario", first=True, settle=timedelta(0))
+            settings = PassSettings("scenario", first=True, settle=timedelta(0))
             now = day.at + timedelta(minutes=5)
             Pass(registry, Chain(), settings, partial(at, now), silent).run(root / "machines")
             (outcome,) = (one for one in Queue(registry.database).outcomes("rig") if one.at == now)

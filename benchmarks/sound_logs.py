@@ -5,7 +5,7 @@
 Rough machines on purpose, by plain Euler steps: stick-slip behind a soft spring, end stops with and
 without bounce, switched and pulsed drives, a quick servo; logged at 50 Hz to 10 kHz with white,
 heavy-tailed or no noise and encoders of 1 um to 1 mm; at most 300 m/s^2. Beside them the machines
-of `random_plants`. The thresholds of `identification.jumps` were chosen on earlier draws of such
+of `random_plants`. The thresholds of `identification.signals.jumps` were chosen on earlier draws of such
 machines (seeds 1 to 6), the measured sets and the shipped recipes; seeds from 7 on judge them.
 """
 
@@ -18,8 +18,8 @@ import numpy as np
 from benchmarks.random_plants import KINDS as PLANTS
 from benchmarks.random_plants import drawn, logged
 from benchmarks.rough_rig import KINDS, rough
-from identification.jumps import jumps, spikes
 from identification.log import Log
+from identification.signals.jumps import jumps, spikes
 
 
 def sound(first: int, seeds: int, each: int) -> Iterator[tuple[Log, bool]]:

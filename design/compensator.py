@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.compiled import compiled_inline
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 
 # A compensator as the kernels take it.
 F_CP, F_CN, F_VP, F_VN, DV_P, DV_N, F_SP, F_SN, DV_P1, DV_N1, E_T, INNER, STICK = range(13)

@@ -10,7 +10,7 @@ from design.loop import ForcePI, LoopNoise
 from design.loop_signals import Signals
 from design.rst import RST
 from design.servo import Servo, ServoRun, simulate_servo
-from identification.plant import Plant
+from identification.model.plant import Plant
 
 
 def simulate_effect_loop(

@@ -11,9 +11,9 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.clean import RIG_A, RIG_C, Filter, fir_lowpass
 from identification.compiled import compiled_inline
 from identification.errors import BadSpecification
+from identification.signals.clean import RIG_A, RIG_C, Filter, fir_lowpass
 
 N_D = 5  # positions of the slope (5)
 CUTOFF, RIG_CUTOFF = 5.0, 10.0  # Hz

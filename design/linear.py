@@ -8,7 +8,7 @@ from scipy.linalg import expm
 from design.polynomial import check_period, trim
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from identification.plant import Actuator
+from identification.model.plant import Actuator
 
 FORCE_LOOP = 0.3  # part of the force error that one sample of the force loop removes
 FORCE_RESET = 10.0  # integral time of the force loop, in its own time constants

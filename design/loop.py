@@ -25,10 +25,10 @@ from design.loop_kernels import (
 )
 from design.rst import RST
 from identification.arrays import Array, IntArray, frozen
-from identification.block import WIDTH
 from identification.errors import BadModel
-from identification.plant import Actuator, Motor, Plant
-from identification.stepping import kernel_parameters
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.karnopp_lanes import WIDTH
+from identification.simulation.karnopp_step import kernel_parameters
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,15 @@
 """The sampled closed loop, compiled: one plant, or WIDTH plants as a structure of arrays.
 
 Sample k: y and F are measured, u follows from them, and is held over [k, k+1), which the plant
-covers in one exact step (`identification.stepping`). Paper, figures 5 and 10; figure 1, upper.
+covers in one exact step (`identification.simulation.karnopp_step`). Paper, figures 5 and 10;
+figure 1, upper.
 """
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.block import (
+from identification.compiled import compiled, compiled_inline
+from identification.simulation.karnopp_lanes import (
     GAIN,
     ROWS,
     V_OLD,
@@ -17,12 +19,11 @@ from identification.block import (
     Y,
     advance,
     place,
-    prepare,
+    prepare_lanes,
     settle_flagged,
     work_space,
 )
-from identification.compiled import compiled, compiled_inline
-from identification.stepping import (
+from identification.simulation.karnopp_step import (
     COLUMNS,
     F_HI,
     F_LO,
@@ -188,14 +189,14 @@ def shift_rest(s: Array, R: Array, S: Array, lanes: int) -> None:
 
 
 @compiled_inline
-def draw(s: Array, row: int, noise: Array, k: int, lanes: int) -> None:
+def draw_noise(s: Array, row: int, noise: Array, k: int, lanes: int) -> None:
     """Noise of sample `k` for every lane, into `row`."""
     for i in range(lanes):
         s[row * WIDTH + i] = noise[k, i]
 
 
 @compiled
-def record(s: Array, modes: IntArray, base: int, k: int, traces: Array) -> None:
+def record_sample(s: Array, modes: IntArray, base: int, k: int, traces: Array) -> None:
     """Sample `k` of a block, before its switches, into traces (RECORDS, n, plants)."""
     for i in range(WIDTH):
         traces[RECORD_Y, k, base + i] = s[Y_OLD * WIDTH + i]
@@ -244,9 +245,9 @@ def march_loop(
         n_y = noise_y[k, 0] if common_y else 0.0
         n_f = noise_f[k, 0] if common_f else 0.0
         if not common_y:
-            draw(s, NOISE_Y, noise_y, k, lanes)
+            draw_noise(s, NOISE_Y, noise_y, k, lanes)
         if not common_f:
-            draw(s, NOISE_F, noise_f, k, lanes)
+            draw_noise(s, NOISE_F, noise_f, k, lanes)
         for i in range(WIDTH):
             y, force = s[Y * WIDTH + i], s[F * WIDTH + i]
             measured = y + (n_y + s[NOISE_Y * WIDTH + i])
@@ -261,7 +262,7 @@ def march_loop(
             flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * u)
         shift_rest(s, R, S, lanes)
         if keep:
-            record(s, modes, base, k, traces)
+            record_sample(s, modes, base, k, traces)
         if flagged:
             settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
 
@@ -291,7 +292,7 @@ def march_motor(
         fed, r, weight, flagged = feed[k], reference[k], weights[k], 0
         n_y = noise_y[k, 0] if common_y else 0.0
         if not common_y:
-            draw(s, NOISE_Y, noise_y, k, lanes)
+            draw_noise(s, NOISE_Y, noise_y, k, lanes)
         for i in range(WIDTH):
             y = s[Y * WIDTH + i]
             measured = y + (n_y + s[NOISE_Y * WIDTH + i])
@@ -313,7 +314,7 @@ def march_motor(
             flagged |= advance(s, i, h, s[F * WIDTH + i], 0.0)
         shift_rest(s, R, S, lanes)
         if keep:
-            record(s, modes, base, k, traces)
+            record_sample(s, modes, base, k, traces)
         if flagged:
             settle_flagged(flagged, s, modes, tables, p, h, s, Y_OLD * WIDTH)
 
@@ -348,7 +349,7 @@ def loops_kernel(
     for base in range(0, len(p), WIDTH):
         plants = p[base : base + WIDTH]
         s[:] = 0.0
-        prepare(plants, h, tables, s)
+        prepare_lanes(plants, h, tables, s)
         for i in range(WIDTH):
             place(s, modes, tables, plants, i, start[0], start[1], start[2])
             for j in range(len(x)):

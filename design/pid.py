@@ -11,15 +11,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import lsq_linear, minimize
 
 from design.place import solve_diophantine, solve_sylvester
-from design.polynomial import (
-    add,
-    check_period,
-    describe_root,
-    divide,
-    multiply,
-    roots,
-    trim,
-)
+from design.polynomial import add, check_period, describe_root, divide, multiply, roots, trim
 from design.rst import RST, closed_loop, closed_loop_poles
 from design.specification import (
     Tracking,

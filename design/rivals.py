@@ -14,8 +14,8 @@ import numpy as np
 from design.pid import pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
-from identification.clean import Filter
 from identification.errors import BadSpecification
+from identification.signals.clean import Filter
 
 IntegralRule = Literal["plain", "dead-zone", "reset"]
 RULES: tuple[IntegralRule, ...] = ("plain", "dead-zone", "reset")

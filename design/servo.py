@@ -30,10 +30,10 @@ from design.servo_kernels import (
 )
 from design.servo_loop import SERVO_ROWS, servo_kernel
 from identification.arrays import Array
-from identification.clean import slope_filter
-from identification.effect_table import ACTUATOR, effect_table, pieces
 from identification.errors import BadModel
-from identification.plant import Motor, Plant
+from identification.model.plant import Motor, Plant
+from identification.signals.clean import slope_filter
+from identification.simulation.effect_table import ACTUATOR, effect_table, pieces
 
 
 @dataclass(frozen=True)

@@ -5,16 +5,16 @@ import numpy as np
 from design.servo_kernels import ADDED, RAW, SPEED, WANTED, Law, Memory, servo_sample
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
-from identification.effect_run import place_of
-from identification.effect_step import (
+from identification.simulation.effect_run import place_of
+from identification.simulation.effect_step import (
     acting_command,
     delayed,
     effect_step,
     shown_position,
     start_states,
 )
-from identification.effect_table import BRISTLE
-from identification.stepping import K1, STUCK, parameters, settled_mode
+from identification.simulation.effect_table import BRISTLE
+from identification.simulation.karnopp_step import K1, STUCK, parameters, settled_mode
 
 SERVO_ROWS = 9
 

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from design.loop import ForcePI, LoopNoise, LoopRun, one_run, prepared_loop
 from design.rst import RST
 from identification.errors import BadModel
-from identification.plant import Plant
+from identification.model.plant import Plant
 
 
 def simulate_two_rate(

@@ -6,18 +6,17 @@ from functools import cache
 import numpy as np
 
 from identification.errors import BadCard
-from identification.karnopp import NAMES, UNITS, Karnopp
 from identification.log import Rig
-from identification.plant import Actuator
-from identification.result import Estimate
-from workbench.card import Card, load_card
-from workbench.fetch import card_path
-from workbench.identifying import Source
-from workbench.model import FitSummary, LogEntry, Model
-from workbench.pipeline import Identified, identify_sources
-from workbench.recipe import Recipe
-from workbench.recording import record
-from workbench.sources import Sources
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES, UNITS, Karnopp
+from identification.model.plant import Actuator
+from workbench.cards.card import Card, load_card
+from workbench.cards.recipe import Recipe
+from workbench.documents.model import FitSummary, LogEntry, Model
+from workbench.logs.fetch import card_path
+from workbench.logs.sources import Source, Sources
+from workbench.steps.identify_sources import Identified, identify_sources
+from workbench.steps.simulate import record
 
 CARD = """
 [card]

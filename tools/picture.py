@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.differentiate import differentiate
-from identification.karnopp import NAMES, friction
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Plant
-from identification.simulate import free_run
-from workbench.card import load_card
-from workbench.fetch import card_path
-from workbench.recording import record
-from workbench.report.figures import BAND, MEASURED, MODEL, figure, label, spread, style
+from identification.model.karnopp import NAMES, friction
+from identification.model.plant import Plant
+from identification.signals.differentiate import differentiate
+from identification.simulation.free_run import free_run
+from workbench.cards.card import load_card
+from workbench.logs.fetch import card_path
+from workbench.report.figures import BAND, MEASURED, MODEL, evenly_spread, figure, label, style
+from workbench.steps.simulate import record
 
 # Errors printed in the paper's table 1 [%], in the order of NAMES.
 PAPER = (14.8, 12.0, 13.6, 11.7, 5.2, 35.5, 1.7, 10.8, 9.7)
@@ -37,7 +37,7 @@ def main(path: Path) -> None:
         left.plot(log["t"][part], 1e3 * run.y[part], "--", color=MODEL, label="model, from u alone")
         left.legend(loc="upper right")
         label(left, "time [s]", "position [mm]", "a step of the log")
-        shown = spread(len(log), 3000)
+        shown = evenly_spread(len(log), 3000)
         force = log["F"] - fit.friction.m * motion.a
         middle.plot(motion.v[shown], force[shown], ".", color=MEASURED, ms=2, label="F_e - m a")
         v = np.linspace(float(motion.v.min()), float(motion.v.max()), 800)

@@ -44,7 +44,7 @@ def card_option(command: Command) -> Command:
 
 def effects_option(command: Command) -> Command:
     """The option `--effects`, folders of effects of the user's own, as `effects`: see
-    `workbench.own_effects`."""
+    `workbench.cards.own_effects`."""
     return click.option(
         "--effects",
         multiple=True,

@@ -8,17 +8,22 @@ import os
 import secrets
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import click
 
 from identification.errors import UserError
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+Row = tuple[str, ...]
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 Advance = Callable[[float], None]
@@ -200,3 +205,21 @@ def progress(label: str, total: float | None = None, *, as_json: bool = False) -
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(label, total=total)
         yield lambda step: bar.advance(task, step)
+
+
+def written(folder: Path, *names: str) -> str:
+    """Where the results lie."""
+    return "written: " + ", ".join(str(folder / name) for name in names)
+
+
+def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Table":
+    """A plain table for a terminal; right: the columns of numbers."""
+    from rich.box import SIMPLE_HEAD
+    from rich.table import Table
+
+    out = Table(box=SIMPLE_HEAD, pad_edge=False)
+    for number, name in enumerate(head):
+        out.add_column(name, justify="right" if number in right else "left", overflow="fold")
+    for row in rows:
+        out.add_row(*row)
+    return out

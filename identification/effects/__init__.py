@@ -1,1 +1,1 @@
-"""The library of effects: one file an effect, found by walking this folder (see `library`)."""
+"""The library of effects: one file an effect, found by walking this folder (see `_library`)."""

@@ -18,7 +18,12 @@ from tests.bad_inputs.shop import Shop
 MEMORY = 6_000_000_000
 """Bytes of address space beyond which a run is ended: nothing here needs a quarter of that."""
 
-HEAVY = ("workbench.cli", "workbench.pipeline", "workbench.tracing", "tests.bad_inputs.cases")
+HEAVY = (
+    "workbench.cli",
+    "workbench.steps.identify_sources",
+    "workbench.steps.trace",
+    "tests.bad_inputs.cases",
+)
 
 
 class Ended(NamedTuple):

@@ -10,11 +10,11 @@ import numpy as np
 from identification.arrays import Array
 from tests.chain import identified
 from tests.workbench.log_files import WRITERS
-from workbench.card import load_card
+from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.model import model_document
+from workbench.documents.model import model_document
 from workbench.output import dumps
-from workbench.recording import as_columns, record
+from workbench.steps.simulate import as_columns, record
 
 _RECIPE = """
 [recipe]

@@ -13,7 +13,7 @@ from benchmarks.blind_cases import Case, case_of, effect_keys, make
 from benchmarks.blind_effects import SIZES, acting, place_of, right_signals, shows
 from benchmarks.blind_machines import MACHINES, lively, machine, simulated, stream
 from benchmarks.blind_report import clopper_pearson, judged, print_report
-from identification.library import built_in
+from identification.effects._library import built_in
 
 SECONDS = 15.0
 

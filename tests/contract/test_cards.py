@@ -5,11 +5,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.differentiate import differentiate
-from workbench.card import Card, load_card
-from workbench.fetch import VARIABLE, card_path, find_data, shipped_cards
-from workbench.logs import read_runs
-from workbench.recording import record
+from identification.signals.differentiate import differentiate
+from workbench.cards.card import Card, load_card
+from workbench.logs.fetch import VARIABLE, card_path, find_data, shipped_cards
+from workbench.logs.runs import read_runs
+from workbench.steps.simulate import record
 
 CARDS = {name: load_card(path) for name, path in shipped_cards().items()}
 DATA = [name for name, card in CARDS.items() if card.files]

@@ -10,13 +10,18 @@ import numpy as np
 import pytest
 
 from identification.effects._base import Effect, Param
+from identification.effects._library import built_in, declared, joined_library
 from identification.errors import BadModel
-from identification.library import built_in, declared, joined
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.simulate import free_run
+from identification.model.plant import Motor, Plant
+from identification.simulation.free_run import free_run
 from tests.identification.plants import table
-from workbench.effect_contract import check_depends_on, check_equation, check_linear, check_units
+from workbench.cards.effect_contract import (
+    check_depends_on,
+    check_equation,
+    check_linear,
+    check_units,
+)
 
 MAGNET = '''"""A magnet at the end of the stroke."""
 
@@ -66,7 +71,7 @@ def written(tmp_path: Path) -> Write:
 
 def test_a_users_own_effect_joins_the_library(written: Write) -> None:
     magnet = declared(written(MAGNET))
-    library = joined([magnet], built_in())
+    library = joined_library([magnet], built_in())
     assert list(library)[-1] == "magnet"
     for check in (check_equation, check_linear, check_units, check_depends_on):
         check(magnet)
@@ -113,7 +118,7 @@ def test_a_declaration_that_contradicts_itself_is_refused(
 
 def test_two_of_one_key_are_refused() -> None:
     with pytest.raises(BadModel, match="two effects with the key 'spring'"):
-        joined([built_in()["spring"]], built_in())
+        joined_library([built_in()["spring"]], built_in())
 
 
 def test_parameters_are_checked() -> None:

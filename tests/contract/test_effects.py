@@ -6,15 +6,15 @@ from dataclasses import replace
 import pytest
 
 from identification.effects._base import Effect, R, Rs
-from identification.library import built_in
-from workbench.effect_contract import (
+from identification.effects._library import built_in
+from workbench.cards.effect_contract import (
     Broken,
     check_depends_on,
     check_equation,
     check_linear,
     check_units,
 )
-from workbench.effect_runs import CHECKS, Check
+from workbench.cards.effect_runs import CHECKS, Check
 
 KEYS = list(built_in())
 

@@ -1,4 +1,4 @@
-"""Effects in a run, beside what `workbench.effect_runs` checks of each; mutants that must fail."""
+"""Effects in a run, beside what `workbench.cards.effect_runs` checks; mutants that must fail."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from identification.effects._base import Effect, R, Rs
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.library import built_in
-from identification.simulate import free_run
-from workbench.effect_contract import Broken
-from workbench.effect_runs import (
+from identification.simulation.free_run import free_run
+from workbench.cards.effect_contract import Broken
+from workbench.cards.effect_runs import (
     CHECKS,
     HYDRAULIC,
     REST,

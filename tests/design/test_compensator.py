@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from design.compensator import Compensator
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 
 FRICTION = Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0)
 C = Compensator(FRICTION, N_c=2.0, e_T=0.003)

@@ -12,13 +12,13 @@ from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
-from identification.clean import applied_force
 from identification.effects._base import Acting
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.library import built_in
 from identification.log import Log, Rig
-from identification.plant import Motor, Plant
-from identification.simulate import free_run
+from identification.model.plant import Motor, Plant
+from identification.signals.clean import applied_force
+from identification.simulation.free_run import free_run
 from tests.identification.plants import ACTUATOR, table
 
 H, N = 1e-3, 4000

@@ -9,8 +9,8 @@ from design.loop import ForcePI
 from design.rst import RST
 from design.two_rate import simulate_two_rate
 from identification.errors import BadSpecification
-from identification.karnopp import Karnopp
-from identification.plant import Actuator, Plant
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 

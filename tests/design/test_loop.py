@@ -11,13 +11,13 @@ from design.loop_kernels import force_command
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
+from identification.effects._library import built_in
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
-from identification.library import built_in
 from identification.log import Log
-from identification.plant import Actuator, Motor, Plant
-from identification.simulate import free_run
-from identification.stepping import STUCK
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.simulation.free_run import free_run
+from identification.simulation.karnopp_step import STUCK
 from tests.identification.oracle import euler
 from tests.identification.plants import ACTUATOR, table
 

@@ -9,12 +9,7 @@ from design.compensator import Compensator
 from design.filters import CompensatorFilters, rig_filters, simulation_filters
 from design.loop import ForcePI, LoopNoise, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
-from design.rivals import (
-    DisturbanceObserver,
-    Dither,
-    FrictionObserver,
-    IntegralPID,
-)
+from design.rivals import DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.servo import (
     Compensation,
     Countermeasure,
@@ -24,9 +19,9 @@ from design.servo import (
     simulate_servo,
 )
 from identification.arrays import Array
-from identification.clean import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 from identification.errors import BadModel, BadSpecification
-from identification.plant import Motor, Plant
+from identification.model.plant import Motor, Plant
+from identification.signals.clean import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 from tests.identification.plants import ACTUATOR, table
 
 H, N = 1e-3, 6000

@@ -20,7 +20,7 @@ from design.tracking import (
 )
 from design.tune import Asked, Goals, tune_pid, tune_rst
 from identification.arrays import Array
-from identification.plant import Actuator
+from identification.model.plant import Actuator
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 H = 0.01

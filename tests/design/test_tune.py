@@ -8,7 +8,7 @@ from design.margins import margins
 from design.tune import Asked, Goals, goals_missed, tune_pid, tune_rst, worst_modulus
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from identification.plant import Actuator
+from identification.model.plant import Actuator
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 H = 0.01

@@ -8,8 +8,8 @@ from design.pid import pid_to_rst
 from design.rst import RST
 from design.two_rate import simulate_two_rate
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
-from identification.plant import Actuator, Motor, Plant
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
 
 PLANT = Plant(
     Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0), Actuator(19530.0, 10405.0)

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from workbench.card import load_card
+from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.fetch import card_path
+from workbench.logs.fetch import card_path
 
 
 @pytest.fixture

@@ -10,9 +10,9 @@ import pytest
 
 from identification.effects import spring as spring_module
 from tests.chain import CARD
-from workbench import demonstration
 from workbench.cli import COMMANDS, main
-from workbench.validating import Limits, validate
+from workbench.steps import demo as demonstration
+from workbench.steps.validate import Limits, validate
 
 REGISTRY_ONLY = ("reidentify", "watch")  # their results go into the registry
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
+from identification.simulation.free_run import free_run
+from workbench.cards.own_effects import library
 from workbench.cli import main
-from workbench.own_effects import library
 
 COIL = '''"""A coil that warms up by its own current gives less force for the same voltage."""
 

@@ -8,9 +8,9 @@ import pandas as pd
 import pytest
 
 from tests.workbench.fleet.values import card_text
-from workbench.card import load_card
+from workbench.cards.card import load_card
 from workbench.cli import main
-from workbench.recording import as_columns, record
+from workbench.steps.simulate import as_columns, record
 
 
 @pytest.fixture

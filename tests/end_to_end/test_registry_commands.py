@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from identification.plant import Actuator
+from identification.model.plant import Actuator
 from tests.chain import CARD, TABLES, model_of
 from tests.workbench.jobs.listener import listening
 from workbench.cli import main
-from workbench.design_values import design_document
-from workbench.model import model_document
+from workbench.documents.design import design_document
+from workbench.documents.model import model_document
 from workbench.output import dumps
-from workbench.tuning import design
+from workbench.steps.design import design
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 WHY = ["--reason", "a test", "--by", "tester"]

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
-from workbench.fetch import card_path
-from workbench.model import read_model
+from workbench.documents.model import read_model
+from workbench.logs.fetch import card_path
 
 
 @pytest.fixture(scope="module")

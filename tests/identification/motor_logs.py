@@ -5,12 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.arrays import Array
-from identification.evidence import Moving, moving
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
+from identification.estimation.regression.equation_rows import MotionLog, motion_log
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
+from identification.simulation.free_run import free_run
 
 H = 2e-3
 K_A = 20.0
@@ -49,6 +49,6 @@ def made(
     return blank.with_signals(y=run.shown + NOISE * rng.standard_normal(n), F=K_A * u)
 
 
-def seen(log: Log) -> Moving:
+def seen(log: Log) -> MotionLog:
     """The log as the trace sees it."""
-    return moving(log, held=True, by_command=False)
+    return motion_log(log, held=True, by_command=False)

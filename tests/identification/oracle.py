@@ -4,7 +4,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.compiled import compiled
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 
 RIGHT = 0
 COASTS_IN_BAND = 1  # inside the band velocity stays instead of falling to 0

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 
 from identification.arrays import Array
-from identification.karnopp import Karnopp
 from identification.log import Log
-from identification.plant import Actuator, Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Plant
+from identification.simulation.free_run import free_run
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 NOISE_Y, NOISE_F = 1e-5, 1e-2

@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import scipy.io
 
 from identification.arrays import Array
-from workbench.card import Card, load_card
+from workbench.cards.card import Card, load_card
 
 Signals = Mapping[str, Array]
 

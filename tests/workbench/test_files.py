@@ -11,12 +11,12 @@ import pytest
 
 from identification.errors import UserError
 from tests.workbench.log_files import WRITERS, card, signals
-from workbench import tables, text
-from workbench.card import load_card
-from workbench.drifting import read_stream
-from workbench.fetch import card_path
-from workbench.logs import read_log
-from workbench.model import read_model
+from workbench.cards.card import load_card
+from workbench.documents.model import read_model
+from workbench.logs import tables, text
+from workbench.logs.fetch import card_path
+from workbench.logs.runs import read_log
+from workbench.steps.drift import read_stream
 
 
 def plug(path: Path) -> None:

@@ -7,13 +7,13 @@ import pytest
 
 from identification.errors import UserError
 from tests.workbench.log_files import CARD, card, signals, write_csv
-from workbench.fetch import card_path, find_data
+from workbench.cards.own_effects import library
+from workbench.documents.reading import read_document
 from workbench.links import broken_link
-from workbench.own_effects import library
-from workbench.reading import read_document
+from workbench.logs.fetch import card_path, find_data
+from workbench.logs.sources import read_sources
+from workbench.logs.tables import read_table
 from workbench.registry.store import Registry
-from workbench.sources import read_sources
-from workbench.tables import read_table
 
 MISSING = "is a link to 'gone', which is missing"
 CIRCLE = "its links lead in a circle"

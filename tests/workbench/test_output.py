@@ -16,15 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.table import Table
 
-from workbench.output import (
-    BadOutput,
-    OutputFolder,
-    dumps,
-    emit,
-    output_options,
-    progress,
-    strict,
-)
+from workbench.output import BadOutput, OutputFolder, dumps, emit, output_options, progress, strict
 
 NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 JSON_LIKE = st.recursive(

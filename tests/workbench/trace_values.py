@@ -1,4 +1,4 @@
-"""Traces made by hand, of machines with effects, as `identification.trace` would tell them."""
+"""Traces made by hand, with effects, as `identification.tracing.trace` would tell them."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -6,25 +6,24 @@ from functools import cache
 
 import numpy as np
 
-from identification.karnopp import NAMES
-from identification.library import built_in
-from identification.plant import Actuator, Plant
-from identification.result import Estimate
-from identification.trace_result import (
+from identification.effects._library import built_in
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Plant
+from identification.tracing.result import (
     Change,
     Dependence,
+    EffectRival,
     Errors,
     FoundEffect,
     Residual,
-    Rival,
     Trace,
-    Verdict,
+    TraceVerdict,
 )
 from tests.chain import TABLES, short_recipe
-from workbench.identifying import Source
-from workbench.recording import record
-from workbench.sources import Sources
-from workbench.tracing import Traced, model_of
+from workbench.logs.sources import Source, Sources
+from workbench.steps.simulate import record
+from workbench.steps.trace import Traced, traced_model
 
 ROWS = 400
 NINE = TABLES["paper_table1"]
@@ -74,7 +73,7 @@ def residual(equation: str, keys: Sequence[str]) -> Residual:
 
 
 def trace_of(
-    verdict: Verdict = "effect", keys: Sequence[str] = ("stribeck",), *, actuator: bool = False
+    verdict: TraceVerdict = "effect", keys: Sequence[str] = ("stribeck",), *, actuator: bool = False
 ) -> Trace:
     """A trace of that verdict with these effects."""
     before = {n: estimate(v, u) for n, v, u in zip(NAMES, NINE.array, UNITS, strict=True)}
@@ -85,9 +84,9 @@ def trace_of(
     acting = tuple(library[key].acting(VALUES[key]) for key in keys)
     drift = (Change("F_cp", "N", 12.0, 14.4, 0.1),) if verdict == "drift" else ()
     rivals = (
-        Rival("nonlinear_viscous", 0.9, "gains 70 % of what stribeck does"),
-        Rival("cogging", None, "gains 2 % of what stribeck does"),
-        Rival("spring", 0.5, "explains as much as stribeck on these logs"),
+        EffectRival("nonlinear_viscous", 0.9, "gains 70 % of what stribeck does"),
+        EffectRival("cogging", None, "gains 2 % of what stribeck does"),
+        EffectRival("spring", 0.5, "explains as much as stribeck on these logs"),
     )
     unknown = Dependence(("y",), 0.4) if verdict == "unknown" else Dependence((), 0.0)
     residuals = [residual("mechanical", keys)]
@@ -120,4 +119,4 @@ def traced(found: Trace, *, rotary: bool = False, tested: bool = True) -> Traced
     if rotary:
         train = replace(train, rig=replace(train.rig, motion="rotary"))
     test = sources("b.csv", "b").runs if tested else ()
-    return Traced(found, model_of(found, train, built_in()), train.runs, test, train.remarks)
+    return Traced(found, traced_model(found, train, built_in()), train.runs, test, train.remarks)

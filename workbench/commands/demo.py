@@ -31,16 +31,17 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     the model found, and checks them in simulation. Exit status 1: the effect is not found, or the
     recommended controller does not keep the limits.
     """
-    from workbench.card import load_card
-    from workbench.demonstration import demo_view, demonstrate
-    from workbench.design_values import design_document
-    from workbench.fetch import card_path
-    from workbench.model import model_document
+    from workbench.cards.card import load_card
+    from workbench.documents.design import design_document
+    from workbench.documents.model import model_document
+    from workbench.logs.fetch import card_path
+    from workbench.report.demo_tables import demo_view
     from workbench.report.reports import design_report, validation_report
     from workbench.report.trace import trace_report
-    from workbench.tracing import trace_document
-    from workbench.validating import validation_document
-    from workbench.validation_views import missed
+    from workbench.report.validation_tables import missed
+    from workbench.steps.demo import demonstrate
+    from workbench.steps.trace import trace_document
+    from workbench.steps.validate import validation_document
 
     card = load_card(card_path(RECIPE))
     with OutputFolder("demo", out, now=datetime.now()) as folder:

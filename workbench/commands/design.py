@@ -56,13 +56,13 @@ def command(
     placed.
     """
     from design.tune import Asked, Goals
-    from workbench.design_values import design_document
-    from workbench.design_views import design_view
-    from workbench.model import read_model
+    from workbench.cards.own_effects import library
+    from workbench.documents.design import design_document
+    from workbench.documents.model import read_model
     from workbench.options import parse_auxiliary, parse_poles
-    from workbench.own_effects import library
+    from workbench.report.design_tables import design_view
     from workbench.report.reports import design_report
-    from workbench.tuning import design, effort_limit
+    from workbench.steps.design import design, effort_limit
 
     model = read_model(model_file, library(effects))
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)

@@ -65,15 +65,15 @@ def command(
     slowly. Writes drift.json and report.html. Exit status 0: no drift; 1: drift, a changed
     structure, or no log that could be judged.
     """
-    from identification.drift_test import Settings
-    from workbench.drift_views import drift_view
-    from workbench.drifting import drift_document, drift_of, model_key, read_stream, write_stream
-    from workbench.model import read_model
-    from workbench.own_effects import library
+    from identification.drift.drift_test import DriftSettings
+    from workbench.cards.own_effects import library
+    from workbench.documents.model import read_model
+    from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_report
-    from workbench.sources import read_sources
+    from workbench.report.drift_tables import drift_view
+    from workbench.steps.drift import drift_document, drift_of, model_key, read_stream, write_stream
 
-    settings = Settings(margin=margin / 100, variation=variation / 100, run_length=run_length)
+    settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
     model = read_model(model_file, library(effects))
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)

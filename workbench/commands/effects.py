@@ -33,8 +33,8 @@ def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool
 
     KEY: those to be shown, by default all.
     """
-    from workbench.effect_values import known_effect
-    from workbench.own_effects import library
+    from workbench.cards.effect_values import known_effect
+    from workbench.cards.own_effects import library
 
     known = library(effects)
     found = [known_effect(key, known) for key in keys] if keys else list(known.values())
@@ -48,13 +48,13 @@ def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool
 def check(folder: Path, as_json: bool) -> int:
     """Check your own effects by the rules that the shipped ones are held to.
 
-    FOLDER holds one effect a file, declared as EFFECT ('python -c "import workbench.own_effects as
-    o; print(o.__doc__)"' shows one). Its Python is run: check only files that you trust. Exit
-    status 1: an effect breaks a rule.
+    FOLDER holds one effect a file, declared as EFFECT ('python -c "import
+    workbench.cards.own_effects as o; print(o.__doc__)"' shows one). Its Python is run: check only
+    files that you trust. Exit status 1: an effect breaks a rule.
     """
-    from identification.library import built_in
-    from workbench.effect_runs import CHECKS, failures
-    from workbench.own_effects import library
+    from identification.effects._library import built_in
+    from workbench.cards.effect_runs import CHECKS, failures
+    from workbench.cards.own_effects import library
 
     own = {key: one for key, one in library([folder]).items() if key not in built_in()}
     broken: dict[str, Mapping[str, str]] = {}

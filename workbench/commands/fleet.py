@@ -80,7 +80,7 @@ def command(
     an alarm.
     """
     from workbench.fleet.finding import find_logs
-    from workbench.fleet.run import Run, Settings
+    from workbench.fleet.run import FleetRun, FleetSettings
     from workbench.fleet.store import ResultStore
 
     if address is not None and workers is not None:
@@ -94,8 +94,8 @@ def command(
         recorder = held.enter_context(_recorder(None if no_registry else (where or "")))
         cluster = held.enter_context(_cluster(address, workers, attempts, timeout))
         advance = held.enter_context(progress("fleet", float(len(found)), as_json=as_json))
-        settings = Settings(logs, text, seed)
-        done = Run(cluster, store, recorder, settings, clock, advance=advance)(found)
+        settings = FleetSettings(logs, text, seed)
+        done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
     result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
     emit(result, as_json, lambda: fleet_view(done, out))
@@ -143,8 +143,8 @@ def _bad(one: Any) -> dict[str, Any]:
 
 def _card_text(name: str) -> str:
     """The text of a card that is sound; raises BadCard."""
-    from workbench.card import load_card
-    from workbench.fetch import card_path
+    from workbench.cards.card import load_card
+    from workbench.logs.fetch import card_path
 
     path = card_path(name)
     load_card(path, with_recipe=False)

@@ -54,12 +54,12 @@ def command(
     report.html. LOG is a path, or a file name of the card's set. Exit status 1: the logs tell
     nothing.
     """
-    from workbench.model import model_document
+    from workbench.documents.model import model_document
+    from workbench.logs.sources import read_sources
     from workbench.options import parse_orders
-    from workbench.pipeline import Options, identify_sources
+    from workbench.report.model_tables import model_view
     from workbench.report.reports import identification_report
-    from workbench.sources import read_sources
-    from workbench.views import model_view
+    from workbench.steps.identify_sources import Options, identify_sources
 
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
     with OutputFolder("identify", out, now=datetime.now()) as folder:

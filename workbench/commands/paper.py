@@ -27,8 +27,8 @@ def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
     one to two minutes.
     """
     from workbench.paper.document import paper_document, paper_view
+    from workbench.paper.report import paper_report
     from workbench.paper.study import study
-    from workbench.report.paper import paper_report
 
     with OutputFolder("paper", out, now=datetime.now()) as folder:
         with progress("paper", 1.0, as_json=as_json) as advance:

@@ -11,7 +11,7 @@ from workbench.options import POSITIVE, card_option, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 if TYPE_CHECKING:
-    from workbench.predicting import Prediction
+    from workbench.steps.predict import Prediction
 
 
 @click.command(epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a")
@@ -44,10 +44,10 @@ def command(
     (actuator driven by the command), position_measured, position_simulated (free run).
     """
     from identification.errors import BadModel
-    from workbench.model import read_model
-    from workbench.own_effects import library
-    from workbench.predicting import predict, prediction_csv
-    from workbench.sources import read_sources
+    from workbench.cards.own_effects import library
+    from workbench.documents.model import read_model
+    from workbench.logs.sources import read_sources
+    from workbench.steps.predict import predict, prediction_csv
 
     model = read_model(model_file, library(effects))
     sources = read_sources([log], card)
@@ -94,7 +94,7 @@ def _errors(found: "list[Prediction]") -> dict[str, float | None]:
 
 
 def _lines(summary: Mapping[str, object], rotary: bool, remarks: tuple[str, ...]) -> list[str]:
-    from workbench.parameter_units import shown
+    from workbench.cards.parameter_units import shown
 
     length, _, force, *_ = shown(rotary)
     by = "the command" if summary["drive"] == "command" else "the applied force"

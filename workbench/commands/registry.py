@@ -159,10 +159,10 @@ def add(
     What is in force stays in force unless --promote is given. The same files again are the same
     version.
     """
-    from workbench.design_values import read_design
-    from workbench.model import read_model
-    from workbench.own_effects import library
-    from workbench.reading import read_document
+    from workbench.cards.own_effects import library
+    from workbench.documents.design import read_design
+    from workbench.documents.model import read_model
+    from workbench.documents.reading import read_document
     from workbench.registry.values import Candidate
 
     remarks = list(read_model(model_file, library(effects)).read)

@@ -38,10 +38,10 @@ def command(
     import pandas as pd
 
     from identification.errors import BadCard
-    from workbench.card import load_card
-    from workbench.fetch import card_path
-    from workbench.own_effects import library
-    from workbench.recording import as_columns, record, truth
+    from workbench.cards.card import load_card
+    from workbench.cards.own_effects import library
+    from workbench.logs.fetch import card_path
+    from workbench.steps.simulate import as_columns, record, truth
 
     card = load_card(card_path(card_name), library(effects))
     if card.recipe is None:

@@ -43,12 +43,12 @@ def command(
     without LOG, the card's [split] names the logs of both kinds. Exit status 0 whatever the
     verdict.
     """
-    from workbench.model import model_document
-    from workbench.own_effects import library
+    from workbench.cards.own_effects import library
+    from workbench.documents.model import model_document
+    from workbench.logs.sources import read_sources
     from workbench.report.trace import trace_report
-    from workbench.sources import read_sources
-    from workbench.trace_views import trace_view
-    from workbench.tracing import named_logs, trace_document, trace_sources
+    from workbench.report.trace_tables import trace_view
+    from workbench.steps.trace import named_logs, trace_document, trace_sources
 
     known = library(effects)
     with OutputFolder("trace", out, now=datetime.now()) as folder:

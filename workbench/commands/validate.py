@@ -68,12 +68,12 @@ def command(
     """
     import numpy as np
 
-    from workbench.design_values import read_design
-    from workbench.model import read_model
-    from workbench.own_effects import library
+    from workbench.cards.own_effects import library
+    from workbench.documents.design import read_design
+    from workbench.documents.model import read_model
     from workbench.report.reports import validation_report
-    from workbench.validating import Limits, validate, validation_document
-    from workbench.validation_views import validation_view
+    from workbench.report.validation_tables import validation_view
+    from workbench.steps.validate import Limits, validate, validation_document
 
     known = library(effects)
     model, found = read_model(model_file, known), read_design(design_file)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from workbench.addresses import shown
+from workbench.documents.model import versions
 from workbench.fleet.finding import said
 from workbench.fleet.values import NEEDED, BadCluster, Item, Result
-from workbench.model import versions
 
 ONE_THREAD = {f"{name}_NUM_THREADS": "1" for name in ("OMP", "MKL", "OPENBLAS", "NUMBA", "NUMEXPR")}
 GATHERED = 10.0  # s that a result may take from its worker to here

@@ -20,7 +20,7 @@ LOOKED = 20  # logs looked at for a card before a run begins
 
 
 @dataclass(frozen=True)
-class Settings:
+class FleetSettings:
     """url of the logs; card: text of the one for all, None: one a machine beside its logs.
 
     alone: how long the cluster may be without any worker.
@@ -51,7 +51,7 @@ class Report:
     memory: int
 
 
-class Run:
+class FleetRun:
     """One run over the logs of a fleet."""
 
     def __init__(
@@ -59,7 +59,7 @@ class Run:
         cluster: Cluster,
         store: ResultStore,
         recorder: Recorder,
-        settings: Settings,
+        settings: FleetSettings,
         clock: Clock,
         *,
         advance: Callable[[float], None] = lambda _step: None,

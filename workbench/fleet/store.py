@@ -18,7 +18,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from pydantic import TypeAdapter, ValidationError
 
-from identification.karnopp import NAMES
+from identification.model.karnopp import NAMES
 from workbench.fleet.values import Result
 from workbench.output import BadOutput, strict
 

@@ -7,15 +7,15 @@ from typing import Any, Literal
 
 from identification.errors import UserError
 from workbench.registry.values import Candidate, Judgement, Version
-from workbench.registry.values import Verdict as Judged
+from workbench.registry.values import LogVerdict as Judged
 
-Verdict = Literal[
+FleetVerdict = Literal[
     "identified", "inadequate",  # without a model in force
     "none", "structure", "promoted", "refused",  # judged against the one in force
     "not_judged", "set_aside", "failed",
     "waits",  # not recorded: the machine has to be looked after, and the next run tries again
 ]  # fmt: skip
-JUDGED: Mapping[Verdict, Judged] = MappingProxyType(
+JUDGED: Mapping[FleetVerdict, Judged] = MappingProxyType(
     {
         "identified": "promoted",
         "inadequate": "refused",
@@ -29,7 +29,7 @@ JUDGED: Mapping[Verdict, Judged] = MappingProxyType(
         "waits": "set_aside",
     }
 )
-GOOD: tuple[Verdict, ...] = ("identified", "none")
+GOOD: tuple[FleetVerdict, ...] = ("identified", "none")
 
 
 NEEDED = "workbench fleet needs Dask, which is not installed; install 'servo-workbench[fleet]'"
@@ -91,7 +91,7 @@ class Result:
     """
 
     log: LogFile
-    verdict: Verdict
+    verdict: FleetVerdict
     reason: str
     sha256: str = ""
     model: Mapping[str, Any] | None = None

@@ -10,14 +10,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
+from workbench.documents.model import model_document, versions
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result
+from workbench.jobs.judge import Chain
 from workbench.jobs.passes import Task
-from workbench.judging import Chain
-from workbench.model import model_document, versions
-from workbench.pipeline import identify_sources
+from workbench.logs.sources import read_sources
 from workbench.registry.values import Candidate, SeenLog
-from workbench.sources import read_sources
+from workbench.steps.identify_sources import identify_sources
 
 KIB = 1024
 

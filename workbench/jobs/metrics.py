@@ -16,7 +16,7 @@ from workbench.registry.store import Registry
 PREFIX = "servo_workbench"
 
 
-class Figures(Collector):
+class MachineFigures(Collector):
     """Figures of all machines at the moment they are asked for; `passed` adds those of a pass."""
 
     def __init__(self, registry: Registry) -> None:
@@ -42,14 +42,14 @@ class Figures(Collector):
             yield _gauge("machines_failed", "Machines that the last pass could not handle.", failed)
 
 
-def collected(figures: Figures) -> CollectorRegistry:
+def collected(figures: MachineFigures) -> CollectorRegistry:
     """The figures as a registry of the Prometheus client, of their own."""
     out = CollectorRegistry(auto_describe=False)
     out.register(figures)
     return out
 
 
-def write_metrics(path: Path, figures: Figures) -> None:
+def write_metrics(path: Path, figures: MachineFigures) -> None:
     """Write them for the node exporter's textfile collector, whole or not at all."""
     write_to_textfile(str(path), collected(figures))
 

@@ -18,7 +18,7 @@ from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery, Webhook
     from workbench.jobs.lease import Clock
-    from workbench.jobs.metrics import Figures
+    from workbench.jobs.metrics import MachineFigures
     from workbench.jobs.passes import PassReport, Report
     from workbench.registry.order import Order
     from workbench.registry.store import Registry
@@ -105,20 +105,20 @@ class Worker:
     webhook: "Webhook | None"
     report: "Report"
     owner: str
-    figures: "Figures"
+    figures: "MachineFigures"
     stop: Callable[[], bool]
 
     def once(self) -> Done:
         """One pass; raises BadRoot, RegistryAway, and OSError where metrics cannot be written."""
-        from workbench.challenge import Terms
+        from workbench.cards.own_effects import library
+        from workbench.jobs.challenge import Terms
+        from workbench.jobs.judge import Chain
         from workbench.jobs.lease import Patience, shared_clock
         from workbench.jobs.metrics import write_metrics
-        from workbench.jobs.passes import Pass, Settings
-        from workbench.judging import Chain
-        from workbench.own_effects import library
+        from workbench.jobs.passes import Pass, PassSettings
 
         given = self.options
-        settings = Settings(
+        settings = PassSettings(
             owner=self.owner,
             lease=timedelta(seconds=given.lease),
             settle=timedelta(seconds=given.settle),
@@ -154,7 +154,7 @@ def worker(options: JobOptions, stop: Callable[[], bool] = lambda: False) -> Ite
     from workbench.jobs.alarms import Webhook
     from workbench.jobs.events import reporter
     from workbench.jobs.lease import Patience
-    from workbench.jobs.metrics import Figures
+    from workbench.jobs.metrics import MachineFigures
     from workbench.jobs.scan import machine_folders
     from workbench.registry.database import location
     from workbench.registry.store import Registry
@@ -164,7 +164,7 @@ def worker(options: JobOptions, stop: Callable[[], bool] = lambda: False) -> Ite
     name = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
     with Patience(options.patience)(Registry, location(options.where)) as registry:
         report = reporter(sys.stderr, name)
-        yield Worker(options, registry, webhook, report, name, Figures(registry), stop)
+        yield Worker(options, registry, webhook, report, name, MachineFigures(registry), stop)
 
 
 def clock() -> datetime:

@@ -15,19 +15,12 @@ from typing import Any, Protocol
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
 from workbench.jobs.lease import Clock, Patience, kept_alive
-from workbench.jobs.scan import (
-    MachineFolder,
-    Scan,
-    machine_folders,
-    refuse_name,
-    scan,
-    unchanged,
-)
+from workbench.jobs.scan import MachineFolder, Scan, machine_folders, refuse_name, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.order import Order
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
-from workbench.registry.values import Claim, Judgement, Outcome, SeenLog, Version
+from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
 
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
@@ -63,7 +56,7 @@ class Judge(Protocol):
 
 
 @dataclass(frozen=True)
-class Settings:
+class PassSettings:
     """How a pass works.
 
     lease: time after which a silent worker counts as dead; settle: how long a file must not have
@@ -91,7 +84,7 @@ class PassReport:
     """
 
     machines: int
-    outcomes: tuple[Outcome, ...]
+    outcomes: tuple[LogOutcome, ...]
     busy: tuple[str, ...]
     failed: Mapping[str, str]
     growing: int
@@ -112,7 +105,7 @@ class Pass:
         self,
         registry: Registry,
         judge: Judge,
-        settings: Settings,
+        settings: PassSettings,
         clock: Clock,
         report: Report,
         stop: Callable[[], bool] = lambda: False,
@@ -131,7 +124,7 @@ class Pass:
         """What the pass did; raises BadRoot, and RegistryAway once its patience has ended."""
         folders = machine_folders(root)
         done = PassReport(len(folders), (), (), {}, 0, ())
-        outcomes: list[Outcome] = []  # kept also of a machine that fails half-way
+        outcomes: list[LogOutcome] = []  # kept also of a machine that fails half-way
         for folder in folders:
             if self._stop():
                 break
@@ -151,7 +144,7 @@ class Pass:
         return replace(done, outcomes=tuple(outcomes))
 
     def _machine(
-        self, folder: MachineFolder, done: PassReport, outcomes: list[Outcome]
+        self, folder: MachineFolder, done: PassReport, outcomes: list[LogOutcome]
     ) -> PassReport:
         name, settings, retry = folder.name, self._settings, self._settings.patience
         refuse_name(folder)
@@ -196,7 +189,7 @@ class Pass:
         return log.sha256 in found.complete or _replaced(log, found)
 
     def _logs(
-        self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[Outcome]
+        self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[LogOutcome]
     ) -> None:
         """Judge the machine's logs; what is waiting is asked again, now that it is ours."""
         for log, begun in self._settings.patience(self._queue.waiting, folder.name):
@@ -210,7 +203,7 @@ class Pass:
 
     def _log(
         self, folder: MachineFolder, found: Scan, claim: Claim, log: SeenLog, begun: int
-    ) -> Outcome | None:
+    ) -> LogOutcome | None:
         """The log's result; None where its file has changed in the meantime."""
         retry, settings = self._settings.patience, self._settings
         if _replaced(log, found):

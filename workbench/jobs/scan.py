@@ -13,7 +13,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
-from workbench.logs import shown_name
+from workbench.logs.runs import shown_name
 from workbench.registry.values import SeenLog
 
 CARD, LOGS = "card.toml", "logs"

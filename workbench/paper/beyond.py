@@ -19,11 +19,11 @@ from design.margins import Margins, margins
 from design.servo import Compensation, Servo
 from design.tune import Asked, Goals, Tuned, tune_rst
 from identification.arrays import Array
-from identification.clean import RIG_A, RIG_C
 from identification.errors import BadSpecification
-from identification.karnopp import NAMES, Karnopp
-from identification.plant import Actuator
-from workbench.paper.figures_rig import Identified
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator
+from identification.signals.clean import RIG_A, RIG_C
+from workbench.paper.figures_rig import IdentifiedRig
 from workbench.paper.measures import Case, measure
 from workbench.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst
 
@@ -56,7 +56,7 @@ class Ours:
         return self.bare.figures.squared_error / self.paper.figures.squared_error
 
 
-def beyond(new: Identified, seeds: Sequence[int], tuning_seed: int) -> Ours:
+def beyond(new: IdentifiedRig, seeds: Sequence[int], tuning_seed: int) -> Ours:
     """The rig of table 3 under our design and the paper's, both of them told `new` only.
 
     Raises BadSpecification where no loop keeps the goals.

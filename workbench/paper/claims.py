@@ -7,29 +7,24 @@ from typing import Literal
 import numpy as np
 
 from workbench.paper.measures import Case
-from workbench.paper.settings import (
-    PRINTED_R,
-    PRINTED_S,
-    PRINTED_SUMS,
-    PRINTED_T,
-)
+from workbench.paper.settings import PRINTED_R, PRINTED_S, PRINTED_SUMS, PRINTED_T
 from workbench.paper.study import Study
 
-Verdict = Literal["reproduced", "partly", "not reproduced", "beaten", "kept", "short"]
+ClaimVerdict = Literal["reproduced", "partly", "not reproduced", "beaten", "kept", "short"]
 NEAR = 0.1  # of a printed ratio
 
 
 @dataclass(frozen=True)
-class Claim:
+class PaperClaim:
     """Where, what the paper has, what we have, and how the two compare."""
 
     where: str
     paper: str
     ours: str
-    verdict: Verdict
+    verdict: ClaimVerdict
 
 
-def claims(found: Study) -> tuple[Claim, ...]:
+def claims(found: Study) -> tuple[PaperClaim, ...]:
     """Every figure and printed number that can be compared, in the paper's order."""
     return (
         _table_1(found),
@@ -41,10 +36,10 @@ def claims(found: Study) -> tuple[Claim, ...]:
     )
 
 
-def _table_1(found: Study) -> Claim:
+def _table_1(found: Study) -> PaperClaim:
     printed = max(abs(paper) for paper, _ in found.table_1.values())
     ours = max(abs(error) for _, error in found.table_1.values())
-    return Claim(
+    return PaperClaim(
         "table 1",
         f"worst error of the nine {100 * printed:.1f} %",
         f"{100 * ours:.2g} %",
@@ -52,11 +47,11 @@ def _table_1(found: Study) -> Claim:
     )
 
 
-def _simulated(found: Study) -> Iterator[Claim]:
+def _simulated(found: Study) -> Iterator[PaperClaim]:
     pd, pid, later = found.simulation.pd, found.simulation.pid, found.simulation.pid_table_3
     none, without, whole = (_stand(pd[n]) for n in ("none", "no zero-velocity", "eq. (4)"))
     e_T = found.simulation.set_up.e_T
-    yield Claim(
+    yield PaperClaim(
         "figure 6",
         "PD: the error at standstill goes only with the zero-velocity term",
         f"{_mm(none)} without compensator, {_mm(without)} without that term, {_mm(whole)} with it"
@@ -64,20 +59,20 @@ def _simulated(found: Study) -> Iterator[Claim]:
         _all(whole < e_T, whole < 0.1 * without, without < none),
     )
     stick = _stand(pd["F_stick in the band"])
-    yield Claim(
+    yield PaperClaim(
         "figure 6, eq. (2)",
         "F_stick in the whole band leaves an error",
         f"{_mm(stick)}: F_e fed back drives the force loop until the body moves",
         "reproduced" if stick > whole else "not reproduced",
     )
     force = pd["eq. (4)"].run.compensation_filtered
-    yield Claim(
+    yield PaperClaim(
         "figure 7",
         "compensation force between the stick limits",
         f"{float(np.min(force)):.1f} to {float(np.max(force)):.1f} N",
         "reproduced",
     )
-    yield Claim(
+    yield PaperClaim(
         "figure 8",
         "PID: no error at standstill, but a limit cycle",
         f"F_stick in the band: {_cycle(pid['F_stick in the band'])}; eq. (4):"
@@ -87,7 +82,7 @@ def _simulated(found: Study) -> Iterator[Claim]:
             pid["eq. (4)"].figures.limit_cycle is None,
         ),
     )
-    yield Claim(
+    yield PaperClaim(
         "figure 8, table 3",
         "what lowers the limit cycle (not shown)",
         f"without compensator {_cycle(later['none'])}; eq. (4) {_cycle(later['eq. (4)'])}; without"
@@ -96,7 +91,7 @@ def _simulated(found: Study) -> Iterator[Claim]:
     )
 
 
-def _rst(found: Study) -> Claim:
+def _rst(found: Study) -> PaperClaim:
     off = [
         float(np.max(np.abs(ours - np.array(printed))))
         for ours, printed in (
@@ -105,7 +100,7 @@ def _rst(found: Study) -> Claim:
             (found.placed.T / np.array(PRINTED_T), np.ones(3)),
         )
     ]
-    return Claim(
+    return PaperClaim(
         "section 3.3.4, R, S, T",
         "printed coefficients",
         f"R to {off[0]:.2g} of {max(PRINTED_R):.0f}, S to {off[1]:.1g}, T to {100 * off[2]:.1g} %",
@@ -113,10 +108,10 @@ def _rst(found: Study) -> Claim:
     )
 
 
-def _rig(found: Study) -> Iterator[Claim]:
+def _rig(found: Study) -> Iterator[PaperClaim]:
     rig = found.rig
     none, without, whole = (_stand(rig.before[n]) for n in ("none", "no zero-velocity", "eq. (4)"))
-    yield Claim(
+    yield PaperClaim(
         "figure 11",
         "PD on the rig: no error at standstill with the compensator",
         f"{_mm(none)} without, {_mm(without)} without the zero-velocity term, {_mm(whole)} with it"
@@ -124,7 +119,7 @@ def _rig(found: Study) -> Iterator[Claim]:
         "partly" if whole < min(without, rig.set_up.e_T) else "not reproduced",
     )
     errors = [max(abs(e) for e in one.errors.values()) for one in (rig.old, rig.new)]
-    yield Claim(
+    yield PaperClaim(
         "tables 2 and 3",
         "identified on the rig",
         f"from one simulated log of 60 s each, every 10 ms: worst error {100 * errors[0]:.2g} % and"
@@ -133,7 +128,7 @@ def _rig(found: Study) -> Iterator[Claim]:
     )
     for name, figures in (("PD", "figure 14"), ("PID", "figures 15 and 16")):
         old, new = (_sum(rig.drifted[name][k]) for k in ("old", "new"))
-        yield Claim(
+        yield PaperClaim(
             figures,
             f"{name} after the drift: old parameters are worse than new ones",
             f"squared error old / new {old / new:.3f}",
@@ -143,21 +138,21 @@ def _rig(found: Study) -> Iterator[Claim]:
         if which != "none":
             paper, ours = printed / PRINTED_SUMS["none"], rig.ratio("RST", which)
             close = abs(ours / paper - 1.0) < NEAR and (ours < 1.0) == (paper < 1.0)
-            yield Claim(
+            yield PaperClaim(
                 f"printed sums, RST, {which} parameters",
                 f"{paper:.3f} of that without compensation",
                 f"{ours:.3f}",
                 "reproduced" if close else "not reproduced",
             )
     bare = rig.ratio("RST", "new, no F_stick")
-    yield Claim(
+    yield PaperClaim(
         "figure 22",
         "without F_stick not much different",
         f"{bare:.3f} against {rig.ratio('RST', 'new'):.3f}",
         "reproduced" if abs(bare / rig.ratio("RST", "new") - 1.0) < NEAR else "not reproduced",
     )
     rst, pid = (_sum(rig.drifted[name]["new"]) for name in ("RST", "PID"))
-    yield Claim(
+    yield PaperClaim(
         "section 4",
         "the RST is superior to the PID",
         f"squared error RST / PID {rst / pid:.2f}: the printed T makes y lag r by every pole",
@@ -165,18 +160,18 @@ def _rig(found: Study) -> Iterator[Claim]:
     )
 
 
-def _remark(found: Study) -> Iterator[Claim]:
+def _remark(found: Study) -> Iterator[PaperClaim]:
     maps = found.sensitivity
     middle = maps.N_c.index(2.0)
     stand = maps.standstill[0, middle]
-    yield Claim(
+    yield PaperClaim(
         "section 2, remark on e_T",
         "smaller e_T: smaller error at standstill",
         f"{_mm(stand[0])} at {_mm(maps.e_T[0])}, {_mm(stand[-1])} at {_mm(maps.e_T[-1])}",
         _all(bool(np.all(np.diff(stand) > 0))),
     )
     chatter = maps.chatter[-1, middle]
-    yield Claim(
+    yield PaperClaim(
         "section 2, remark on e_T",
         "smaller e_T: more switching under noise",
         f"at {maps.noises[-1]:g} times the noise F_comp changes by {chatter[0]:.2g} N a sample at"
@@ -185,7 +180,7 @@ def _remark(found: Study) -> Iterator[Claim]:
     )
     least, most = maps.standstill[0, 0, 4], maps.standstill[0, -1, 4]
     noisy = maps.standstill[-1, :, 0]
-    yield Claim(
+    yield PaperClaim(
         "section 2, remark on N_c",
         "larger N_c: larger error at standstill",
         f"at the paper's noise {_mm(least)} to {_mm(most)}; at {maps.noises[-1]:g} times, e_T ="
@@ -198,22 +193,22 @@ def _remark(found: Study) -> Iterator[Claim]:
     )
 
 
-def _beyond(found: Study) -> Iterator[Claim]:
+def _beyond(found: Study) -> Iterator[PaperClaim]:
     ours, margin = found.ours, found.ours.tuned.margins
     samples = float("inf") if margin.delay_s is None else margin.delay_s / margin.h
-    yield Claim(
+    yield PaperClaim(
         "beyond: squared error",
         "its RST with new parameters: 1",
         f"{ours.ratio:.3f} (without compensator {ours.bare_ratio:.3f})",
         "beaten" if ours.ratio <= 0.5 else "short",
     )
-    yield Claim(
+    yield PaperClaim(
         "beyond: margins",
         f"modulus margin {ours.paper_margins.modulus:.2f}; asked of ours: 0.5, two samples",
         f"modulus margin {margin.modulus:.2f}, delay margin {samples:.1f} samples",
         "kept" if margin.modulus >= 0.5 and samples >= 2.0 else "short",
     )
-    yield Claim(
+    yield PaperClaim(
         "beyond: control energy",
         f"{ours.paper.figures.energy:.3g} V² s",
         f"{ours.ours.figures.energy:.3g} V² s",
@@ -239,5 +234,5 @@ def _cycle(case: Case) -> str:
     return "none" if found is None else f"{_mm(found.amplitude)}, {found.period:.2f} s"
 
 
-def _all(*holds: bool) -> Verdict:
+def _all(*holds: bool) -> ClaimVerdict:
     return "reproduced" if all(holds) else "partly" if any(holds) else "not reproduced"

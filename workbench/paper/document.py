@@ -4,12 +4,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.model import versions
+from workbench.documents.model import versions
+from workbench.output import Row, table, written
 from workbench.paper.claims import claims
 from workbench.paper.measures import Case, Figures
 from workbench.paper.settings import PRINTED_SUMS
 from workbench.paper.study import Study
-from workbench.views import Row, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -108,7 +108,7 @@ def figure_cells(found: Figures) -> tuple[str, ...]:
     )
 
 
-def rival_rows(found: Study, number: int) -> list[Row]:
+def rival_servo_rows(found: Study, number: int) -> list[Row]:
     """The rivals on the plant of a table, the setting after the name."""
     return [
         (f"{name} ({one.setting})", *figure_cells(one.case.figures))
@@ -124,8 +124,8 @@ def paper_view(found: Study, folder: Path) -> "Group":
         f"seeds {', '.join(map(str, found.seeds))} judge; chosen on seed {found.tuning_seed}",
         table(CLAIMS, claim_rows(found), ()),
         "rivals on the plant of table 1, steps of 0.1 m:",
-        table(FIGURES, rival_rows(found, 1), (1, 2, 4)),
+        table(FIGURES, rival_servo_rows(found, 1), (1, 2, 4)),
         "rivals on the plant of table 3:",
-        table(FIGURES, rival_rows(found, 3), (1, 2, 4)),
+        table(FIGURES, rival_servo_rows(found, 3), (1, 2, 4)),
         written(folder, "report.html", "paper.json"),
     )

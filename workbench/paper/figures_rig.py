@@ -10,12 +10,12 @@ import numpy as np
 
 from design.loop import LoopNoise
 from design.servo import Compensation, simulate_servo
-from identification.excitation import RandomSteps, reference_signal
-from identification.karnopp import NAMES, Karnopp
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
 from identification.log import Log, Rig
-from identification.output_error import fit_karnopp
-from identification.plant import Actuator
-from identification.result import KarnoppFit
+from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import NAMES, Karnopp
+from identification.model.plant import Actuator
+from identification.signals.excitation import RandomSteps, reference_signal
 from workbench.paper.measures import Case, compare
 from workbench.paper.settings import (
     NOISE_F,
@@ -35,7 +35,7 @@ STIFF = 4.0  # the rig's PD times this moves the machine enough to tell its para
 
 
 @dataclass(frozen=True)
-class Identified:
+class IdentifiedRig:
     """The rig identified from one simulated log, and the true values beside."""
 
     fit: KarnoppFit
@@ -67,8 +67,8 @@ class RigFigures:
 
     set_up: SetUp
     stepped: SetUp
-    old: Identified
-    new: Identified
+    old: IdentifiedRig
+    new: IdentifiedRig
     before: dict[str, Case]
     drifted: dict[str, dict[str, Case]]
 
@@ -78,7 +78,7 @@ class RigFigures:
         return cases[compensator].figures.squared_error / cases["none"].figures.squared_error
 
 
-def identify_rig(set_up: SetUp, truth: Karnopp, seed: int) -> Identified:
+def identify_rig(set_up: SetUp, truth: Karnopp, seed: int) -> IdentifiedRig:
     """One experiment of 60 s on the rig with this friction, and the fit of its log."""
     rng = np.random.default_rng(seed)
     t = set_up.h * np.arange(round(EXPERIMENT / set_up.h), dtype=np.float64)
@@ -89,7 +89,7 @@ def identify_rig(set_up: SetUp, truth: Karnopp, seed: int) -> Identified:
     run = simulate_servo(set_up.plant(truth), set_up.servo(stiff), reference, set_up.h, noise=noise)
     signals = {"t": run.t, "y": run.y_measured, "F": run.F_measured, "u": run.u}
     fit = fit_karnopp([Log("rig", signals)], np.random.default_rng(seed), rig=Rig("force"))
-    return Identified(fit, truth)
+    return IdentifiedRig(fit, truth)
 
 
 def rig_figures(seeds: Sequence[int], log_seed: int) -> RigFigures:

@@ -12,7 +12,7 @@ import numpy as np
 from design.rivals import DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.servo import Servo
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 from workbench.paper.measures import Case, measure
 from workbench.paper.settings import (
     NOISE_Y,
@@ -34,14 +34,14 @@ DRIVEN = 0.05  # m/s per root s: what drives the observer's velocity besides the
 
 
 @dataclass(frozen=True)
-class Rival:
+class RivalServo:
     """A countermeasure with the setting that was best for it, in words."""
 
     setting: str
     case: Case
 
 
-def rivals(table: int, seeds: Sequence[int], tuning_seed: int) -> dict[str, Rival]:
+def rivals(table: int, seeds: Sequence[int], tuning_seed: int) -> dict[str, RivalServo]:
     """All of them on the plant of `table`, with the compensator and the plain PD and PID.
 
     What rests on a model has, on table 1, the paper's estimates of it, on table 3 the true values.
@@ -49,7 +49,7 @@ def rivals(table: int, seeds: Sequence[int], tuning_seed: int) -> dict[str, Riva
     set_up, truth = simulation(), friction_of(table)
     known = TABLE_1_ESTIMATED if table == 1 else truth
     out = {}
-    for name, choices in candidates(set_up, known):
+    for name, choices in rival_servos(set_up, known):
         tried = []
         for setting, servo in choices:
             try:
@@ -58,11 +58,11 @@ def rivals(table: int, seeds: Sequence[int], tuning_seed: int) -> dict[str, Riva
                 continue
             tried.append((case.figures.squared_error, setting, servo))
         _, setting, servo = min(tried, key=lambda one: one[0])
-        out[name] = Rival(setting, measure(set_up, truth, servo, seeds))
+        out[name] = RivalServo(setting, measure(set_up, truth, servo, seeds))
     return out
 
 
-def candidates(set_up: SetUp, known: Karnopp) -> Iterable[tuple[str, list[tuple[str, Servo]]]]:
+def rival_servos(set_up: SetUp, known: Karnopp) -> Iterable[tuple[str, list[tuple[str, Servo]]]]:
     """Every rival with the settings to choose from, each in words and as a servo."""
     pd, pid, compensation = simulation_pd(), simulation_pid(), set_up.compensation(known)
     yield "PD", [("k_d = 200 N/m", set_up.servo(pd))]

@@ -7,23 +7,17 @@ import numpy as np
 
 from design.polynomial import multiply, second_order
 from design.rst import RST, design_rst
-from identification.karnopp import NAMES
-from identification.output_error import fit_karnopp
-from workbench.card import load_card
-from workbench.fetch import card_path
+from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.model.karnopp import NAMES
+from workbench.cards.card import load_card
+from workbench.logs.fetch import card_path
 from workbench.paper.beyond import Ours, beyond
 from workbench.paper.figures_rig import RigFigures, rig_figures
 from workbench.paper.figures_simulation import SimulationFigures, simulation_figures
-from workbench.paper.rivals import Rival, rivals
+from workbench.paper.rivals import RivalServo, rivals
 from workbench.paper.sensitivity import Sensitivity, sensitivity
-from workbench.paper.settings import (
-    DOMINANT,
-    PRINTED_A,
-    PRINTED_B,
-    TABLE_1_ESTIMATED,
-    friction_of,
-)
-from workbench.recording import record
+from workbench.paper.settings import DOMINANT, PRINTED_A, PRINTED_B, TABLE_1_ESTIMATED, friction_of
+from workbench.steps.simulate import record
 
 ZEROS = ((100.0, 0.1), (200.0, 0.05), (314.0, 0.05))  # (w [rad/s], zeta) of H_R, worked out
 TUNING = 100  # added to the first seed for what is chosen
@@ -45,7 +39,7 @@ class Study:
     placed: RST
     simulation: SimulationFigures
     rig: RigFigures
-    competitors: dict[int, dict[str, Rival]]
+    competitors: dict[int, dict[str, RivalServo]]
     sensitivity: Sensitivity
     ours: Ours
 

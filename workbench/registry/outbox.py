@@ -22,7 +22,7 @@ from sqlalchemy.orm import Session
 from workbench.registry.database import Database
 from workbench.registry.rows import lock_machine
 from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
-from workbench.registry.values import Alarm, Verdict
+from workbench.registry.values import Alarm, LogVerdict
 
 FIRST = timedelta(minutes=1)  # after an alarm's first refusal; each further one doubles it
 LONGEST = timedelta(hours=4)
@@ -34,7 +34,7 @@ class Outbox:
     def __init__(self, database: Database) -> None:
         self._database = database
 
-    def fill(self, verdicts: Sequence[Verdict], *, since: datetime, now: datetime) -> None:
+    def fill(self, verdicts: Sequence[LogVerdict], *, since: datetime, now: datetime) -> None:
         """Put the results of these verdicts from `since` on into it that never were in it."""
         told = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
         here = and_(OutboxRow.log_id == OutcomeRow.log_id, OutboxRow.turn == OutcomeRow.turn)

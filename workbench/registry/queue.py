@@ -27,8 +27,8 @@ from workbench.registry.rows import (
     lock_machine,
     logs_behind,
     need_machine,
-    plain,
     seen,
+    storable_text,
     turn,
     version_in_force,
 )
@@ -45,7 +45,7 @@ from workbench.registry.values import (
     Claim,
     DecisionKind,
     Judgement,
-    Outcome,
+    LogOutcome,
     SeenLog,
     Version,
 )
@@ -169,7 +169,7 @@ class Queue:
         by: str,
         now: datetime,
         order: Order = "time-or-name",
-    ) -> Outcome:
+    ) -> LogOutcome:
         """Record a log's result, with its candidate and the decision on it, all or nothing.
 
         What an older log than one behind the model in force has led to is recorded and not put
@@ -205,7 +205,7 @@ class Queue:
                 turn=now_turn,
                 version_id=None if current is None else current.id,
                 verdict=judgement.verdict,
-                reason=plain(judgement.reason),
+                reason=storable_text(judgement.reason),
                 evidence=dumps(judgement.evidence),
                 token=claim.token,
                 at=now,
@@ -257,7 +257,7 @@ class Queue:
                     return found
         return None
 
-    def outcomes(self, machine: str) -> tuple[Outcome, ...]:
+    def outcomes(self, machine: str) -> tuple[LogOutcome, ...]:
         """Results of a machine's logs, in the order of their files."""
         query = (
             select(LogRow, OutcomeRow)
@@ -379,10 +379,10 @@ def _log_row(machine: str, log: SeenLog, now: datetime) -> LogRow:
     )
 
 
-def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> Outcome:
+def _outcome(session: Session, log: LogRow, row: OutcomeRow) -> LogOutcome:
     number = select(VersionRow.number).where(VersionRow.id == row.version_id)
     verdict: Any = row.verdict
-    return Outcome(
+    return LogOutcome(
         machine=log.machine,
         log=seen(log),
         verdict=verdict,

@@ -9,6 +9,7 @@ from sqlalchemy import ColumnElement, and_, func, or_, select
 from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session, aliased
 
+from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.errors import BadRegistry
 from workbench.registry.tables import (
@@ -49,8 +50,6 @@ def need_machine(session: Session, name: str, *, lock: bool = False) -> None:
     """Raises BadRegistry where there is no such machine; lock: as `lock_machine` does."""
     query = select(MachineRow.name).where(MachineRow.name == name)
     if session.scalar(query.with_for_update() if lock else query) is None:
-        from workbench.card import nearest
-
         known = session.scalars(select(MachineRow.name).order_by(MachineRow.name)).all()
         said = nearest(name, known) if known else "; it holds no machine yet"
         raise BadRegistry(f"the registry has no machine {name!r}{said}")
@@ -126,7 +125,7 @@ def decide(
         kind=kind,
         version_id=version.id,
         log_id=log_id,
-        reason=plain(reason),
+        reason=storable_text(reason),
         evidence=dumps(evidence or {}),
         made_by=by,
         at=now,
@@ -209,7 +208,7 @@ def seen(row: LogRow) -> SeenLog:
     return SeenLog(row.sha256, row.file, row.size, row.mtime_ns)
 
 
-def plain(text: str) -> str:
+def storable_text(text: str) -> str:
     """The text as every database takes it: no lone surrogates of odd file names, and no NUL."""
     return text.replace("\0", "\\0").encode("utf-8", "backslashreplace").decode("utf-8")
 

@@ -8,7 +8,7 @@ from typing import Any, Literal
 Document = Mapping[str, Any]
 Kind = Literal["model", "design", "validation"]
 DecisionKind = Literal["added", "promoted", "rolled_back", "refused"]
-Verdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
+LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class SeenLog:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class LogOutcome:
     """What a log led to; number: the version in force against which it was judged.
 
     turn: how often the log had been reopened before.
@@ -76,7 +76,7 @@ class Outcome:
 
     machine: str
     log: SeenLog
-    verdict: Verdict
+    verdict: LogVerdict
     reason: str
     number: int | None
     evidence: Document
@@ -118,7 +118,7 @@ class Judgement:
     rival: one that was made too and is refused, with its reason.
     """
 
-    verdict: Verdict
+    verdict: LogVerdict
     reason: str
     candidate: Candidate | None = None
     evidence: Document = field(default_factory=dict)

@@ -4,9 +4,9 @@ from collections.abc import Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
 
+from workbench.output import table
 from workbench.registry.difference import Line, Number
-from workbench.registry.values import Decision, MachineState, Outcome
-from workbench.views import table
+from workbench.registry.values import Decision, LogOutcome, MachineState
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -35,7 +35,7 @@ def list_view(machines: Sequence[MachineState]) -> "Table | str":
 
 
 def machine_view(
-    state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[Outcome]
+    state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
 ) -> "Group":
     """A machine: what is in force and why, every decision, every log's result."""
     from rich.console import Group, RenderableType
@@ -64,7 +64,7 @@ def machine_view(
     return Group(*parts)
 
 
-def outcomes_view(outcomes: Sequence[Outcome]) -> "Table":
+def outcomes_view(outcomes: Sequence[LogOutcome]) -> "Table":
     """A line a log."""
     return table(
         ("machine", "log", "verdict", "version", "reason"),

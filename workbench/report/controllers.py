@@ -6,9 +6,9 @@ from scipy.signal import lfilter
 from design.margins import sensitivities
 from design.rst import closed_loop
 from identification.arrays import Array
-from workbench.design_values import Controller, Design
-from workbench.design_views import HEAD, design_lines, margin_rows, polynomial_lines
-from workbench.parameter_units import shown
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Controller, Design
+from workbench.report.design_tables import HEAD, design_lines, margin_rows, polynomial_lines
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, style
 from workbench.report.page import Section, render
 
@@ -27,7 +27,7 @@ def coefficients(found: Design) -> Section:
     return Section("Coefficients", render("lines", lines=text))
 
 
-def sensitivity(found: Design, rotary: bool = False) -> Section:
+def sensitivity_section(found: Design, rotary: bool = False) -> Section:
     """|S_yp| with its limit, and |S_up|."""
     A, B = np.array(found.plant.A), np.array(found.plant.B)
     w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h

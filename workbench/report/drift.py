@@ -4,26 +4,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from workbench.drift_views import (
+from workbench.report.drift_tables import (
     RUN_HEAD,
     SHIFT_HEAD,
+    drift_sentence,
     notes,
     run_rows,
-    sentence,
     shift_rows,
 )
-from workbench.drifting import Drifted, Tested
-from workbench.report.figures import (
-    BAND,
-    MEASURED,
-    MODEL,
-    REFERENCE,
-    figure,
-    inline,
-    label,
-    style,
-)
+from workbench.report.figures import BAND, MEASURED, MODEL, REFERENCE, figure, inline, label, style
 from workbench.report.page import Section, page, render
+from workbench.steps.drift import Drifted, Tested
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -42,7 +33,7 @@ def drift_report(found: Drifted) -> str:
             _table(f"Parameters before and after, {last.source.file}", SHIFT_HEAD, shift_rows(last))
         )
     sections.append(Section("Notes", render("lines", lines=notes(found))))
-    return page(f"Drift test of {found.model.card}", sentence(found), sections)
+    return page(f"Drift test of {found.model.card}", drift_sentence(found), sections)
 
 
 def _pictures(found: Drifted, last: Tested) -> Section:

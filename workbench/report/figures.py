@@ -86,7 +86,7 @@ def thinned(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
     return x[index], y[index]
 
 
-def spread(count: int, most: int = SCATTER) -> IntArray:
+def evenly_spread(count: int, most: int = SCATTER) -> IntArray:
     """Indices of at most `most` of `count` points, evenly spread."""
     step = max(1, -(-count // most))
     return np.arange(0, count, step, dtype=np.int64)

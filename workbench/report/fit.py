@@ -3,14 +3,14 @@
 import numpy as np
 
 from identification.arrays import Array
-from identification.inverse_model import Smoothing, force_predicted
 from identification.log import Log
-from identification.simulate import FreeRun
-from workbench.model import Model
-from workbench.parameter_units import shown
+from identification.model.inverse_model import Smoothing, force_predicted
+from identification.simulation.free_run import FreeRun
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import Model
 from workbench.report.figures import MEASURED, MODEL, figure, inline, label, line, style
+from workbench.report.model_tables import held
 from workbench.report.page import Section, render
-from workbench.views import held
 
 ZOOM = 0.12  # part of the log shown enlarged
 

@@ -6,14 +6,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.arrays import Array
-from identification.differentiate import differentiate, low_pass
-from identification.inverse_model import held_force
-from identification.karnopp import NAMES, Karnopp
 from identification.log import Log
-from identification.result import KarnoppFit
-from workbench.model import Model
-from workbench.parameter_units import shown
-from workbench.report.figures import BAND, MEASURED, MODEL, figure, inline, label, spread, style
+from identification.model.estimates import KarnoppFit
+from identification.model.inverse_model import held_force
+from identification.model.karnopp import NAMES, Karnopp
+from identification.signals.differentiate import differentiate, low_pass
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import Model
+from workbench.report.figures import (
+    BAND,
+    MEASURED,
+    MODEL,
+    evenly_spread,
+    figure,
+    inline,
+    label,
+    style,
+)
 from workbench.report.page import Section, render
 
 if TYPE_CHECKING:
@@ -51,7 +60,7 @@ def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
     with style():
         drawn = figure(9.0, 4.6)
         axes = drawn.subplots()
-        keep = spread(len(data.v))
+        keep = evenly_spread(len(data.v))
         axes.plot(
             data.v[keep], data.F_f[keep], ".", ms=3.5, color=MEASURED, alpha=0.45, mew=0,
             rasterized=True, label="log: F_e − m a",
@@ -79,7 +88,7 @@ def _slip(v: Array, p: Karnopp) -> Array:
 def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     """95 % interval of the sliding friction at `v` over equally likely parameters."""
     nine = np.tile(p.array, (min(CURVES, len(fit.samples)), 1))
-    drawn = fit.samples[spread(len(fit.samples), CURVES)][: len(nine)]
+    drawn = fit.samples[evenly_spread(len(fit.samples), CURVES)][: len(nine)]
     for column, name in enumerate(fit.free):
         if name in NAMES:
             nine[: len(drawn), NAMES.index(name)] = drawn[:, column]

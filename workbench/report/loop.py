@@ -4,11 +4,11 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from design.loop import LoopRun
-from workbench.parameter_units import shown
+from workbench.cards.parameter_units import shown
 from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, line, style
 from workbench.report.page import Section, render
-from workbench.validating import COMPENSATED, Traces, Validation
-from workbench.validation_views import HEAD, validation_lines, validation_rows
+from workbench.report.validation_tables import HEAD, validation_lines, validation_rows
+from workbench.steps.validate import COMPENSATED, Traces, Validation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

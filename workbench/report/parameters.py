@@ -1,11 +1,11 @@
 """Section: the parameters in a table, with what each means."""
 
-from workbench.model import Model, used
+from workbench.documents.model import Model, used
+from workbench.report.model_tables import parameter_rows
 from workbench.report.page import Section, render
-from workbench.views import parameter_rows
 
 
-def parameters(model: Model) -> Section:
+def parameters_section(model: Model) -> Section:
     """The parameters with units and intervals, or why there is none."""
     held = {**model.friction, **(model.actuator or {})}
     assumed = ", ".join(

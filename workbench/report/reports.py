@@ -2,24 +2,24 @@
 
 from collections.abc import Mapping
 
-from workbench.design_values import Design
-from workbench.pipeline import Identified
-from workbench.predicting import fitted_run
+from workbench.documents.design import Design
 from workbench.report.controllers import (
     coefficients,
     controllers,
-    sensitivity,
+    sensitivity_section,
     step_response,
 )
 from workbench.report.fit import fit
 from workbench.report.friction import friction_curve
 from workbench.report.loop import judged, loop
+from workbench.report.model_tables import fit_lines, summary
 from workbench.report.page import Section, page, render
-from workbench.report.parameters import parameters
+from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
-from workbench.validating import Traces, Validation
-from workbench.validation_views import verdict
-from workbench.views import fit_lines, summary
+from workbench.report.validation_tables import validation_verdict
+from workbench.steps.identify_sources import Identified
+from workbench.steps.predict import fitted_run
+from workbench.steps.validate import Traces, Validation
 
 
 def identification_report(found: Identified) -> str:
@@ -28,7 +28,7 @@ def identification_report(found: Identified) -> str:
     run = fitted_run(model, log, 0)
     notes = [*fit_lines(model), *found.remarks, *model.fit.remarks]
     sections = (
-        parameters(model),
+        parameters_section(model),
         Section("In words", render("lines", lines=notes)),
         fit(model, log, run),
         friction_curve(model, found.fit, log),
@@ -46,7 +46,7 @@ def design_report(found: Design, rotary: bool = False) -> str:
     sections = (
         controllers(found, rotary),
         step_response(found),
-        sensitivity(found, rotary),
+        sensitivity_section(found, rotary),
         coefficients(found),
     )
     return page(f"Design for {found.card}", lead, sections)
@@ -58,4 +58,4 @@ def validation_report(
     """HTML: whether the design holds in simulation, and what the loop does."""
     places = dict.fromkeys(place for _, place in traces)
     sections = (judged(found, rotary), *(loop(traces, place, rotary) for place in places))
-    return page(f"Validation for {found.card}", f"{verdict(found)}.", sections)
+    return page(f"Validation for {found.card}", f"{validation_verdict(found)}.", sections)

@@ -3,12 +3,12 @@
 import numpy as np
 
 from identification.arrays import Array
-from identification.differentiate import differentiate
-from identification.inverse_model import SURE
 from identification.log import Log
-from identification.simulate import FreeRun
-from workbench.model import Model
-from workbench.parameter_units import shown
+from identification.model.inverse_model import SURE_SLIDING
+from identification.signals.differentiate import differentiate
+from identification.simulation.free_run import FreeRun
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import Model
 from workbench.report.figures import MODEL, REFERENCE, figure, inline, label, line, style
 from workbench.report.friction import friction_data
 from workbench.report.page import Section, render
@@ -51,7 +51,7 @@ def _force_residual(model: Model, log: Log) -> tuple[Array, Array]:
     motion = differentiate(log["y"], log.h)
     data, p = friction_data(model, log), model.karnopp
     times = (log["t"] - log["t"][0])[motion.edge : len(log) - motion.edge]
-    fast = np.abs(data.v) > SURE * motion.v_noise
+    fast = np.abs(data.v) > SURE_SLIDING * motion.v_noise
     slides = fast & ((data.v > p.dv_p) | (data.v < p.dv_n))
     curve = np.where(data.v > 0, p.F_cp + p.F_vp * data.v, -p.F_cn + p.F_vn * data.v)
     index = np.flatnonzero(slides)

@@ -1,5 +1,6 @@
 """The report of a trace: verdict, residual before and after, what explains it, rivals."""
 
+from workbench.output import Row
 from workbench.report.page import Section, page, render
 from workbench.report.trace_friction import friction_before_after
 from workbench.report.trace_pictures import (
@@ -9,7 +10,7 @@ from workbench.report.trace_pictures import (
     over_time,
     pictures,
 )
-from workbench.trace_views import (
+from workbench.report.trace_tables import (
     DRIFT_HEAD,
     EFFECT_HEAD,
     RIVAL_HEAD,
@@ -22,11 +23,10 @@ from workbench.trace_views import (
     errors_head,
     next_run,
     rival_rows,
-    sentence,
+    trace_sentence,
     words,
 )
-from workbench.tracing import Traced
-from workbench.views import Row
+from workbench.steps.trace import Traced
 
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
@@ -66,7 +66,7 @@ def trace_report(traced: Traced) -> str:
     notes = [*traced.remarks, *found.remarks]
     if notes:
         sections.append(Section("Notes", render("lines", lines=notes)))
-    lead = f"{sentence(traced)} {next_run(found)}".strip()
+    lead = f"{trace_sentence(traced)} {next_run(found)}".strip()
     return page(f"Trace of {model.card}", lead, sections)
 
 

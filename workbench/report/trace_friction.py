@@ -5,27 +5,27 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.along import contribution
 from identification.arrays import Array
 from identification.effects._base import Acting
-from identification.karnopp import NAMES, Karnopp
-from identification.trace_result import Trace
-from workbench.model import used
-from workbench.parameter_units import shown
+from identification.model.karnopp import NAMES, Karnopp
+from identification.simulation.effect_along_motion import contribution
+from identification.tracing.result import Trace
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import used
 from workbench.report.figures import (
     MEASURED,
     MODEL,
     REFERENCE,
+    evenly_spread,
     figure,
     inline,
     label,
-    spread,
     style,
 )
 from workbench.report.friction import MARGIN, friction_data
 from workbench.report.page import Section, render
-from workbench.trace_views import words
-from workbench.tracing import Traced
+from workbench.report.trace_tables import words
+from workbench.steps.trace import Traced
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,7 +46,7 @@ def friction_before_after(traced: Traced) -> Section:
     source = traced.test[0] if _drifted(found) and traced.test else traced.train[0]
     data = friction_data(model, source.log)
     reach = max(float(np.quantile(np.abs(data.v), 0.999)), 2 * max(after.dv_p, -after.dv_n))
-    keep = spread(len(data.v))
+    keep = evenly_spread(len(data.v))
     v, F_f = data.v[keep], data.F_f[keep]
     with style():
         drawn = figure(9.0, 3.8)

@@ -5,25 +5,25 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from identification.along import contribution
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting, Effect
-from identification.karnopp import Karnopp
-from identification.trace_result import Residual, Trace
-from workbench.parameter_units import shown
+from identification.model.karnopp import Karnopp
+from identification.simulation.effect_along_motion import contribution
+from identification.tracing.result import Residual, Trace
+from workbench.cards.parameter_units import shown
 from workbench.report.figures import (
     MEASURED,
     MODEL,
     OTHER,
     REFERENCE,
+    evenly_spread,
     figure,
     inline,
     label,
-    spread,
     style,
 )
 from workbench.report.page import Section, render
-from workbench.trace_views import words
+from workbench.report.trace_tables import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -189,7 +189,7 @@ def over_time(residual: Residual, rotary: bool) -> Section:
     with style():
         drawn = figure(9.0, 3.2)
         axes = drawn.subplots()
-        keep = spread(len(residual.t))
+        keep = evenly_spread(len(residual.t))
         for values, colour, name in _both(residual):
             axes.plot(
                 residual.t[keep], values[keep], ".", ms=3, mew=0, color=colour, label=name,
@@ -208,7 +208,8 @@ def over_time(residual: Residual, rotary: bool) -> Section:
         name = f"trace-time-{residual.equation}"
         svg = inline(drawn, name, "residual against time, before and after")
     shares = [
-        f"{inside(values, residual.noise):.0f} % ({name})" for values, _, name in _both(residual)
+        f"{share_inside(values, residual.noise):.0f} % ({name})"
+        for values, _, name in _both(residual)
     ]
     caption = (
         f"{EQUATIONS[residual.equation].capitalize()}, {ROWS.get(residual.equation, WINDOWS)}; a"
@@ -226,7 +227,7 @@ def _both(residual: Residual) -> list[tuple[Array, str, str]]:
     return [(residual.before, BEFORE, "before"), after]
 
 
-def inside(values: Array, noise: Array) -> float:
+def share_inside(values: Array, noise: Array) -> float:
     """Points within two standard deviations of the noise [%]."""
     return 100 * float(np.mean(np.abs(values) <= 2 * noise))
 
@@ -250,7 +251,7 @@ def against_signal(picture: Picture, rotary: bool) -> Section:
             unit = f"residual [{_unit(residual, rotary)}]" if axes is every[0] else ""
             label(axes, axis_label(picture.signal, rotary), unit, title)
         if picture.curve is not None and picture.effect:
-            for at, _ in directions(residual).values():
+            for at, _ in by_direction(residual).values():
                 every[0].plot(
                     *running_median(x[at], picture.curve[at], FINE), color=MEASURED, lw=1.0,
                     ls="--", label=f"fitted: {words(picture.effect.key)}",
@@ -268,9 +269,9 @@ def against_signal(picture: Picture, rotary: bool) -> Section:
 
 def _cloud(axes: "Axes", residual: Residual, x: Array, values: Array, colour: str) -> None:
     """Points against a signal, and their running median in each direction of motion."""
-    keep = spread(len(x), DOTS)
+    keep = evenly_spread(len(x), DOTS)
     axes.plot(x[keep], values[keep], ".", ms=3, mew=0, color=colour, alpha=0.6, rasterized=True)
-    for name, (at, way) in directions(residual).items():
+    for name, (at, way) in by_direction(residual).items():
         axes.plot(*running_median(x[at], values[at], LEVELS), color=way, lw=1.8, label=name)
 
 
@@ -286,7 +287,7 @@ def _caption(picture: Picture) -> str:
     return text
 
 
-def directions(residual: Residual) -> dict[str, tuple[BoolArray, str]]:
+def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, str]]:
     """Rows of each direction of motion and its colour; those of too few points are left out."""
     v = residual.signals.get("v")
     if v is None:

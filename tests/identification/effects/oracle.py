@@ -10,7 +10,7 @@ import sympy  # type: ignore[import-untyped]
 
 from identification.arrays import Array
 from identification.effects._base import Acting
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 
 STATE = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
 Evolve = Callable[[float, dict[str, float], float], float]

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log
-from identification.plant import Plant
-from identification.simulate import free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.simulation.free_run import free_run
 from tests.identification.effects.oracle import Evolve, Written, euler
 from tests.identification.motor_logs import made
 from tests.identification.motor_logs import plant as motor
@@ -113,7 +113,7 @@ def test_a_switch_within_a_sub_step_is_where_it_is_in_finer_ones(
 ) -> None:
     log, one = made(1), motor({key: values})
     coarse = free_run(one, log, (0.0, 0.0, 0.0), "command").y
-    monkeypatch.setattr("identification.simulate.pieces", lambda *_: 80)
-    monkeypatch.setattr("identification.simulate.fewer", lambda *_: 80)
+    monkeypatch.setattr("identification.simulation.free_run.pieces", lambda *_: 80)
+    monkeypatch.setattr("identification.simulation.free_run.fewer", lambda *_: 80)
     fine = free_run(one, log, (0.0, 0.0, 0.0), "command").y
     assert np.max(np.abs(coarse - fine)) < most

@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification import simulate
 from identification.arrays import Array
-from identification.effect_table import LONGEST_BRISTLE, EffectTable, pieces
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.simulate import FreeRun, free_run
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Motor, Plant
+from identification.simulation import free_run as simulate
+from identification.simulation.effect_table import LONGEST_BRISTLE, EffectTable, pieces
+from identification.simulation.free_run import FreeRun, free_run
 from tests.identification.plants import table
 
 H = 1e-3

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.along import contribution
 from identification.arrays import Array
-from identification.library import built_in
+from identification.effects._library import built_in
 from identification.log import Log
-from identification.plant import Motor, Plant
-from identification.simulate import FreeRun, free_run
+from identification.model.plant import Motor, Plant
+from identification.simulation.effect_along_motion import contribution
+from identification.simulation.free_run import FreeRun, free_run
 from tests.identification.plants import ACTUATOR, command, table
 
 H = 1e-3

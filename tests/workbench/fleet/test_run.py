@@ -24,7 +24,7 @@ from tests.workbench.fleet.values import (
 )
 from workbench.fleet.cluster import Cluster, Work, cluster_at, local_cluster
 from workbench.fleet.recording import LEASE, InRegistry, NoRegistry, Recorder
-from workbench.fleet.run import Report, Run, Settings
+from workbench.fleet.run import FleetRun, FleetSettings, Report
 from workbench.fleet.store import RESULTS, ResultStore
 from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
 from workbench.jobs.lease import Patience
@@ -58,8 +58,8 @@ def run(
     card: str = "card",
 ) -> Report:
     with ResultStore(folder) as store:
-        settings = Settings("/nowhere", card)
-        return Run(cluster, store, recorder or NoRegistry(), settings, clock, work=work)(logs)
+        settings = FleetSettings("/nowhere", card)
+        return FleetRun(cluster, store, recorder or NoRegistry(), settings, clock, work=work)(logs)
 
 
 def verdicts(folder: Path) -> dict[str, str]:
@@ -123,8 +123,8 @@ def test_a_worker_killed_from_outside(cluster: Cluster, tmp_path: Path) -> None:
             os.kill(pids[0], signal.SIGKILL)
 
     with ResultStore(tmp_path) as store:
-        settings = Settings("/nowhere", "card")
-        found = Run(cluster, store, NoRegistry(), settings, clock, work=slow, advance=advance)
+        settings = FleetSettings("/nowhere", "card")
+        found = FleetRun(cluster, store, NoRegistry(), settings, clock, work=slow, advance=advance)
         done = found([*LOGS, *(log_of(f"n{number}") for number in range(6))])
     assert killed
     assert done.verdicts == {"identified": 12}
@@ -202,7 +202,9 @@ def test_a_result_against_a_version_that_is_gone_is_left(registry: Registry) -> 
 
 def test_logs_without_any_card_are_refused(cluster: Cluster, tmp_path: Path) -> None:
     with ResultStore(tmp_path / "out") as store:
-        found = Run(cluster, store, NoRegistry(), Settings(str(tmp_path)), clock, work=answer)
+        found = FleetRun(
+            cluster, store, NoRegistry(), FleetSettings(str(tmp_path)), clock, work=answer
+        )
         with pytest.raises(BadLogs, match=r"no card.toml .* --card"):
             found(LOGS)
 

@@ -13,12 +13,12 @@ import pytest
 
 from tests.chain import TABLES
 from tests.workbench.fleet.values import card_text
-from workbench.card import load_card
+from workbench.cards.card import load_card
 from workbench.fleet.finding import find_logs
 from workbench.fleet.values import Item, Result
 from workbench.fleet.work import work
-from workbench.recording import as_columns, record
 from workbench.registry.values import Version
+from workbench.steps.simulate import as_columns, record
 
 URL = "memory://bench"
 VERSION = Version("a", 3, "m", None, None, datetime(2026, 3, 1, tzinfo=UTC))

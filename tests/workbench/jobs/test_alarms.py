@@ -26,7 +26,7 @@ from workbench.jobs.alarms import (
     key,
     send_alarms,
 )
-from workbench.jobs.metrics import Figures, write_metrics
+from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.passes import Pass, Report
 from workbench.registry.outbox import FIRST, LONGEST, Outbox
 from workbench.registry.store import Registry
@@ -285,7 +285,7 @@ def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Pat
     (given_up, *_) = (a for a in outbox.due(now) if a.machine == "m1")
     assert outbox.give_up(before=given_up.at + timedelta(microseconds=1), now=now)
     send(fleet, webhook(listener))
-    write_metrics(tmp_path / "m.prom", Figures(fleet))
+    write_metrics(tmp_path / "m.prom", MachineFigures(fleet))
     text = (tmp_path / "m.prom").read_text(encoding="utf-8")
     for name, waiting, failed in (("m0", 0, 1), ("m1", 0, 1), ("m2", 0, 0)):
         assert f'servo_workbench_alarms_waiting{{machine="{name}"}} {waiting}.0' in text
@@ -293,7 +293,7 @@ def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Pat
 
 
 def test_metrics_are_what_the_registry_holds(judged: Registry, tmp_path: Path) -> None:
-    figures = Figures(judged)
+    figures = MachineFigures(judged)
     figures.passed(datetime(2026, 3, 1, tzinfo=UTC), 1)
     write_metrics(tmp_path / "m.prom", figures)
     text = (tmp_path / "m.prom").read_text(encoding="utf-8")

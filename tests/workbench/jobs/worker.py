@@ -6,14 +6,14 @@ from pathlib import Path
 
 from identification.errors import BadLog
 from workbench.jobs.lease import Patience
-from workbench.jobs.passes import Pass, PassReport, Settings, Task
+from workbench.jobs.passes import Pass, PassReport, PassSettings, Task
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Judgement
 
 LEASE = timedelta(seconds=0.4)
 
 
-def settings(owner: str, **changes: object) -> Settings:
+def settings(owner: str, **changes: object) -> PassSettings:
     """Settings for short tests; a log is never given up."""
     given = {
         "lease": LEASE,
@@ -21,7 +21,7 @@ def settings(owner: str, **changes: object) -> Settings:
         "attempts": 10_000,
         "patience": Patience(5.0, 0.1),
     }
-    return Settings(owner, **{**given, **changes})  # type: ignore[arg-type]
+    return PassSettings(owner, **{**given, **changes})  # type: ignore[arg-type]
 
 
 def clock() -> datetime:

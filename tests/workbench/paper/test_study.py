@@ -5,24 +5,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from design.compensator import (
-    E_T,
-    F_CN,
-    F_CP,
-    F_SN,
-    F_SP,
-    INNER,
-    INNER_NONE,
-    Compensator,
-)
+from design.compensator import E_T, F_CN, F_CP, F_SN, F_SP, INNER, INNER_NONE, Compensator
 from design.servo import Compensation
 from identification.arrays import Array
-from identification.karnopp import Karnopp
+from identification.model.karnopp import Karnopp
 from workbench.output import dumps
 from workbench.paper.claims import claims
 from workbench.paper.document import paper_document
 from workbench.paper.figures_rig import RigFigures
 from workbench.paper.measures import figures_of, measure, standing
+from workbench.paper.report import paper_report
 from workbench.paper.settings import (
     PRINTED_A,
     PRINTED_B,
@@ -37,7 +29,6 @@ from workbench.paper.settings import (
     steps,
 )
 from workbench.paper.study import Study, study
-from workbench.report.paper import paper_report
 
 
 @pytest.fixture(scope="module")

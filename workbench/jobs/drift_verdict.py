@@ -7,13 +7,13 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from scipy.stats import norm
 
-from identification.karnopp import NAMES
-from identification.result import Estimate
-from workbench.identifying import identify
-from workbench.model import Model
-from workbench.sources import Sources
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from workbench.documents.model import Model
+from workbench.logs.sources import Sources
+from workbench.steps.identify import identify
 
-Verdict = Literal["none", "drift", "structure", "not_judged"]
+JudgedDrift = Literal["none", "drift", "structure", "not_judged"]
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
 MARGIN = 0.05  # relative change that does not matter
 LEVEL = 1e-3  # of a false alarm, over all parameters of one log
@@ -38,14 +38,14 @@ class Drift:
     with the next log; plain JSON.
     """
 
-    verdict: Verdict
+    verdict: JudgedDrift
     reason: str
     moved: tuple[Moved, ...] = ()
     p_value: float | None = None
     state: Mapping[str, Any] = field(default_factory=dict)
 
 
-class DriftTest(Protocol):
+class DriftJudge(Protocol):
     """A test of a machine's new log against its model in force."""
 
     def __call__(

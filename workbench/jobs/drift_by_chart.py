@@ -10,14 +10,14 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
-from identification.drift_chart import DriftState
-from identification.drift_test import DriftTest, Shift
+from identification.drift.drift_test import DriftTest, Shift
+from identification.drift.mewma import DriftState
 from identification.errors import BadModel
-from workbench.drift_verdict import Drift, Moved
-from workbench.drifting import Drifted, Stream, drift_of, model_key
-from workbench.model import Model
+from workbench.documents.model import Model
+from workbench.jobs.drift_verdict import Drift, Moved
+from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
-from workbench.sources import Sources
+from workbench.steps.drift import Drifted, Stream, drift_of, model_key
 
 
 def drift_by_chart(

@@ -7,13 +7,7 @@ import numpy as np
 
 from design.servo import ServoRun
 from workbench.paper.claims import claims
-from workbench.paper.document import (
-    CLAIMS,
-    FIGURES,
-    case_rows,
-    claim_rows,
-    rival_rows,
-)
+from workbench.paper.document import CLAIMS, FIGURES, case_rows, claim_rows, rival_servo_rows
 from workbench.paper.measures import Case
 from workbench.paper.sensitivity import Sensitivity
 from workbench.paper.study import Study
@@ -151,7 +145,7 @@ def _named(name: str, cases: Mapping[str, Case]) -> list[tuple[str, ...]]:
 
 
 def _competitors(found: Study, number: int) -> Section:
-    rows = rival_rows(found, number)
+    rows = rival_servo_rows(found, number)
     lines = (
         "each with the setting of the least squared error under another noise",
         "what rests on a model has the paper's estimates of table 1, the true values of table 3",

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 
 from identification.errors import BadModel
-from identification.karnopp import Karnopp
 from identification.log import Log
-from identification.plant import Actuator
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
-from workbench.challenge import Contender, Contest, Terms, challenge, contest_document
-from workbench.recording import record
-from workbench.tuning import design
+from workbench.jobs.challenge import Contender, Contest, Terms, challenge, contest_document
+from workbench.steps.design import design
+from workbench.steps.simulate import record
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 OLD = TABLES["paper_table1"]

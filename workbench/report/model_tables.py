@@ -4,15 +4,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.result import Estimate
-from workbench.model import Model
-from workbench.parameter_units import shown
+from identification.model.estimates import Estimate
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import Model
+from workbench.output import Row, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group
-    from rich.table import Table
 
-Row = tuple[str, ...]
 MEANING = {
     "m": "moving mass",
     "F_cp": "Coulomb friction, positive direction",
@@ -74,11 +73,6 @@ def model_view(model: Model, remarks: Sequence[str], folder: Path) -> "Group":
     return Group(*parts)
 
 
-def written(folder: Path, *names: str) -> str:
-    """Where the results lie."""
-    return "written: " + ", ".join(str(folder / name) for name in names)
-
-
 def summary(model: Model) -> str:
     """What was found, in one sentence."""
     known = [name for name, e in model.friction.items() if e.value is not None]
@@ -120,23 +114,10 @@ def fit_lines(model: Model) -> list[str]:
 
 def held(model: Model) -> str:
     """How a run on the measured force was kept near the measured position."""
-    from workbench.predicting import FORCE_WINDOW
+    from workbench.steps.predict import FORCE_WINDOW
 
     unit = shown(model.rotary).stiffness
     return (
         f"held to the measured position by {model.fit.stiffness:.3g} {unit} and restarted every"
         f" {FORCE_WINDOW:g} s"
     )
-
-
-def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Table":
-    """A plain table for a terminal; right: the columns of numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.table import Table
-
-    out = Table(box=SIMPLE_HEAD, pad_edge=False)
-    for number, name in enumerate(head):
-        out.add_column(name, justify="right" if number in right else "left", overflow="fold")
-    for row in rows:
-        out.add_row(*row)
-    return out

@@ -5,14 +5,15 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from identification.chance import DRAWS
-from identification.findings import listed
-from identification.result import Estimate
-from identification.trace_result import Change, Errors, FoundEffect, Rival, Trace
-from workbench.parameter_units import shown
-from workbench.tracing import Traced, effect_estimates
-from workbench.units import Motion
-from workbench.views import Row, in_digits, table, written
+from identification.model.estimates import Estimate
+from identification.tracing.regression.significance import DRAWS
+from identification.tracing.result import Change, EffectRival, Errors, FoundEffect, Trace
+from identification.tracing.verdict import listed
+from workbench.cards.parameter_units import shown
+from workbench.cards.units import Motion
+from workbench.output import Row, table, written
+from workbench.report.model_tables import in_digits
+from workbench.steps.trace import Traced, effect_estimates
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -50,11 +51,11 @@ def errors_head(tested: bool) -> Row:
     return ("error", "train before", "after", f"{test} before", "after", "sensors' noise")
 
 
-def sentence(traced: Traced) -> str:
+def trace_sentence(traced: Traced) -> str:
     """The verdict in one or two plain sentences."""
     found = traced.trace
     names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
-    told = fall(traced) if found.effects else ""
+    told = fall_of_error(traced) if found.effects else ""
     errors = f" {told}" if told else ""
     changed = ", ".join(_changed(change) for change in found.drift)
     match found.verdict:
@@ -69,7 +70,7 @@ def sentence(traced: Traced) -> str:
                 " its structure holds."
             )
         case "inseparable":
-            others = " or ".join(words(key) for key in dict.fromkeys(alike(found)))
+            others = " or ".join(words(key) for key in dict.fromkeys(equal_rival_keys(found)))
             rival = f" They do not tell it from {others}." if others else ""
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _:
@@ -117,7 +118,7 @@ def nothing_missing(found: Trace, unit: str) -> str:
     )
 
 
-def fall(traced: Traced) -> str:
+def fall_of_error(traced: Traced) -> str:
     """How the error fell in which the effects show."""
     told = told_by(traced)
     if told is None:
@@ -160,7 +161,7 @@ def _both(before: Errors, after: Errors, key: str) -> tuple[float, float]:
     return values if None not in values else (math.nan, math.nan)
 
 
-def alike(found: Trace) -> tuple[str, ...]:
+def equal_rival_keys(found: Trace) -> tuple[str, ...]:
     """Keys of the rivals that explain as much as an effect taken; the first, where none says so."""
     keys = [r.key for r in found.rivals if r.why_not.startswith("explains as much")]
     return tuple(keys or [r.key for r in found.rivals[:1]])
@@ -248,7 +249,7 @@ def rival_rows(found: Trace, rotary: bool) -> list[Row]:
     """Rivals in the order of the force error that they leave; last those that leave none."""
     unit = shown(rotary).force
 
-    def left(rival: Rival) -> float:
+    def left(rival: EffectRival) -> float:
         return math.inf if rival.test_force_rms is None else rival.test_force_rms
 
     return [
@@ -326,7 +327,7 @@ def trace_view(traced: Traced, folder: Path) -> "Group":
     from rich.console import Group, RenderableType
 
     found, rotary = traced.trace, traced.model.rotary
-    parts: list[RenderableType] = [sentence(traced)]
+    parts: list[RenderableType] = [trace_sentence(traced)]
     parts.append(table(errors_head(bool(traced.test)), error_rows(found, rotary)))
     sections: Sequence[tuple[Sequence[str], list[Row]]] = (
         (EFFECT_HEAD, effect_rows(found, traced.model.rig.motion)),

@@ -7,17 +7,17 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from identification.plant import Actuator
+from identification.model.plant import Actuator
 from tests.chain import TABLES, identified, model_of
-from workbench.parameter_units import actuator_units, friction_units
-from workbench.pipeline import Identified
-from workbench.report.figures import POINTS, spread, thinned
+from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.report.figures import POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_report, identification_report, validation_report
-from workbench.tuning import design
-from workbench.validating import validate
-from workbench.validation_views import validation_lines
+from workbench.report.validation_tables import validation_lines
+from workbench.steps.design import design
+from workbench.steps.identify_sources import Identified
+from workbench.steps.validate import validate
 
 LARGEST = 2_000_000
 VOID = {"meta", "br", "img", "hr"}
@@ -136,7 +136,7 @@ def test_thinning_keeps_ends_and_peaks() -> None:
 
 @pytest.mark.parametrize(("count", "most"), [(10, 100), (1000, 100), (1001, 100)])
 def test_spread_is_even_and_bounded(count: int, most: int) -> None:
-    index = spread(count, most)
+    index = evenly_spread(count, most)
     assert len(index) <= most
     assert len(set(np.diff(index).tolist())) <= 1
 

@@ -17,7 +17,9 @@ Library = Mapping[str, Effect]
 def built_in() -> Library:
     """The effects that ship with the package."""
     names = sorted(m.name for m in pkgutil.iter_modules(effects.__path__) if m.name[0] != "_")
-    return joined(declared(importlib.import_module(f"{effects.__name__}.{n}")) for n in names)
+    return joined_library(
+        declared(importlib.import_module(f"{effects.__name__}.{n}")) for n in names
+    )
 
 
 def declared(module: ModuleType) -> Effect:
@@ -31,7 +33,7 @@ def declared(module: ModuleType) -> Effect:
     return effect
 
 
-def joined(found: Iterable[Effect], to: Library | None = None) -> Library:
+def joined_library(found: Iterable[Effect], to: Library | None = None) -> Library:
     """These effects by key, after those of `to`; raises BadModel where a key is taken."""
     library = dict(to or {})
     for effect in found:

@@ -10,21 +10,21 @@ import numpy as np
 import pandas as pd
 import pytest
 
+from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
-from identification.karnopp import Karnopp
-from identification.library import built_in
+from identification.model.karnopp import Karnopp
 from tests.chain import CARD, TABLES
-from workbench.card import Card, load_card
-from workbench.challenge import Terms
-from workbench.drift_judge import drift_by_chart
-from workbench.drift_verdict import Drift, drift_by_refit
+from workbench.cards.card import Card, load_card
+from workbench.documents.model import Model, read_model
+from workbench.jobs.challenge import Terms
+from workbench.jobs.drift_by_chart import drift_by_chart
+from workbench.jobs.drift_verdict import Drift, drift_by_refit
+from workbench.jobs.judge import Chain, divided
 from workbench.jobs.passes import Task
-from workbench.judging import Chain, divided
-from workbench.model import Model, read_model
+from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps
-from workbench.recording import as_columns, record
 from workbench.registry.values import Judgement, SeenLog, Version
-from workbench.sources import Sources, read_sources
+from workbench.steps.simulate import as_columns, record
 
 OLD = TABLES["paper_table1"]
 NEW = replace(OLD, F_cp=16.0, F_vp=380.0, F_sp=26.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.trace_result import Residual
+from identification.tracing.result import Residual
 from workbench.report.trace_pictures import folded_at
 
 

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.design_values import Controller, Design
-from workbench.parameter_units import shown
-from workbench.views import Row, table, written
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Controller, Design
+from workbench.output import Row, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group

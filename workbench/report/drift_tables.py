@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.drift_test import Shift, Statistic
-from workbench.drifting import Drifted, Tested
-from workbench.views import Row, table, written
+from identification.drift.drift_test import Shift, Statistic
+from workbench.output import Row, table, written
+from workbench.steps.drift import Drifted, Tested
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -14,7 +14,7 @@ RUN_HEAD = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
 SHIFT_HEAD = ("parameter", "before", "after", "unit", "change", "95 % interval")
 
 
-def sentence(found: Drifted) -> str:
+def drift_sentence(found: Drifted) -> str:
     """The verdict over all runs in one or two plain sentences."""
     tests = [one.test for one in found.tests]
     if found.verdict == "structure":
@@ -40,10 +40,11 @@ def _files(found: Drifted, verdict: str) -> str:
 
 
 def _changed(shift: Shift) -> str:
-    return f"{shift.name} {percent(shift.change)} ({percent(shift.low)} to {percent(shift.high)})"
+    change, low, high = (signed_percent(x) for x in (shift.change, shift.low, shift.high))
+    return f"{shift.name} {change} ({low} to {high})"
 
 
-def percent(value: float) -> str:
+def signed_percent(value: float) -> str:
     """A relative change in percent, with its sign."""
     return f"{100 * value:+.2f} %" if abs(value) < 0.1 else f"{100 * value:+.1f} %"
 
@@ -78,9 +79,9 @@ def shift_rows(one: Tested) -> list[Row]:
 
 
 def _shift_row(shift: Shift) -> Row:
-    interval = f"{percent(shift.low)} to {percent(shift.high)}"
+    interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
     before, after = f"{shift.before:.4g}", f"{shift.after:.4g}"
-    return (shift.name, before, after, shift.unit, percent(shift.change), interval)
+    return (shift.name, before, after, shift.unit, signed_percent(shift.change), interval)
 
 
 def notes(found: Drifted) -> list[str]:
@@ -104,7 +105,7 @@ def drift_view(found: Drifted, folder: Path) -> "Group":
     """The verdict, every run, the parameters of the last one, for a terminal."""
     from rich.console import Group, RenderableType
 
-    parts: list[RenderableType] = [sentence(found), table(RUN_HEAD, run_rows(found))]
+    parts: list[RenderableType] = [drift_sentence(found), table(RUN_HEAD, run_rows(found))]
     rows = shift_rows(found.tests[-1])
     if rows:
         parts.append(table(SHIFT_HEAD, rows))

@@ -9,30 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from identification.errors import (
-    BadLog,
-    BadModel,
-    BadSpecification,
-    NotIdentifiable,
-    UserError,
-)
-from identification.library import Library
+from identification.effects._library import Library
+from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
-from workbench.challenge import Contender, Terms, challenge, contest_document
-from workbench.design_values import Design, design_document, read_design
-from workbench.drift_judge import drift_by_chart
-from workbench.drift_verdict import Drift, DriftTest
-from workbench.identifying import Source
+from workbench.cards.own_effects import library as installed
+from workbench.documents.design import Design, design_document, read_design
+from workbench.documents.model import Model, model_document, read_model
+from workbench.jobs.challenge import Contender, Terms, challenge, contest_document
+from workbench.jobs.drift_by_chart import drift_by_chart
+from workbench.jobs.drift_verdict import Drift, DriftJudge
 from workbench.jobs.passes import Task
-from workbench.model import Model, model_document, read_model
-from workbench.own_effects import library as installed
-from workbench.pipeline import identify_sources
+from workbench.logs.sources import Source, Sources, read_sources
 from workbench.registry.values import Candidate, Judgement
-from workbench.sources import Sources, read_sources
-from workbench.trace_views import sentence
-from workbench.tracing import Traced, trace_sources
-from workbench.tuning import design
-from workbench.validating import validate, validation_document
+from workbench.report.trace_tables import trace_sentence
+from workbench.steps.design import design
+from workbench.steps.identify_sources import identify_sources
+from workbench.steps.trace import Traced, trace_sources
+from workbench.steps.validate import validate, validation_document
 
 HELD_OUT = 0.35  # of a log's time that a challenger is not fitted on
 
@@ -46,7 +39,7 @@ class Chain:
     default all but a user's own files.
     """
 
-    drift: DriftTest = drift_by_chart
+    drift: DriftJudge = drift_by_chart
     terms: Terms = field(default_factory=Terms)
     seed: int = 0
     library: Library | None = None
@@ -91,7 +84,7 @@ class Chain:
         except UserError as error:
             return Judgement("structure", f"{found.reason}; trace: {error}", evidence=evidence)
         evidence = {**evidence, "trace": _summary(traced)}
-        reason = f"{found.reason}; {sentence(traced)}"
+        reason = f"{found.reason}; {trace_sentence(traced)}"
         made: tuple[Contender | None, Candidate | None, str]
         if traced.trace.verdict == "effect":
             made = self._designed(traced.model)

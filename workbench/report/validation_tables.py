@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.parameter_units import Shown, shown
-from workbench.validating import COMPENSATED, Figures, Validation
-from workbench.views import Row, table, written
+from workbench.cards.parameter_units import Shown, shown
+from workbench.output import Row, table, written
+from workbench.steps.validate import COMPENSATED, LoopFigures, Validation
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -40,7 +40,7 @@ def _shown(name: str) -> str:
     return alone.upper() if alone == name else f"{alone.upper()} + comp"
 
 
-def _row(one: Figures, units: Shown) -> Row:
+def _row(one: LoopFigures, units: Shown) -> Row:
     m = one.margins
     delay = "-"
     if m:
@@ -88,7 +88,7 @@ def _missed(found: Validation, name: str) -> list[str]:
     ]
 
 
-def verdict(found: Validation) -> str:
+def validation_verdict(found: Validation) -> str:
     """Whether the judged controller passed, in one line."""
     word = "passes" if found.passed else "fails"
     return f"{found.judged.upper()} {word} in simulation"
@@ -99,7 +99,7 @@ def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "G
     from rich.console import Group
 
     return Group(
-        verdict(found),
+        validation_verdict(found),
         table(HEAD, validation_rows(found, rotary)),
         *validation_lines(found, rotary),
         written(folder, "validation.json", "report.html"),

@@ -15,12 +15,12 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.log import Log
-from identification.result import Drive
-from workbench.closed_loop import loop_period, run_loop
-from workbench.design_values import Design
-from workbench.model import Model
-from workbench.predicting import default_drive, predict
-from workbench.validating import (
+from identification.model.estimates import Drive
+from workbench.documents.design import Design
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import loop_period, run_loop
+from workbench.steps.predict import default_drive, predict
+from workbench.steps.validate import (
     DWELLS,
     SHORTEST_DWELL,
     SMOOTH_SHARE,
