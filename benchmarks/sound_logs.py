@@ -5,8 +5,8 @@
 Rough machines on purpose, by plain Euler steps: stick-slip behind a soft spring, end stops with and
 without bounce, switched and pulsed drives, a quick servo; logged at 50 Hz to 10 kHz with white,
 heavy-tailed or no noise and encoders of 1 um to 1 mm; at most 300 m/s^2. Beside them the machines
-of `random_plants`. The thresholds of `identification.signals.jumps` were chosen on earlier draws of such
-machines (seeds 1 to 6), the measured sets and the shipped recipes; seeds from 7 on judge them.
+of `random_plants`. The thresholds of `identification.signals.jumps` were chosen on earlier draws of
+such machines (seeds 1 to 6), the measured sets and the shipped recipes; seeds from 7 on judge them.
 """
 
 import argparse
