@@ -92,13 +92,7 @@ def select_arx(
     order at all can be estimated.
     """
     fitted, held = _runs(logs, validation, split)
-    if not 0 <= min_nk <= max_nk or max_na < 0 or max_nb < 0:
-        raise BadModel(
-            f"orders up to na={max_na}, nb={max_nb} and delays {min_nk} to {max_nk}; "
-            "none may be negative, and the delays must rise"
-        )
-    span = max_nk - min_nk + max_nb if max_nb else 0
-    largest = Order(max_na, span, min_nk)
+    largest = _largest(max_na, max_nb, max_nk, min_nk)
     fit, test = factor_of(fitted, largest), factor_of(held, largest)
     if test.rows <= largest.size:
         raise BadLog(
@@ -133,6 +127,16 @@ def select_arx(
         samples=test.rows,
         independent=independent,
     )
+
+
+def _largest(max_na: int, max_nb: int, max_nk: int, min_nk: int) -> Order:
+    """The order that holds all those tried; raises BadModel where there are none."""
+    if not 0 <= min_nk <= max_nk or max_na < 0 or max_nb < 0:
+        raise BadModel(
+            f"orders up to na={max_na}, nb={max_nb} and delays {min_nk} to {max_nk}; "
+            "none may be negative, and the delays must rise"
+        )
+    return Order(max_na, max_nk - min_nk + max_nb if max_nb else 0, min_nk)
 
 
 def _runs(logs: Runs, validation: Runs | None, split: float) -> tuple[list[Run], list[Run]]:

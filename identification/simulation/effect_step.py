@@ -54,6 +54,8 @@ STATES = 1 << 9  # beside the bits of the codes
 ROUNDED = 1.0 + 1e-9  # of a sub-step, that the last one may be too long
 MOST_PIECES = 100  # of a sample, after which its switches are no longer told from each other
 SURE_AFTER = 1e-3  # of a sub-step, after which its acceleration is sure
+# t, y, v, F, u
+Instant = tuple[float, float, float, float, float]
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]
 
@@ -215,6 +217,108 @@ def shown_position(
 
 
 @compiled_inline
+def forces_along(
+    acts: int,
+    codes: IntArray,
+    addresses: IntArray,
+    q: Array,
+    s: Array,
+    z: Array,
+    p: Parameters,
+    at: Instant,
+    way_on: float,
+    way: float,
+    rest: bool,
+) -> tuple[float, float]:
+    """Forces of the effects [N] and their stiffness [N/m] along a sub-step's way on [m].
+
+    Along the way they are a straight line in position, which is stepped exactly too.
+    """
+    if not acts & (1 << FORCE):
+        return 0.0, 0.0
+    t, y, v, F, u = at
+    here = total(FORCE, codes, addresses, q, s, z, p, t, y, v, F, u, way, rest)
+    if abs(way_on) <= SHORTEST_WAY:
+        return here, 0.0
+    ahead = total(FORCE, codes, addresses, q, s, z, p, t, y + way_on, v, F, u, way, rest)
+    k_e = max((here - ahead) / way_on, -p[K2])
+    return 0.5 * (here + ahead + k_e * way_on), k_e
+
+
+@compiled_inline
+def level_on_bristle(
+    acts: int,
+    codes: IntArray,
+    addresses: IntArray,
+    q: Array,
+    s: Array,
+    z: Array,
+    p: Parameters,
+    at: tuple[float, float, float, float, float, float],
+) -> tuple[float, float]:
+    """Level [N] and viscous coefficient [N s/m] where a bristle replaces sticking.
+
+    In place of the band: a level that falls from the stick limit as LuGre's does.
+    """
+    t, y, v, F, u, d = at
+    edge = p[DV_P] if d > 0.0 else p[DV_N]
+    low, _ = level(p, d, v, False)
+    high, _ = level(p, d, v, True)
+    if acts & (1 << STICTION):
+        high += total(STICTION, codes, addresses, q, s, z, p, t, y, 0.0, F, u, d, True)
+    if acts & (1 << SLIP):
+        low += total(SLIP, codes, addresses, q, s, z, p, t, y, v, F, u, d, False)
+    low, viscous = carried(low, p[F_VP] if d > 0.0 else p[F_VN], abs(v))
+    return max(low + (max(high, 0.0) - low) * math.exp(-((v / edge) ** 2)), 1e-9), viscous
+
+
+@compiled_inline
+def with_friction(
+    acts: int,
+    codes: IntArray,
+    addresses: IntArray,
+    q: Array,
+    s: Array,
+    z: Array,
+    p: Parameters,
+    at: Instant,
+    slow: tuple[bool, bool],
+    k_e: float,
+) -> Parameters:
+    """The plant with the effects' friction and stiffness in it, as it is during a sub-step.
+
+    slow: whether the body may come to rest from positive, and from negative motion.
+    """
+    t, y, v, F, u = at
+    slow_p, slow_n = slow
+    up = down = high_p = high_n = 0.0
+    wp, wn = max(v, 0.0), min(v, 0.0)
+    if slow_n and acts & (1 << SLIP):
+        up = total(SLIP, codes, addresses, q, s, z, p, t, y, wp, F, u, 1.0, False)
+    if slow_p and acts & (1 << SLIP):
+        down = total(SLIP, codes, addresses, q, s, z, p, t, y, wn, F, u, -1.0, False)
+    if slow_p and slow_n and acts & (1 << STICTION):
+        x = (t, y, 0.0, F, u)
+        high_p = total(STICTION, codes, addresses, q, s, z, p, *x, 1.0, True)
+        high_n = total(STICTION, codes, addresses, q, s, z, p, *x, -1.0, True)
+    coulomb_p, viscous_p = carried(p[F_CP] + up, p[F_VP], wp)
+    coulomb_n, viscous_n = carried(p[F_CN] + down, p[F_VN], -wn)
+    return (
+        p[M],
+        coulomb_p,
+        coulomb_n,
+        viscous_p,
+        viscous_n,
+        p[DV_P],
+        p[DV_N],
+        max(p[F_SP] + high_p, 0.0),
+        min(p[F_SN] - high_n, 0.0),
+        p[K1],
+        p[K2] + k_e,
+    )
+
+
+@compiled_inline
 def effect_step(
     p: Parameters,
     count: int,
@@ -257,33 +361,17 @@ def effect_step(
         if acts & STATES:
             spare[:] = z
             evolve_states(False, 0.5 * dt, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, still)
-        # Along the way the forces are a straight line in position, which is stepped exactly too.
         way_on = 2.0 * (ym - y)
-        extra, k_e = 0.0, 0.0
-        if acts & (1 << FORCE):
-            extra = total(FORCE, codes, addresses, q, s, z, p, now, y, vm, Fm, u, way, rest)
-        if acts & (1 << FORCE) and abs(way_on) > SHORTEST_WAY:
-            end = y + way_on
-            ahead = total(FORCE, codes, addresses, q, s, z, p, now, end, vm, Fm, u, way, rest)
-            k_e = max((extra - ahead) / way_on, -p[K2])
-            extra = 0.5 * (extra + ahead + k_e * way_on)
+        at_start = (now, y, vm, Fm, u)
+        extra, k_e = forces_along(acts, codes, addresses, q, s, z, p, at_start, way_on, way, rest)
         g_now = g
         if acts & (1 << ACTUATOR):
             g_now += total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
         y_0, before, F_0, unused = y, v, F, 0.0
         if bristle >= 0:
-            # In place of the band: a level that falls from the stick limit as LuGre's does.
             d = direction(vm, z[bristle])
-            edge = p[DV_P] if d > 0.0 else p[DV_N]
-            low, _ = level(p, d, vm, False)
-            high, _ = level(p, d, vm, True)
-            if acts & (1 << STICTION):
-                high += total(STICTION, codes, addresses, q, s, z, p, now, ym, 0.0, Fm, u, d, True)
-            if acts & (1 << SLIP):
-                low += total(SLIP, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, d, False)
-            low, viscous = carried(low, p[F_VP] if d > 0.0 else p[F_VN], abs(vm))
-            c = max(low + (max(high, 0.0) - low) * math.exp(-((vm / edge) ** 2)), 1e-9)
             at = (now, ym, vm, Fm, u, d)
+            c, viscous = level_on_bristle(acts, codes, addresses, q, s, z, p, at)
             y, v, F, z[bristle] = bristle_step(
                 p, addresses[bristle, VALUE], q[bristle], s[bristle], z[bristle], c, at, y, v, F,
                 g_now, viscous, extra, k_e, dt,
@@ -291,32 +379,9 @@ def effect_step(
             mode = STUCK if p[DV_N] < v < p[DV_P] else (SLIP_P if v > 0.0 else SLIP_N)
         else:
             slowest, fastest = min(v, v + 2.0 * dt * a), max(v, v + 2.0 * dt * a)
-            slow_p, slow_n = slowest < AWAY * p[DV_P], fastest > AWAY * p[DV_N]
-            up = down = high_p = high_n = 0.0
-            wp, wn = max(vm, 0.0), min(vm, 0.0)
-            if slow_n and acts & (1 << SLIP):
-                up = total(SLIP, codes, addresses, q, s, z, p, now, ym, wp, Fm, u, 1.0, False)
-            if slow_p and acts & (1 << SLIP):
-                down = total(SLIP, codes, addresses, q, s, z, p, now, ym, wn, Fm, u, -1.0, False)
-            if slow_p and slow_n and acts & (1 << STICTION):
-                x = (now, ym, 0.0, Fm, u)
-                high_p = total(STICTION, codes, addresses, q, s, z, p, *x, 1.0, True)
-                high_n = total(STICTION, codes, addresses, q, s, z, p, *x, -1.0, True)
-            coulomb_p, viscous_p = carried(p[F_CP] + up, p[F_VP], wp)
-            coulomb_n, viscous_n = carried(p[F_CN] + down, p[F_VN], -wn)
-            shifted = (
-                p[M],
-                coulomb_p,
-                coulomb_n,
-                viscous_p,
-                viscous_n,
-                p[DV_P],
-                p[DV_N],
-                max(p[F_SP] + high_p, 0.0),
-                min(p[F_SN] - high_n, 0.0),
-                p[K1],
-                p[K2] + k_e,
-            )
+            slow = slowest < AWAY * p[DV_P], fastest > AWAY * p[DV_N]
+            at_middle = (now, ym, vm, Fm, u)
+            shifted = with_friction(acts, codes, addresses, q, s, z, p, at_middle, slow, k_e)
             mode = settled_mode(shifted, v, F + extra)
             if still and mode != STUCK:  # what friction owes to the rest goes with the first motion
                 if acts & STATES:

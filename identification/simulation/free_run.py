@@ -144,22 +144,14 @@ def free_run(
         force = k_a * log["u"]
     else:
         force = log["F"] if held else np.zeros(len(log))
-    at, at_y, at_v = restarts if restarts else (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
-    keep = at > 0
-    at = np.concatenate([[0], at[keep]]).astype(np.int64)
-    at_f = log["F"][at] if "F" in log else force[at]
-    if forces is not None:
-        at_f = np.concatenate([at_f[:1], forces[keep]])
-    at_f = np.concatenate([[start[2]], at_f[1:]])
-    out = np.zeros((4, len(log)))
-    modes = np.zeros(len(log), dtype=np.int64)
+    begun = _begun(log, start, force, restarts, forces)
+    out, modes = np.zeros((4, len(log))), np.zeros(len(log), dtype=np.int64)
     u = read_only(log["u"] if "u" in log else np.zeros(len(log)))
     force = read_only(force)
     slope = np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False)
-    at_y, at_v = np.append(start[0], at_y[keep]), np.append(start[1], at_v[keep])
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
     if not plant.effects:
-        run_kernel(p, log.h, held, u, force, slope, log["y"], at, at_y, at_v, at_f, out, modes)
+        run_kernel(p, log.h, held, u, force, slope, log["y"], *begun, out, modes)
         out[3] = out[0]
     else:
         table, signals = effect_table(plant.effects), signal_table(plant.effects, log)
@@ -167,20 +159,44 @@ def free_run(
         if outside(table.codes):  # the body moves as that of the plain plant, stepped exactly
             acting = effective_commands(*own, np.zeros(len(table.codes)), log["t"], u, log.h)
             force = read_only(k_a * acting) if k_a != 0.0 else force
-            more = (slope, log["y"], at, at_y, at_v, at_f, out, modes)
-            run_kernel(p, log.h, held, read_only(acting), force, *more)
-            shown_run(p, log.h, *own, log["t"], u, at, out)
+            run_kernel(
+                p, log.h, held, read_only(acting), force, slope, log["y"], *begun, out, modes
+            )
+            shown_run(p, log.h, *own, log["t"], u, begun[0], out)
         else:
             count = pieces(table, log.h, bristle_step)
             few = fewer(table, count, bristle_step)
             effect_run_kernel(
-                p, log.h, few, count, *own, held, k_a, log["t"], u, force, slope, log["y"], at,
-                at_y, at_v, at_f, out, modes,
+                p, log.h, few, count, *own, held, k_a, log["t"], u, force, slope, log["y"], *begun,
+                out, modes,
             )  # fmt: skip
-    if not np.all(np.isfinite(out[0])):
-        lost = float(log["t"][int(np.argmin(np.isfinite(out[0])))])
+    _refuse_lost(log, out[0])
+    return FreeRun(out[0], out[1], out[2], modes, out[3])
+
+
+def _refuse_lost(log: Log, y: Array) -> None:
+    """Raises BadModel where the run (n,) has come to no number."""
+    if not np.all(np.isfinite(y)):
+        lost = float(log["t"][int(np.argmin(np.isfinite(y)))])
         raise BadModel(
             f"{log.name}: the simulated run cannot be followed beyond t = {lost:g} s (too many"
             " switches within one sample, or numbers without bound); check mass and band"
         )
-    return FreeRun(out[0], out[1], out[2], modes, out[3])
+
+
+def _begun(
+    log: Log,
+    start: tuple[float, float, float],
+    force: Array,
+    restarts: tuple[IntArray, Array, Array] | None,
+    forces: Array | None,
+) -> tuple[IntArray, Array, Array, Array]:
+    """Samples (k,) at which the run begins and begins anew, with position, velocity and force."""
+    at, at_y, at_v = restarts if restarts else (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
+    keep = at > 0
+    at = np.concatenate([[0], at[keep]]).astype(np.int64)
+    at_f = log["F"][at] if "F" in log else force[at]
+    if forces is not None:
+        at_f = np.concatenate([at_f[:1], forces[keep]])
+    at_f = np.concatenate([[start[2]], at_f[1:]])
+    return at, np.append(start[0], at_y[keep]), np.append(start[1], at_v[keep]), at_f

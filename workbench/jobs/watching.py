@@ -71,22 +71,31 @@ def watch_machines(
     scheduler.add_job(run, DateTrigger(clock()), id="first", misfire_grace_time=None)
     scheduler.start()
     try:
-        for wait in _longer(AGAIN, LONGEST):
-            try:
-                of_machine = of_log if marker is None else of_log_or(marker)
-                for _ in watch(root, watch_filter=of_machine, stop_event=stop,
-                               raise_interrupt=False):  # fmt: skip
-                    soon()
-                return  # stopped
-            except Exception as error:  # it raises all kinds on names and folders that it dislikes
-                said = " ".join(str(error).split()) or type(error).__name__
-                report("watcher_failed", reason=said, again_in_s=wait)
-            soon()  # for what came meanwhile
-            if stop.wait(wait):
-                return
+        _follow_files(root, soon, stop, report, of_log if marker is None else of_log_or(marker))
     finally:
         stop.set()
         scheduler.shutdown(wait=True)
+
+
+def _follow_files(
+    root: Path,
+    soon: Callable[[], None],
+    stop: threading.Event,
+    report: Report,
+    of_machine: Callable[[Change, str], bool],
+) -> None:
+    """Calls `soon` with each change of a log or card until `stop` is set."""
+    for wait in _longer(AGAIN, LONGEST):
+        try:
+            for _ in watch(root, watch_filter=of_machine, stop_event=stop, raise_interrupt=False):
+                soon()
+            return  # stopped
+        except Exception as error:  # it raises all kinds on names and folders that it dislikes
+            said = " ".join(str(error).split()) or type(error).__name__
+            report("watcher_failed", reason=said, again_in_s=wait)
+        soon()  # for what came meanwhile
+        if stop.wait(wait):
+            return
 
 
 def of_log_or(marker: str) -> Callable[[Change, str], bool]:

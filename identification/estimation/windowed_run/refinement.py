@@ -240,6 +240,82 @@ def _best_of(plant: Plant, tried: Sequence[Karnopp], errors_of: Judge) -> Plant:
     return plants[int(np.argmin(costs))]
 
 
+@dataclass(frozen=True, eq=False)
+class _Unknowns:
+    """A plant's parameters as the unknowns of a refinement, in units of their sizes.
+
+    names, x0, unit (k,): all of them; at (d,): those that are free; trust (k,): the regression's
+    deviations; steps: at most, of one minimum; little: share of the cost below which a step is the
+    last.
+    """
+
+    plant: Plant
+    logs: Sequence[MotionLog]
+    drive: Drive
+    names: tuple[str, ...]
+    x0: Array
+    unit: Array
+    at: IntArray
+    trust: Array
+    steps: int
+    little: float
+
+    @classmethod
+    def of(
+        cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, prior: Mapping[str, float],
+        steps: int, little: float,
+    ) -> "_Unknowns":  # fmt: skip
+        """The parameters that `prior` leaves open: a shape at its bound has no say."""
+        names = names_of(plant, drive)
+        x0 = values_of(plant, names)
+        trust = np.array([prior.get(name, np.inf) for name in names])
+        at = np.array([i for i, name in enumerate(names) if prior.get(name, 1.0) != 0.0])
+        unit = units_in(plant, names, x0)
+        return cls(plant, logs, drive, tuple(names), x0, unit, at, trust, steps, little)
+
+    @property
+    def start(self) -> Array:
+        """The unknowns (d,) of the plant itself."""
+        return self.x0[self.at] / self.unit[self.at]
+
+    def full(self, x: Array) -> Array:
+        """All parameters (k,) of the unknowns (d,)."""
+        out = self.x0.copy()
+        out[self.at] = x * self.unit[self.at]
+        return out
+
+    def plant_at(self, x: Array) -> Plant:
+        """The plant of the unknowns (d,)."""
+        return plant_with(self.plant, self.names, self.full(x))
+
+    def of_plant(self, plant: Plant) -> Array:
+        """The unknowns (d,) of another plant."""
+        return np.asarray(values_of(plant, self.names)[self.at] / self.unit[self.at])
+
+    def misfit(self, x: Array, bristle: float = COARSE) -> float:
+        """What the free run of the unknowns (d,) leaves."""
+        return misfit(self.plant_at(x), self.logs, self.drive, bristle)
+
+    def refined(
+        self, x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
+        reach: Array | float = np.inf, little: float | None = None,
+    ) -> Minimum:  # fmt: skip
+        """The nearest minimum over windows of so many seconds; tie: held by the regression."""
+        now = self.plant_at(x)
+        errors_of = judge(now, self.logs, self.drive, seconds, bristle)
+        # While most is far off, what is far off must still pull.
+        far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST_FROM, FARTHEST))
+        tied = np.flatnonzero(np.isfinite(self.trust) & (self.trust > 0))
+
+        def bent(at: Array) -> Array:
+            r = soft(errors_of(self.plant_at(at)), far)
+            pull = (self.full(at)[tied] - self.x0[tied]) / (LOOSE * self.trust[tied])
+            return np.concatenate([r, pull]) if tie else np.asarray(r)
+
+        last = self.little if little is None else little
+        return gauss_newton(bent, x, self.steps, reach=reach, little=last)
+
+
 def refit(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, *, prior: dict[str, float],
     band: float = 0.0, effort: Effort = "whole", rescues: int = 0,
@@ -254,106 +330,92 @@ def refit(
     is left.
     """
     quick = effort == "quick"
-    searched = effort in ("rough", "whole")
-    if searched:
+    if effort in ("rough", "whole"):
         plant = start_band(plant, logs, drive, band)
-    evaluations = QUICK_STEPS if quick else REFIT_STEPS
-    names = names_of(plant, drive)
-    x0 = values_of(plant, names)
-    unit = units_in(plant, names, x0)
-    trust = np.array([prior.get(name, np.inf) for name in names])
-    tied = np.flatnonzero(np.isfinite(trust) & (trust > 0))
-    # A shape at its bound, or an effect's default, has no say.
-    open_ = np.array([i for i, name in enumerate(names) if prior.get(name, 1.0) != 0.0])
-
-    def full(x: Array) -> Array:
-        out = x0.copy()
-        out[open_] = x * unit[open_]
-        return out
-
-    def bent(x: Array, errors_of: Judge, tie: bool, far: float) -> Array:
-        r = errors_of(plant_with(plant, names, full(x)))
-        r = soft(r, far)
-        pull = (full(x)[tied] - x0[tied]) / (LOOSE * trust[tied])
-        return np.concatenate([r, pull]) if tie else np.asarray(r)
-
-    passing = PASSING if effort == "rough" else 0.0
-
-    def refined(
-        x: Array, seconds: float, tie: bool, part: float = 0.0, bristle: float = COARSE,
-        reach: Array | float = np.inf, little: float = passing,
-    ) -> Minimum:  # fmt: skip
-        now = plant_with(plant, names, full(x))
-        errors_of = judge(now, logs, drive, seconds, bristle)
-        # While most is far off, what is far off must still pull.
-        far = float(np.clip(np.quantile(np.abs(errors_of(now)), part), ROBUST_FROM, FARTHEST))
-        return gauss_newton(
-            lambda at: bent(at, errors_of, tie, far), x, evaluations, reach=reach, little=little
-        )
-
     slow = on_bristle(plant)  # its sub-steps are ten times shorter
-    if slow:
-        evaluations = min(evaluations, BRISTLE_STEPS)
-    x = x0[open_] / unit[open_]
-    if searched:
-        x = refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
-    for seconds, part in BRIEF_WINDOWS if effort == "far" else ():
-        brief = max(seconds, *(BRIEF_SAMPLES * one.log.h for one in logs))
-        reach = BRIEF_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
-        x = refined(x, brief, False, part, reach=reach, little=PASSING).x
-    at = refined(x, RUN_WINDOW, True, HALF_SHARE)
+    steps = QUICK_STEPS if quick else REFIT_STEPS
+    steps = min(steps, BRISTLE_STEPS) if slow else steps
+    passing = PASSING if effort == "rough" else 0.0
+    unknowns = _Unknowns.of(plant, logs, drive, prior, steps, passing)
+    at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
     hopeless = effort == "rough" and at.mean > SLIDING_MISFIT
     rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
+    longest = MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
     if steady and not slow and rounds:
-        rounds.append(MOTOR_WINDOW if plant_is_motor(plant) else WHOLE)
+        rounds.append(longest)
     for seconds in rounds:
-        again = refined(at.x, seconds, False)
+        again = unknowns.refined(at.x, seconds, False)
         at = again if again.followed else at
-
-    def ended(at: Minimum) -> tuple[Minimum, float]:
-        """The minimum itself and its misfit."""
-        found = misfit(plant_with(plant, names, full(at.x)), logs, drive)
-        if quick or not at.followed:
-            return at, found
-        finer = gauss_newton(at.fun, at.x, evaluations, FINE_STEP)
-        left_by = misfit(plant_with(plant, names, full(finer.x)), logs, drive)
-        return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
-
-    at, found = ended(at)
-    for _ in range(0 if quick or slow else rescues):
-        if found <= COMPLETE:
-            break
-        # Band and stick limits have narrow minima, and many: another one of either direction.
-        other = by_side(plant_with(plant, names, full(at.x)), logs, drive)
-        trial = refined(values_of(other, names)[open_] / unit[open_], RUN_WINDOW, False)
-        if steady:
-            longer = refined(trial.x, MOTOR_WINDOW if plant_is_motor(plant) else WHOLE, False)
-            trial = longer if longer.followed else trial
-        trial, better = ended(trial)
-        before = found
-        if better < found:
-            at, found = trial, better
-        if better > NO_USE * before:
-            break
+    at, found = _ended(unknowns, at, quick)
+    if not (quick or slow):
+        at, found = _rescued(unknowns, at, found, rescues, longest if steady else None)
     if slow and not quick and COMPLETE < found < IN_REACH and loose(plant, drive):
         # Without a spring the errors of the sub-steps add up.
-        trial = refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
-        left_by = misfit(plant_with(plant, names, full(trial.x)), logs, drive, LONGEST_BRISTLE)
+        trial = unknowns.refined(at.x, RUN_WINDOW, False, bristle=LONGEST_BRISTLE)
+        left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
-    best = plant_with(plant, names, full(at.x))
+    free, unit = unknowns.at, unknowns.unit
 
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
         factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
         walking = any(walks(one, drive) for one in logs)
         cluster = _windows(logs, drive) if walking else None
-        return factor * at.covariance(cluster) * np.outer(unit[open_], unit[open_])
+        return factor * at.covariance(cluster) * np.outer(unit[free], unit[free])
 
-    return Refit(best, found, tuple(names[i] for i in open_), dict(prior), spread)
+    names = tuple(unknowns.names[i] for i in free)
+    return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread)
+
+
+def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
+    """The minimum held by the regression, come to as the effort says."""
+    x = unknowns.start
+    if effort in ("rough", "whole"):
+        x = unknowns.refined(x, SHORT_WINDOW, True, FIRST_SHARE).x
+    for seconds, part in BRIEF_WINDOWS if effort == "far" else ():
+        brief = max(seconds, *(BRIEF_SAMPLES * one.log.h for one in unknowns.logs))
+        reach = BRIEF_REACH * np.maximum(np.abs(x), LEAST_OF_UNIT)
+        x = unknowns.refined(x, brief, False, part, reach=reach, little=PASSING).x
+    return unknowns.refined(x, RUN_WINDOW, True, HALF_SHARE)
+
+
+def _ended(unknowns: _Unknowns, at: Minimum, quick: bool) -> tuple[Minimum, float]:
+    """The minimum itself and its misfit."""
+    found = unknowns.misfit(at.x)
+    if quick or not at.followed:
+        return at, found
+    finer = gauss_newton(at.fun, at.x, unknowns.steps, FINE_STEP)
+    left_by = unknowns.misfit(finer.x)
+    return (finer, left_by) if left_by < max(found, COMPLETE) else (at, found)
+
+
+def _rescued(
+    unknowns: _Unknowns, at: Minimum, found: float, rescues: int, longest: float | None
+) -> tuple[Minimum, float]:
+    """The best minimum from other bands and stick limits, as long as that helps.
+
+    longest [s]: windows in which it is followed in the end, None where no run is.
+    """
+    for _ in range(rescues):
+        if found <= COMPLETE:
+            break
+        # Band and stick limits have narrow minima, and many: another one of either direction.
+        other = by_side(unknowns.plant_at(at.x), unknowns.logs, unknowns.drive)
+        trial = unknowns.refined(unknowns.of_plant(other), RUN_WINDOW, False)
+        if longest is not None:
+            longer = unknowns.refined(trial.x, longest, False)
+            trial = longer if longer.followed else trial
+        trial, better = _ended(unknowns, trial, quick=False)
+        before = found
+        if better < found:
+            at, found = trial, better
+        if better > NO_USE * before:
+            break
+    return at, found
 
 
 def briefly(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:

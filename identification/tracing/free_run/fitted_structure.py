@@ -28,6 +28,7 @@ from identification.estimation.windowed_run.refinement import (
     COMPLETE,
     RESCUES,
     Effort,
+    Refit,
     even,
     loose,
     misfit,
@@ -74,29 +75,93 @@ class FittedStructure:
     misfit: float = np.inf
 
 
+@dataclass(frozen=True, eq=False)
+class _Regressed:
+    """A structure by the equations alone: its plant, how sure they are of each parameter by name,
+    and (silent) parameters of which they tell nothing; slow [m/s]: speed below which they do not
+    hold."""
+
+    plant: Plant
+    prior: Mapping[str, float]
+    silent: Mapping[str, float]
+    slow: float
+
+
 def fitted_structure(
-    stage: EffectRows,
-    outcomes: Mapping[str, RowFit],
-    steps: Sequence[Step],
-    logs: Sequence[MotionLog],
-    drive: Drive,
-    rig: Rig,
-    rng: np.random.Generator,
-    *,
-    near: Karnopp | None = None,
-    vain: float = np.inf,
-) -> FittedStructure:
+    stage: EffectRows, outcomes: Mapping[str, RowFit], steps: Sequence[Step],
+    logs: Sequence[MotionLog], drive: Drive, rig: Rig, rng: np.random.Generator,
+    *, near: Karnopp | None = None, vain: float = np.inf,
+) -> FittedStructure:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
     limits to begin from too, where those of the regression lead nowhere; vain: misfit of short logs
     from which no search is worth its while.
     """
+    told = _regressed(stage, outcomes, steps, logs, rig)
+    plant, prior = told.plant, dict(told.prior)
+    if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
+        return FittedStructure(stage, outcomes, plant, {**prior, **told.silent}, True)
+    # Where sliding itself is not explained, no other band of a plant with effects will do. A state
+    # follows the velocity as the log tells it, so even of the right effect more than noise is left.
+    remembers = any(s.candidate.effect.evolve and s.candidate.effect.place.rubs for s in steps)
+    left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
+    missing = max(left) > MUCH**2 and not remembers
+    hopeless = missing and (bool(steps) or rough(outcomes))
+    done = _refined(told, logs, drive, near, "rough" if hopeless else "whole")
+    free = loose(plant, drive)
+    smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
+    if smooth and done.misfit > COMPLETE and not hopeless:
+        again = replace(onward(done.plant, logs, drive), prior=prior)
+        done = again if again.misfit < done.misfit else done
+    followed = NEARLY if steps else COMPLETE
+    if free and done.misfit > followed and not hopeless:
+        by_loads = any(by_load(one.effect) for one in plant.effects)
+        begins = [plant, done.plant]
+        if near is not None and by_loads:
+            # What the plain run tells is what the load leaves of it.
+            begins = [loaded(replace(plant, friction=near)), plant]
+        if missing:  # it will not do, however closely it is searched
+            begins = begins[:1]
+        banded = BREAKAWAY in outcomes and not missing and not by_loads
+        known = {} if missing else left_open(plant.effects, prior)
+        searches = 0 if missing else SEARCHES
+        done = closest(begins, logs, drive, rng, searches, banded, known, done, vain)
+    return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+
+
+def _refined(
+    told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None, effort: Effort
+) -> Refit:
+    """The regression's plant refined on the free run, from another band and on a piece first where
+    that leaves more than noise."""
+    plant, prior = told.plant, dict(told.prior)
+    free = loose(plant, drive)
+    done = refit(plant, logs, drive, band=max(told.slow, 1e-4), prior=prior, effort=effort)
+    if near is not None and not free and done.misfit > COMPLETE:
+        same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
+        beside = replace(plant, friction=replace(plant.friction, **same))
+        other = refit(
+            beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior, effort=effort
+        )
+        done = other if other.misfit < done.misfit else done
+    if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
+        part = [shortened(one, PIECE_SECONDS) for one in logs]
+        begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
+        begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
+        close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
+        done = close if close.misfit < done.misfit else done
+    return done
+
+
+def _regressed(
+    stage: EffectRows, outcomes: Mapping[str, RowFit], steps: Sequence[Step],
+    logs: Sequence[MotionLog], rig: Rig,
+) -> _Regressed:  # fmt: skip
+    """The plant by the equations alone."""
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
-    prior: dict[str, float] = {}
     sliding = outcomes[MECHANICAL]
-    deviation = deviations(sliding)
-    prior |= dict(zip(FIVE, deviation[:5].tolist(), strict=True))
+    prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
     up, down = borne(logs)
     stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
     if BREAKAWAY in outcomes:
@@ -114,65 +179,33 @@ def fitted_structure(
         drives = Motor(rig.force_per_command)
     acting, silent = [], dict[str, float]()
     for step in steps:
-        effect = step.candidate.effect
-        values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
-        spreads = effect_sd(effect, values, outcomes)
-        none = slight(effect, values, spreads)
-        for p in effect.params:  # a signal that is not there tells nothing of its parameter
-            if p.name in AT_REST:  # nor do the equations tell a stick limit
-                silent[f"{effect.key}.{p.name}"] = np.inf
-                spreads.pop(p.name)
-            elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
-                silent[f"{effect.key}.{p.name}"] = np.inf
-                values[p.name] = float(np.clip(0.0, p.low, p.high))
-            elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
-                values[p.name] = float(np.clip(0.0, p.low, p.high))
-        acting.append(effect.acting(values))
-        prior |= {f"{effect.key}.{k}": x for k, x in spreads.items()}
+        values, spreads, unheard = _of_effect(step, outcomes)
+        acting.append(step.candidate.effect.acting(values))
+        prior |= spreads
+        silent |= dict.fromkeys(unheard, np.inf)
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
-    plant = Plant(nine, drives, tuple(acting))
-    if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
-        return FittedStructure(stage, outcomes, plant, prior | silent, True)
-    # Where sliding itself is not explained, no other band of a plant with effects will do. A state
-    # follows the velocity as the log tells it, so even of the right effect more than noise is left.
-    remembers = any(s.candidate.effect.evolve and s.candidate.effect.place.rubs for s in steps)
-    left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
-    missing = max(left) > MUCH**2 and not remembers
-    free = loose(plant, drive)
-    effort: Effort = "rough" if missing and (steps or rough(outcomes)) else "whole"
-    begin = max(slow, 1e-4)
-    done = refit(plant, logs, drive, band=begin, prior=prior, effort=effort)
-    if near is not None and not free and done.misfit > COMPLETE:
-        same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
-        beside = replace(plant, friction=replace(nine, **same))
-        other = refit(
-            beside, logs, drive, band=max(near.dv_p, -near.dv_n), prior=prior, effort=effort
-        )
-        done = other if other.misfit < done.misfit else done
-    if effort == "whole" and not (free or on_bristle(plant)) and done.misfit > COMPLETE:
-        part = [shortened(one, PIECE_SECONDS) for one in logs]
-        begun = refit(done.plant, part, drive, prior=prior, effort="quick").plant
-        begun = begun if misfit(begun, logs, drive) < done.misfit else done.plant
-        close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
-        done = close if close.misfit < done.misfit else done
-    hopeless = missing and (bool(steps) or rough(outcomes))
-    smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
-    if smooth and done.misfit > COMPLETE and not hopeless:
-        again = replace(onward(done.plant, logs, drive), prior=prior)
-        done = again if again.misfit < done.misfit else done
-    followed = NEARLY if steps else COMPLETE
-    if free and done.misfit > followed and not hopeless:
-        begins = [plant, done.plant]
-        if near is not None and any(by_load(a.effect) for a in acting):
-            # What the plain run tells is what the load leaves of it.
-            begins = [loaded(replace(plant, friction=near)), plant]
-        if missing:  # it will not do, however closely it is searched
-            begins = begins[:1]
-        told = BREAKAWAY in outcomes and not missing and not any(by_load(a.effect) for a in acting)
-        known = {} if missing else left_open(acting, prior)
-        searches = 0 if missing else SEARCHES
-        done = closest(begins, logs, drive, rng, searches, told, known, done, vain)
-    return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+    return _Regressed(Plant(nine, drives, tuple(acting)), prior, silent, slow)
+
+
+def _of_effect(
+    step: Step, outcomes: Mapping[str, RowFit]
+) -> tuple[dict[str, float], dict[str, float], list[str]]:
+    """An effect's parameters by the equations, how sure they are of each (as key.name), and those
+    (as key.name) of which they tell nothing."""
+    effect = step.candidate.effect
+    values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
+    spreads = effect_sd(effect, values, outcomes)
+    none, unheard = slight(effect, values, spreads), []
+    for p in effect.params:  # a signal that is not there tells nothing of its parameter
+        if p.name in AT_REST:  # nor do the equations tell a stick limit
+            unheard.append(f"{effect.key}.{p.name}")
+            spreads.pop(p.name)
+        elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
+            unheard.append(f"{effect.key}.{p.name}")
+            values[p.name] = float(np.clip(0.0, p.low, p.high))
+        elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
+            values[p.name] = float(np.clip(0.0, p.low, p.high))
+    return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unheard
 
 
 def _limit(coulomb: float, held: float) -> float:

@@ -9,7 +9,7 @@ from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Plant
 from identification.simulation.free_run import free_run
-from identification.tracing import trace
+from identification.tracing import recorded_rows
 
 NINE = Karnopp(3.5, 16.97, 18.13, 289.0, 287.4, 0.009, -0.01, 20.76, -21.8)
 H = 2e-3
@@ -41,10 +41,10 @@ def logged(u_d: float) -> Log:
 def test_an_actuator_that_an_effect_makes_linear_is_judged(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(trace, "LINEAR_ACTUATOR", 0.9)  # of this log a line leaves 0.92
+    monkeypatch.setattr(recorded_rows, "LINEAR_ACTUATOR", 0.9)  # of this log a line leaves 0.92
     log, dead = logged(0.25), {"valve_dead_zone": built_in()["valve_dead_zone"]}
     remarks: list[str] = []
-    assert trace._by_command([log], RIG, dead, remarks)
+    assert recorded_rows._by_command([log], RIG, dead, remarks)
     assert not remarks
-    assert not trace._by_command([log], RIG, {}, remarks)
+    assert not recorded_rows._by_command([log], RIG, {}, remarks)
     assert "a linear actuator leaves 92 %" in remarks[0]

@@ -1,0 +1,155 @@
+"""Verdict: what is left, whether it carries over to the test logs, and what is to be said of it."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
+from identification.estimation.windowed_run.refinement import COMPLETE
+from identification.log import Rig
+from identification.model.plant import units_of
+from identification.tracing.constant_force import beyond_friction, constant_remark
+from identification.tracing.free_run.backward_elimination import DECISIVE, equations_explained
+from identification.tracing.free_run.fitted_structure import FittedStructure
+from identification.tracing.free_run.trial_structures import driven_only
+from identification.tracing.model_errors import carries, errors_of, share_left
+from identification.tracing.parameter_drift import parameter_drift
+from identification.tracing.regression.stepwise import Choice
+from identification.tracing.remaining_structure import (
+    ASTRAY,
+    DOUBTFUL,
+    IMPOSED_LEFT,
+    MOST_PLACES,
+    at_breakaway,
+    in_run,
+    places,
+    remaining_structure,
+    strongest,
+    too_much,
+    unrepeated,
+)
+from identification.tracing.result import Change, Dependence, Errors, TraceVerdict
+from identification.tracing.structure_search import Refinement, Selection, without_effects
+from identification.tracing.verdict import verdict_of
+
+NOTHING = Dependence((), 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Judgement:
+    """The verdict, the errors of the plain model and with the effects, and what is left of them."""
+
+    verdict: TraceVerdict
+    before: Mapping[str, Errors]
+    after: Mapping[str, Errors]
+    left: Dependence
+    drift: tuple[Change, ...]
+    remarks: tuple[str, ...]
+
+
+def judgement(
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog], rig: Rig
+) -> Judgement:
+    """What is to be said of a refined structure; seen: the test logs, recorded as the others."""
+    rows, plain = chosen.plain.rows, chosen.plain.model
+    choice, after, logs = found.choice, found.model, list(rows.logs)
+    changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
+    left = _left(choice, after, chosen)
+    verdict = verdict_of(choice, left, changed)
+    slowest = choice.base[MECHANICAL].slowest
+    errors_before = errors_of(plain, slowest, (), logs, seen, rows.drive)
+    errors_after = errors_of(after, slowest, choice.steps, logs, seen, rows.drive)
+    doubts = _doubts(chosen, found, errors_before, errors_after, bool(changed))
+    if verdict != "unknown" and (doubts or too_much(choice, after)):
+        verdict = "unknown"
+        # A law of place is told from what the plain model leaves.
+        of_place = PIECES in doubts or LONGER in doubts
+        left = NOTHING if of_place else strongest(choice, after, logs, rows.drive)
+        if choice.steps and not left.depends_on:  # of all that is missing
+            left = remaining_structure(without_effects(chosen.plain, choice), plain, any_size=True)
+    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts)
+    return Judgement(verdict, errors_before, errors_after, left, tuple(changed), said)
+
+
+def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependence:
+    """On what the rest depends: in the equations, else in the run, else at the breakaways."""
+    # A refinement may end short of its minimum.
+    most = DECISIVE if choice.steps else COMPLETE
+    left = NOTHING if after.misfit <= most else remaining_structure(choice, after)
+    if not (left.depends_on or choice.steps or after.imposed) and after.misfit > DOUBTFUL:
+        rows = chosen.plain.rows
+        left = in_run(after, list(rows.logs), rows.drive)
+        left = left if left.depends_on else at_breakaway(choice)
+    return left
+
+
+PIECES = (
+    "several effects of place together follow what is missing: rather pieces of one law of place"
+    " that the library does not have"
+)
+LONGER = "a force is said to repeat over more than the travel shows: it stands in for another"
+STANDS_IN = (
+    "what explains the training logs does not explain the test logs: it stands in for something"
+    " else, or the machine differs in them"
+)
+
+
+def _doubts(
+    chosen: Selection, found: Refinement, before: Mapping[str, Errors], after: Mapping[str, Errors],
+    changed: bool,
+) -> tuple[str, ...]:  # fmt: skip
+    """Why the effects found may stand in for one that the library lacks; changed: by drift."""
+    choice, model = found.choice, found.model
+    if model.stage.imposed:
+        carried = share_left(before, after) <= IMPOSED_LEFT
+    else:
+        carried = not equations_explained(choice.base) or carries(before, after)
+    pieces = places(choice) >= MOST_PLACES
+    pieces = pieces or (chosen.pieces and places(choice) > 1 and model.misfit > COMPLETE)
+    doubts = {
+        PIECES: pieces,
+        LONGER: not model.imposed and unrepeated(model),
+        STANDS_IN: bool(choice.steps) and not changed and not carried,
+    }
+    return tuple(said for said, holds in doubts.items() if holds)
+
+
+def _remarks(
+    choice: Choice,
+    after: FittedStructure,
+    left: Dependence,
+    logs: Sequence[MotionLog],
+    seen: Sequence[MotionLog],
+    rig: Rig,
+) -> Iterator[str]:
+    """What whoever reads the trace has to know of it."""
+    if after.imposed and after.stage.imposed:
+        yield "the motion is imposed (inertia is of no account): no free run is judged"
+    elif after.imposed:
+        yield "inertia does not show beside what is left: no free run is judged"
+    elif choice.steps and after.misfit > ASTRAY:
+        yield (
+            f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
+            " band and stick limits are not to be trusted, or more is missing"
+        )
+    always = beyond_friction(choice.end.theta)
+    if always is not None:
+        yield constant_remark(always, units_of(rig.motion)["F_cp"])
+    if left.swing > 0.0:
+        yield (
+            f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"
+            " outside, or another loop"
+        )
+    if not after.imposed and driven_only(logs):
+        motor = (
+            " nor a dead zone of the command be told from friction" if rig.kind == "motor" else ""
+        )
+        yield (
+            "the force hardly ever opposes the motion, so friction in proportion to it would not"
+            f" show{motor} (a run that brakes hard would show it)"
+        )
+    if seen and not any(len(one.sliding.start) for one in seen):
+        yield "the body does not slide in the test logs, so they say nothing of the force error"
+    if not seen:
+        yield "no test log: the test errors are those of stretches left out in turn"

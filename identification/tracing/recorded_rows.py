@@ -1,0 +1,160 @@
+"""Rows: the logs with their motion, and which equations and effects they can show at all."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from identification.effects._library import Library
+from identification.errors import NotIdentifiable
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    Fitted,
+    MotionLog,
+    actuator,
+    motion_log,
+    solve_rows,
+    stacked,
+)
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.tracing.regression.candidates import best_of
+from identification.tracing.regression.stepwise import first_stage
+from identification.tracing.remaining_structure import FEWEST_ROWS
+
+LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
+SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
+RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
+OF_SPEED = frozenset({"v", "reversal"})
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRows:
+    """The training logs with their motion, and how another log is recorded in the same way.
+
+    by_command: whether the actuator's equation is judged too; refused: why they tell nothing
+    unless a rig imposes their motion, None where they do.
+    """
+
+    logs: tuple[MotionLog, ...]
+    recorded: Callable[..., MotionLog]
+    drive: Drive
+    by_command: bool
+    refused: NotIdentifiable | None
+    remarks: tuple[str, ...]
+
+
+def recorded_rows(train: Sequence[Log], rig: Rig, library: Library) -> RecordedRows:
+    """The training logs as rows; raises NotIdentifiable where too little of the motion slides."""
+    remarks: list[str] = []
+    by_command = _by_command(train, rig, library, remarks)
+    held = rig.kind == "motor"
+    recorded = partial(motion_log, held=held, by_command=by_command, rotary=rig.motion == "rotary")
+    drive: Drive = "command" if by_command or held else "force"
+    logs, refused = _logs(train, recorded, drive)
+    return RecordedRows(tuple(logs), recorded, drive, by_command, refused, tuple(remarks))
+
+
+def imposed_rows(rows: RecordedRows) -> RecordedRows:
+    """The same logs as a rig's that imposes the motion; raises NotIdentifiable as above."""
+    recorded = partial(rows.recorded, imposed=True)
+    logs = tuple(recorded(one.log) for one in rows.logs)
+    _enough(logs)
+    return RecordedRows(logs, recorded, rows.drive, rows.by_command, None, rows.remarks)
+
+
+def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
+    """Whether an actuator with a logged command is to be judged too: a linear one, or one that
+    some effect of the library makes linear."""
+    if rig.kind == "motor" or not all("u" in log and np.ptp(log["u"]) > 0 for log in train):
+        return False
+    logs = [motion_log(log, held=False, by_command=True) for log in train]
+    rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in logs])
+    found = solve_rows(rows)
+
+    def left_by(one: Fitted) -> float:
+        left = float(np.std(one.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
+        return left if one.theta[0] > 0 else max(left, 1.0)  # nothing follows the command
+
+    left = left_by(found)
+    if left > LINEAR_ACTUATOR:
+        stage, first = first_stage(logs, True)
+        own = [e for e in library.values() if e.place.in_actuator]
+        tried = [best_of(stage, effect, first) for effect in own if ACTUATOR in first]
+        fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
+        left = min([left, *(left_by(fit) for fit in fits)])
+    if left > LINEAR_ACTUATOR:
+        remarks.append(
+            f"a linear actuator leaves {100 * left:.0f} % of the force's rate: effects between"
+            " command and force are not judged"
+        )
+        return False
+    return True
+
+
+def _logs(
+    train: Sequence[Log], recorded: Callable[..., MotionLog], drive: Drive
+) -> tuple[list[MotionLog], NotIdentifiable | None]:
+    """The logs with their motion; imposed where only a rig's slow motion may hold enough, and then
+    the error that they are otherwise."""
+    logs = [recorded(log) for log in train]
+    try:
+        _enough(logs)
+    except NotIdentifiable as error:
+        if drive != "force":
+            raise
+        logs = [recorded(log, imposed=True) for log in train]
+        try:
+            _enough(logs)
+        except NotIdentifiable:
+            raise error from None
+        return logs, error
+    return logs, None
+
+
+def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library, tuple[str, ...]]:
+    """The library without effects of speed alone, where a rig kept to much the same speed; and
+    what to say of it.
+
+    There they would stand in for whatever makes one stroke differ from another.
+    """
+    ratios = []
+    for way in (True, False):
+        speed = np.concatenate([one.speed[one.up == way] for one in logs])
+        low, high = np.quantile(speed, RANGE)
+        ratios.append(float(high / low))
+    of_speed = [
+        k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= OF_SPEED
+    ]
+    if max(ratios) >= VARIED or not of_speed:
+        return library, ()
+    said = (
+        f"the speeds of each direction are too alike (a factor of {max(ratios):.2g} at most,"
+        f" {VARIED:g} needed) to tell friction that depends on speed alone:"
+        f" {', '.join(of_speed)} not tried; add runs at other speeds"
+    )
+    return {key: effect for key, effect in library.items() if key not in of_speed}, (said,)
+
+
+def _enough(logs: Sequence[MotionLog]) -> None:
+    rows = sum(len(one.sliding.start) for one in logs)
+    if rows < FEWEST_ROWS:
+        raise NotIdentifiable(
+            f"{logs[0].log.name}: {rows} stretches of sliding in one direction long enough to"
+            f" judge ({FEWEST_ROWS} needed); log longer or faster motion"
+        )
+    up = np.concatenate([one.up for one in logs])
+    if np.all(up) or not np.any(up):
+        way = "negative" if up[0] else "positive"
+        raise NotIdentifiable(
+            f"{logs[0].log.name}: no stretch of sliding in {way} direction is long enough to judge;"
+            " log motion in both directions (identify takes one direction alone)"
+        )
+    share = float(np.mean(np.concatenate([one.signals["d"] != 0 for one in logs])))
+    if share < SLIDES and rows < MANY_ROWS:
+        raise NotIdentifiable(
+            f"{logs[0].log.name}: the body slides for {100 * share:.1f} % of the log, in {rows}"
+            f" stretches ({100 * SLIDES:.0f} %, or {MANY_ROWS} stretches, needed to tell its mass"
+            " from its friction); drive it harder, or log longer motion"
+        )

@@ -1,0 +1,114 @@
+"""Selection and refinement: effects that the equations call for, and that the run confirms."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.log import Rig
+from identification.tracing.free_run.backward_elimination import (
+    Setting,
+    doubted,
+    fewest,
+    first_alone,
+    suffices,
+)
+from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure, inertia_is_lost
+from identification.tracing.free_run.forward_selection import at_once, judged_forward
+from identification.tracing.free_run.rivals import told_apart
+from identification.tracing.plain_model import PlainModel
+from identification.tracing.regression.row_fit import mean_square
+from identification.tracing.regression.stepwise import Choice, Progress, choose
+from identification.tracing.remaining_structure import MOST_PLACES, before_pieces, places
+
+HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
+HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """What the equations choose: the first effect alone, refined on its run, and all of them.
+
+    pieces: whether they are pieces of one law of place, all but the first dropped.
+    """
+
+    plain: PlainModel
+    setting: Setting
+    begun: Choice
+    alone: FittedStructure | None
+    choice: Choice
+    pieces: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Refinement:
+    """The structure that the free run confirms, and its model."""
+
+    choice: Choice
+    model: FittedStructure
+
+
+def selection(plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Progress) -> Selection:
+    """The effects that the equations call for, one after the other."""
+    rows, start, first, library = plain.rows, plain.start, plain.first, plain.library
+    logs = list(rows.logs)
+    setting = Setting(
+        logs, logs, rows.drive, rig, library, start, first, plain.model, rng.spawn(1)[0]
+    )
+    choice = begun = choose(start, first, library, rng, report, most=1)
+    alone = first_alone(begun, setting)
+    if begun.steps and not suffices(alone, begun, setting):
+        choice = choose(start, first, library, rng, report, begun)
+    pieces = not plain.model.imposed and places(choice) >= MOST_PLACES
+    choice = before_pieces(choice) if pieces else choice
+    return Selection(plain, setting, begun, alone, choice, pieces)
+
+
+def refinement(chosen: Selection, report: Progress) -> Refinement:
+    """The effects refined on the free run, without those that it does without, with those that
+    only it shows."""
+    setting, choice, plain = chosen.setting, chosen.choice, chosen.plain.model
+    begun, alone, model = chosen.begun, chosen.alone, plain
+    sliding = choice.base[MECHANICAL]
+    hidden = plain.imposed and (inertia_is_lost(sliding) or mean_square(sliding) > MUCH**2)
+    unsure = setting.start.band == 0.0 and not hidden
+    # Where the first effect leaves next to nothing of the equations, the run may tell the next.
+    more = alone is not None and 0 < len(alone.plant.effects) < len(choice.steps)
+    found = at_once(begun, alone, setting, report) if alone is not None and more else None
+    if found is not None:
+        choice, model = found
+    elif choice.steps:
+        choice, model = fewest(choice, setting, unsure)
+    if unsure:
+        choice, model = doubted(choice, model, setting)
+        setting = replace(setting, doubted=choice.steps)
+    report("judging", 0.0)
+    choice, model = judged_forward(choice, model, setting, report)
+    if useless(choice, plain, model):
+        choice, model = without_effects(chosen.plain, choice), plain
+    return Refinement(told_apart(choice, model, setting), model)
+
+
+def without_effects(plain: PlainModel, choice: Choice) -> Choice:
+    """The choice of no effect; those tried are remembered."""
+    start, first = plain.start, plain.first
+    return Choice(start, first, (), start, first, choice.tried)
+
+
+def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> bool:
+    """Whether effects explain neither the run nor, to the sensors' noise, the equations.
+
+    Where no effect of the library is the right one, the nearest stands in for it: it lowers what
+    the equations leave (though not to a hundredth), bends the other parameters, and hides on what
+    the rest depends.
+    """
+    if after.imposed or not choice.steps:
+        return False
+    told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
+    lacked = any(mean_square(choice.first[e]) > MUCH**2 for e in told)
+    if lacked and all(
+        mean_square(choice.base[e]) <= max(MUCH**2, HUNDREDTH * mean_square(choice.first[e]))
+        for e in told
+    ):
+        return False
+    return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
