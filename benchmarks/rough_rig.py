@@ -48,6 +48,7 @@ def rough(kind: str, rng: np.random.Generator) -> Log:
     if kind == "stick-slip":
         k, stop = m * (2 * np.pi * rng.uniform(2, 80)) ** 2, 1e9
         r = np.exp(rng.uniform(-7.0, -2.3)) * np.abs((t + 0.25 * t[-1]) % t[-1] - 0.5 * t[-1])
+        r -= r[0]  # the spring begins slack
     elif kind == "stops":
         stop = rng.uniform(0.01, 0.1)
         F = f_s * rng.uniform(1.5, 6) * np.sign(np.sin(2 * np.pi * rng.uniform(0.1, 2) * t))
