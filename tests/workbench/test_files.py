@@ -17,6 +17,7 @@ from workbench.drifting import read_stream
 from workbench.fetch import card_path
 from workbench.logs import read_log
 from workbench.model import read_model
+from workbench.own_effects import load_effect
 
 
 def plug(path: Path) -> None:
@@ -45,6 +46,7 @@ def test_what_never_ends_is_refused(
         lambda: card_path(path),
         lambda: read_model(path),
         lambda: read_stream(path),
+        lambda: load_effect(path),
     )
     for read in readers:
         with pytest.raises(UserError, match=f"thing: is {what}, not a file; write its data"):
