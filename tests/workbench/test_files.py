@@ -12,6 +12,7 @@ import pytest
 from identification.errors import UserError
 from tests.workbench.log_files import WRITERS, card, signals
 from workbench.cards.card import load_card
+from workbench.cards.own_effects import load_effect
 from workbench.documents.model import read_model
 from workbench.logs import tables, text
 from workbench.logs.fetch import card_path
@@ -45,6 +46,7 @@ def test_what_never_ends_is_refused(
         lambda: card_path(path),
         lambda: read_model(path),
         lambda: read_stream(path),
+        lambda: load_effect(path),
     )
     for read in readers:
         with pytest.raises(UserError, match=f"thing: is {what}, not a file; write its data"):

@@ -57,6 +57,7 @@ import numba
 from identification.effects._base import Effect
 from identification.effects._library import Library, built_in, declared, joined_library
 from identification.errors import BadModel, UserError
+from workbench.files import refuse_special
 from workbench.links import broken_link
 
 GROUP = "workbench.effects"
@@ -81,6 +82,7 @@ def library(folders: Iterable[Path] = ()) -> Library:
 
 def load_effect(path: Path) -> Effect:
     """The effect that the file declares, compiled; raises BadModel as `library`."""
+    refuse_special(path, BadModel)
     name = f"workbench_effects_{hashlib.sha256(str(path).encode()).hexdigest()[:12]}_{path.stem}"
     spec = importlib.util.spec_from_file_location(name, path)
     if spec is None or spec.loader is None:
