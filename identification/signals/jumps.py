@@ -114,23 +114,29 @@ def _changes(step: Array) -> Array:
     """By how much each step differs from both its neighbours to the same side, else 0; (n - 1,)."""
     bend = np.diff(step)
     before, after = np.concatenate(([step[0] - step[1]], bend)), np.concatenate((-bend, bend[-1:]))
-    same = before * after > 0.0
-    return np.where(same, np.minimum(np.abs(before), np.abs(after)), 0.0)
+    del bend
+    other = before * after <= 0.0
+    change: Array = np.minimum(np.abs(before, out=before), np.abs(after, out=after), out=before)
+    change[other] = 0.0
+    return change
 
 
 def _returning(x: Array, step: Array, length: int, least: float) -> NDArray[np.intp]:
     """First samples of excursions of this length that begin and end on one level, quiet around."""
-    last = len(x) - length
-    first = np.arange(1, last)
-    before, after = x[first - 1], x[first + length]
-    away = np.array(
-        [x[first + j] - before - (after - before) * (j + 1) / (length + 1) for j in range(length)]
-    )
-    height = np.where(np.abs(np.sum(np.sign(away), axis=0)) == length, np.min(np.abs(away), 0), 0.0)
-    even = (length + 1) * _even(step)[first - 1]
-    large = (height > least) & (np.abs(after - before - even) < _QUIET * height)
-    found = first[large]
-    quiet = [_around(step, i, length) < _QUIET * height[i - 1] for i in found]
+    count = len(x) - length - 1
+    before, after = x[:count], x[length + 1 :]
+    side, height = np.zeros(count, dtype=np.int8), np.full(count, np.inf)
+    for j in range(1, length + 1):  # one at a time: a long log's signals are large
+        away = x[j : j + count] - before - (after - before) * j / (length + 1)
+        side += np.sign(away).astype(np.int8)
+        height = np.minimum(height, np.abs(away))
+    # Where none is high enough, as in most logs, the motion around need not be known.
+    high = (np.abs(side) == length) & (height > least)
+    if not np.any(high):
+        return np.flatnonzero(high)
+    even = (length + 1) * _even(step)[:count]
+    found = np.flatnonzero(high & (np.abs(after - before - even) < _QUIET * height)) + 1
+    quiet = [_around(step, int(i), length) < _QUIET * height[i - 1] for i in found]
     return found[np.array(quiet, dtype=bool)] if found.size else found
 
 

@@ -22,12 +22,13 @@ of an effect is a number in SI or a text with its unit; one that has a default m
     control_limit_v = 5.0
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
 from pydantic_core import PydanticCustomError
 
 from identification.arrays import Array
@@ -145,7 +146,7 @@ class CardTable(BaseModel):
 def _refuse_absurd(key: str, value: object) -> None:
     """Raises ValueError where the value, or one in the list, is a number that no machine has."""
     for one in value if isinstance(value, list) else [value]:
-        if isinstance(one, int | float) and one != 0 and not 1 / ABSURD <= abs(one) <= ABSURD:
+        if isinstance(one, int | float) and ABSURD < abs(one) < math.inf:
             raise ValueError(
                 f"{key!r} = {str(one)[:20]} is a number that no machine has; correct it"
             )
@@ -156,7 +157,15 @@ def _takes_bool(section: type[CardTable], key: str) -> bool:
     return annotation is bool or bool in getattr(annotation, "__args__", ())
 
 
-Positive = Annotated[float, Field(gt=0)]
+def _more_than_nothing(value: float) -> float:
+    """The value; raises ValueError where it is so small that what is divided by it overflows."""
+    if 0.0 < value < 1.0 / ABSURD:
+        raise ValueError(f"is nothing, {1.0 / ABSURD:.0e} or more needed")
+    return value
+
+
+Divisor = Annotated[float, AfterValidator(_more_than_nothing)]
+Positive = Annotated[Divisor, Field(gt=0)]
 NotNegative = Annotated[float, Field(ge=0)]
 
 
@@ -303,7 +312,7 @@ class LoopSection(CardTable):
 class FrictionSection(CardTable):
     """The nine parameters; signs are checked by `Karnopp`."""
 
-    m: float
+    m: Divisor
     F_cp: float
     F_cn: float
     F_vp: float
