@@ -9,11 +9,11 @@ from identification.effects._library import Library
 from identification.errors import UserError
 from identification.estimation.output_error.karnopp_fit import searched_plant
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.windowed_run.refinement import COMPLETE, loose, misfit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.tracing.free_run.fitted_structure import FittedStructure, band, fitted_structure
-from identification.tracing.imposed_motion import inertia_has_no_part
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
 from identification.tracing.regression.effect_rows import EffectRows
 from identification.tracing.regression.row_fit import RowFit, base_fits

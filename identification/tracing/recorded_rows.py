@@ -17,6 +17,7 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
+from identification.estimation.regression.inertia import SPEEDS_APART, speed_ratios
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.tracing.regression.candidates import best_of
@@ -25,7 +26,6 @@ from identification.tracing.remaining_structure import FEWEST_ROWS
 
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
-RANGE, VARIED = (0.05, 0.95), 4.0  # quantiles of speed, and what they must be apart (a factor)
 OF_SPEED = frozenset({"v", "reversal"})
 
 
@@ -119,19 +119,15 @@ def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library,
 
     There they would stand in for whatever makes one stroke differ from another.
     """
-    ratios = []
-    for way in (True, False):
-        speed = np.concatenate([one.speed[one.up == way] for one in logs])
-        low, high = np.quantile(speed, RANGE)
-        ratios.append(float(high / low))
+    ratio = max(speed_ratios(logs))
     of_speed = [
         k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= OF_SPEED
     ]
-    if max(ratios) >= VARIED or not of_speed:
+    if ratio >= SPEEDS_APART or not of_speed:
         return library, ()
     said = (
-        f"the speeds of each direction are too alike (a factor of {max(ratios):.2g} at most,"
-        f" {VARIED:g} needed) to tell friction that depends on speed alone:"
+        f"the speeds of each direction are too alike (a factor of {ratio:.2g} at most,"
+        f" {SPEEDS_APART:g} needed) to tell friction that depends on speed alone:"
         f" {', '.join(of_speed)} not tried; add runs at other speeds"
     )
     return {key: effect for key, effect in library.items() if key not in of_speed}, (said,)

@@ -58,14 +58,30 @@ def test_imposed_motion_gives_friction_but_no_design(
 
 
 def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) -> None:
-    assert data.is_dir()
-    log, out = "O-ring257_3bar.csv", tmp_path / "id"
-    assert main(["identify", log, "--card", "pneumatic_seals", "--out", str(out)]) == 0
+    logs = [str(data / "pneumatic_seals" / f"PK_{bar}bar.csv") for bar in (1, 5, 7)]
+    out = tmp_path / "id"
+    assert main(["identify", *logs, "--card", "pneumatic_seals", "--out", str(out)]) == 0
     friction = read(out / "model.json")["friction"]
     assert isinstance(friction, dict)
-    assert friction["F_vp"]["value"] is None
-    assert "wrong sign" in friction["F_vp"]["reason"]
-    assert friction["F_vp"]["assumed"] >= 0.0
+    assert friction["F_cp"]["value"] is None  # a constant force is beside the seal's friction
+    assert "wrong sign" in friction["F_cp"]["reason"]
+    assert friction["F_cp"]["assumed"] >= 0.0
+
+
+def test_a_rig_that_leads_the_body_is_fitted_on_its_force(data: Path, tmp_path: Path) -> None:
+    assert data.is_dir()
+    out = tmp_path / "id"
+    logs = [f"O-ring257_{bar}bar.csv" for bar in (1, 5, 7)]
+    assert main(["identify", *logs, "--card", "pneumatic_seals", "--out", str(out)]) == 0
+    model = read(out / "model.json")
+    friction = model["friction"]
+    assert isinstance(friction, dict)
+    # Means of the force over the strokes of either direction.
+    assert 8.0 < friction["F_cp"]["value"] < 10.0
+    assert 4.0 < friction["F_cn"]["value"] < 6.0
+    for name in ("F_vp", "F_vn"):
+        assert friction[name]["value"] is None
+        assert "too alike to tell" in friction[name]["reason"]
 
 
 def test_a_servo_without_a_force_is_refused(

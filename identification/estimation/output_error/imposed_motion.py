@@ -12,18 +12,32 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.arx.residual_tests import effective_samples
-from identification.errors import NotIdentifiable
+from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.output_error.identifiability import Events, estimates
 from identification.estimation.output_error.problem import Problem
-from identification.estimation.regression.three_step import FirstEstimate, usable_cutoffs
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    MotionLog,
+    Rows,
+    mechanical,
+    motion_log,
+    solve_rows,
+    stacked,
+)
+from identification.estimation.regression.inertia import (
+    SPEEDS_APART,
+    inertia_has_no_part,
+    speed_ratios,
+)
+from identification.estimation.regression.three_step import FirstEstimate
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
-from identification.model.inverse_model import SLIDING_NAMES, Regression, Smoothing, regression
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.signals.initial_state import measured_start
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
-IMPOSED_SHARE = 0.01  # share of the force below which the motion is surely imposed
+FEWEST_ROWS = 4  # in each direction
+ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
 WHY_NOT = {
@@ -48,18 +62,14 @@ class ForceFit:
     share: float
 
 
-def is_imposed(logs: Sequence[Log], firsts: Sequence[FirstEstimate], rig: Rig) -> bool:
-    """Whether the logs show imposed motion: no command, and inertia of no account."""
+def is_imposed(logs: Sequence[Log], rig: Rig) -> bool:
+    """Whether the logs show imposed motion: no command, and inertia has no part in the force."""
     if rig.kind == "motor" or any("u" in log for log in logs):
         return False
-    shares = []
-    for log, first in zip(logs, firsts, strict=True):
-        if first.sliding is None:
-            return False
-        m = first.sliding.m
-        inertia = abs(m) * float(np.std(first.motion.a))
-        shares.append(inertia / max(float(np.std(log["F"])), 1e-300))
-    return float(np.median(shares)) < IMPOSED_SHARE
+    try:
+        return inertia_has_no_part([motion_log(log, held=False, by_command=False) for log in logs])
+    except BadLog:
+        return False
 
 
 def fit_imposed(
@@ -75,8 +85,9 @@ def fit_imposed(
     Raises NotIdentifiable where no log slides enough in both directions.
     """
     logs, firsts = problem.logs, problem.firsts
-    data = [_regression(log) for log in logs]
-    fit = _best(data)
+    moved = [motion_log(log, held=False, by_command=False, imposed=True) for log in logs]
+    rows = _rows(moved, _name(logs))
+    fit = _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
     samples = np.tile(center, (1024, 1))
@@ -84,8 +95,8 @@ def fit_imposed(
     samples[:, list(fit.used)] = drawn
     nine = _assumed(center, firsts)
     friction = Karnopp.from_array(nine)
-    found = _estimates(fit, nine, samples, data, rig, _name(logs))
-    names = tuple(SLIDING_NAMES[i] for i in fit.used)
+    found = _estimates(fit, nine, samples, rows, rig, _name(logs))
+    names = tuple(FIVE[i] for i in fit.used)
     return KarnoppFit(
         friction=friction,
         actuator=None,
@@ -119,40 +130,52 @@ def fit_imposed(
     )
 
 
-def _regression(log: Log) -> Regression:
-    """Sliding samples, with more smoothing where the motion is slow. Raises NotIdentifiable."""
-    usable = usable_cutoffs(log)
-    for cutoff in usable[:-1]:
-        try:
-            return regression(log, Smoothing(cutoff=cutoff))
-        except NotIdentifiable:
-            continue
-    return regression(log, Smoothing(cutoff=usable[-1]))
+def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:
+    """The equation of motion in weak form, in windows of sliding, of each log.
+
+    Raises NotIdentifiable where they do not slide enough in both directions.
+    """
+    up = sum(int(np.count_nonzero(one.up)) for one in logs)
+    down = sum(len(one.up) for one in logs) - up
+    if min(up, down) < FEWEST_ROWS:
+        raise NotIdentifiable(
+            f"{name}: {up} windows of sliding in positive and {down} in negative direction, at"
+            f" least {FEWEST_ROWS} of each needed; log strokes in both directions"
+        )
+    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(ROUNDS):
+        theta = solve_rows(stacked([mechanical(one, theta) for one in logs])).theta
+    return [mechanical(one, theta) for one in logs]
 
 
-def _best(data: Sequence[Regression]) -> ForceFit:
-    """The largest set of columns that the motion tells apart."""
-    columns = np.concatenate([part.columns for part in data])
-    force = np.concatenate([part.force for part in data])
+def _best(data: Sequence[Rows], alike: bool) -> ForceFit:
+    """The largest set of columns that the motion tells apart; alike: whether its speeds are."""
+    noise = np.concatenate([part.sd for part in data])
+    columns = np.concatenate([part.X for part in data])
+    force = np.concatenate([part.b for part in data])
+    weight = np.median(noise) / noise
     inertia = 0.0
     for name in ("all", "no mass", "constant"):
         used = COLUMN_SETS[name]
-        chosen = columns[:, used]
+        chosen = columns[:, used] * weight[:, np.newaxis]
         size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
-        theta = np.linalg.lstsq(chosen / size, force, rcond=None)[0] / size
-        residual = force - chosen @ theta
+        theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
+        residual = force - columns[:, used] @ theta
         if name == "all":
             size_of_force = max(float(np.std(force)), 1e-300)
             inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / size_of_force
             if theta[0] <= 0 or inertia < INERTIA_SHARE:
                 continue
+        if alike and name == "no mass":
+            continue
         if float(np.linalg.cond(chosen / size)) < CONDITION:
             break
-    lengths = np.cumsum([len(part.force) for part in data])[:-1]
+    lengths = np.cumsum([len(part.b) for part in data])[:-1]
     parts = tuple(np.split(residual, lengths))
     independent = effective_samples([part for part in parts if len(part) > 8])
     inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
-    variance = float(np.mean(residual**2)) * len(residual) / max(independent - len(used), 1.0)
+    square = float(np.mean((weight * residual) ** 2))
+    variance = square * len(residual) / max(independent - len(used), 1.0)
     return ForceFit(
         used=used,
         theta=theta,
@@ -178,16 +201,16 @@ def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
 
 
 def _estimates(
-    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Regression], rig: Rig, name: str
+    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Rows], rig: Rig, name: str
 ) -> dict[str, Estimate]:
     """The five with intervals, the others with the reason."""
     units = ROTARY_UNITS if rig.motion == "rotary" else UNITS
-    up = int(sum(np.count_nonzero(part.columns[:, 1] > 0.5) for part in data))
-    down = int(sum(np.count_nonzero(part.columns[:, 2] < -0.5) for part in data))
-    fastest = float(max(np.max(np.abs(part.columns[:, 3:])) for part in data))
+    up = int(sum(np.count_nonzero(part.X[:, 1] > 0.5) for part in data))
+    down = int(sum(np.count_nonzero(part.X[:, 2] < -0.5) for part in data))
+    fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
     # Sliding is all that these parameters need.
     events = Events((0, 0), (0, 0), (up, down), (fastest, fastest))
-    used = [SLIDING_NAMES[i] for i in fit.used]
+    used = [FIVE[i] for i in fit.used]
     told = estimates(
         used, fit.theta, samples[:, list(fit.used)], events, rig.motion == "rotary", name
     )

@@ -73,7 +73,7 @@ def fit_karnopp(
     """
     report = on_progress or (lambda _stage, _share: None)
     problem = pose(logs, rig, drive)
-    if is_imposed(logs, problem.firsts, rig):
+    if is_imposed(logs, rig):
         return fit_imposed(problem, rng, rig, IMPOSED_WHY)
     problem, solution = best_solution(problem, rng, report)
     remarks: list[str] = []

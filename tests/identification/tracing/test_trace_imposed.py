@@ -11,9 +11,9 @@ from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog, motion_log
+from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.tracing.free_run.fitted_structure import inertia_is_lost
-from identification.tracing.imposed_motion import inertia_has_no_part
 from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.effect_rows import EffectRows
 from identification.tracing.regression.row_fit import base_fits

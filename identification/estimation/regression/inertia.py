@@ -1,4 +1,4 @@
-"""Whether a rig leads the body along a path, whatever the model lacks."""
+"""Whether a rig leads the body along a path, whatever the model lacks, and at how many speeds."""
 
 from collections.abc import Sequence
 
@@ -13,6 +13,11 @@ TOLD_BY_FORCE = 0.6
 NEXT = 2.0  # times their length, that neighbouring windows begin apart at most
 CHANCE_FACTOR = 25.0  # times what chance explains of noise
 LEAST_PAIRS = 30  # pairs of neighbouring windows, without which nothing tells that a rig leads it
+SPEED_RANGE = (
+    0.05,
+    0.95,
+)  # quantiles of speed, of which the higher must be so many times the lower
+SPEEDS_APART = 4.0  # to tell friction that depends on speed alone
 
 
 def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
@@ -49,3 +54,15 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
 
     inertia = theta[0] > 0.0 and tells(float(np.sum(others**2)), SHOWN_BY_INERTIA)
     return not (inertia or tells(float(np.sum(b**2)), TOLD_BY_FORCE))
+
+
+def speed_ratios(logs: Sequence[MotionLog]) -> tuple[float, float]:
+    """How many times the slow strokes the quick ones are, in positive and in negative direction.
+
+    Raises ValueError where there is none in a direction.
+    """
+    up, down = (
+        np.quantile(np.concatenate([one.speed[one.up == way] for one in logs]), SPEED_RANGE)
+        for way in (True, False)
+    )
+    return float(up[1] / up[0]), float(down[1] / down[0])
