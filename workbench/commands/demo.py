@@ -68,4 +68,4 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
         "out": folder.final,
     }
     emit(result, as_json, lambda: demo_view(found, folder.final))
-    return 0 if validation.passed else 1
+    return 0 if validation.passed and found.named_rightly else 1

@@ -66,7 +66,7 @@ def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
 def refuse_name(folder: MachineFolder) -> None:
     """Raises BadName where the folder's name is not UTF-8."""
     if folder.card.parent.name != folder.name:
-        raise BadName(f"{folder.name}: the folder's name is not UTF-8; rename the folder")
+        raise BadName("the folder's name is not UTF-8; rename the folder")
 
 
 def scan(

@@ -39,6 +39,11 @@ class Demonstration:
     truth: Mapping[str, Any]
 
     @property
+    def named_rightly(self) -> bool:
+        """Whether the effects found are those of the truth, and no other."""
+        return {one.effect.key for one in self.traced.trace.effects} == set(self.truth["effects"])
+
+    @property
     def worst_error(self) -> float:
         """Largest relative error of an identified parameter of the nine."""
         known = self.traced.model.friction

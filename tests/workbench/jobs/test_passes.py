@@ -223,9 +223,7 @@ def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root
         ("a", "caf\\xe9.csv", "set_aside"),
         ("z", "1.csv", "promoted"),
     ]
-    assert dict(done.failed) == {
-        "caf\\xe9": "caf\\xe9: the folder's name is not UTF-8; rename the folder"
-    }
+    assert dict(done.failed) == {"caf\\xe9": "the folder's name is not UTF-8; rename the folder"}
     assert run().outcomes == ()
 
 
