@@ -34,7 +34,7 @@ from identification.drift.reference_model import InForce, in_force
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 
@@ -74,7 +74,7 @@ class Outcome:
 def put_in_force(one: Machine, seed: int) -> InForce:
     """The model of one log of the machine as it is."""
     log = simulated(one, (), seed, "model", MODEL).log
-    fit = fit_karnopp([log], np.random.default_rng(seed), rig=one.rig)
+    fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
     fastest = float(np.quantile(np.abs(np.gradient(log["y"], log.h)), 0.99))
     return in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
 

@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.model.plant import Plant
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import free_run
@@ -32,7 +32,7 @@ def main(seeds: int) -> None:
     print(f"{'seed':>4s}{'training mm':>13s}{'PULSES mm':>11s}{'s':>6s}")
     for seed in range(seeds):
         begin = time.perf_counter()
-        fit = fit_karnopp([train], np.random.default_rng(seed), rig=card.rig())
+        fit = fit_plant([train], np.random.default_rng(seed), rig=card.rig())
         seconds = time.perf_counter() - begin
         row = []
         for log in (train, pulses):

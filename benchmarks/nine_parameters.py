@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
@@ -75,7 +75,7 @@ def trial(name: str, recipe: Recipe, seed: int, signals: tuple[str, ...]) -> Tri
     least = bound(recipe, log)
     seen = Log(name, {key: log[key] for key in signals})
     begin = time.perf_counter()
-    fit: KarnoppFit = fit_karnopp([seen], np.random.default_rng(seed), rig=Rig("force"))
+    fit: KarnoppFit = fit_plant([seen], np.random.default_rng(seed), rig=Rig("force"))
     seconds = time.perf_counter() - begin
     truth = recipe.plant.friction.array
     errors = np.full(9, np.nan)

@@ -20,7 +20,7 @@ import numpy as np
 from benchmarks.euler_loop import closed_loop
 from identification.arrays import Array
 from identification.errors import UserError
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
@@ -227,7 +227,7 @@ def trial(seed: int, kinds: tuple[str, ...]) -> bool:
     stops = int(np.count_nonzero(~still[:-1] & still[1:]))
     begin = time.perf_counter()
     try:
-        fit = fit_karnopp([seen], np.random.default_rng(seed), rig=rig)
+        fit = fit_plant([seen], np.random.default_rng(seed), rig=rig)
         outcome = judged(fit, truth, TOLERANCE[machine.kind])
         said = f"{outcome.chi_square:10.4g}  {outcome.worst:>18s} {len(outcome.errors)} told"
     except UserError as error:

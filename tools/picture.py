@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Rig
 from identification.model.karnopp import NAMES, friction
 from identification.model.plant import Plant
@@ -26,7 +26,7 @@ def main(path: Path) -> None:
     recipe = load_card(card_path("paper_table1")).recipe
     assert recipe is not None
     log = record("paper_table1", recipe, SEED)
-    fit = fit_karnopp([log], np.random.default_rng(SEED), rig=Rig("force"))
+    fit = fit_plant([log], np.random.default_rng(SEED), rig=Rig("force"))
     run = free_run(Plant(fit.friction, fit.actuator), log, fit.logs[0].start, "command")
     motion = differentiate(log["y"], log.h)
     with style():

@@ -1,11 +1,11 @@
 """Drift test of one new log against the model in force: has the machine changed, and in what?
 
-The log's own parameters come from a local refit (`karnopp_estimate`, with effects
-`effect_estimate`). Their change counts by how far
-it lies beyond a practical margin, in the covariance of everything that is unsure: the log's fit,
-the model's fit, and how much the machine varies from log to log anyhow. A second statistic over
-the logs since the model was put in force (`mewma`) finds what changes slowly. A log that no
-parameters bring the model to follow is said to have another structure; that is no drift.
+The log's own parameters come from its fit, begun from the model in force (`log_estimate`). Their
+change counts by how far it lies beyond a practical margin, in the covariance of everything that is
+unsure: the log's fit, the model's fit, and how much the machine varies from log to log anyhow. A
+second statistic over the logs since the model was put in force (`mewma`) finds what changes slowly.
+A log that no parameters bring the model to follow is said to have another structure; that is no
+drift.
 """
 
 from collections.abc import Mapping
@@ -16,8 +16,7 @@ import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array
-from identification.drift.effect_estimate import estimate_with_effects
-from identification.drift.karnopp_estimate import LogEstimate, estimate_log
+from identification.drift.log_estimate import LogEstimate, estimate_log
 from identification.drift.mewma import (
     DriftState,
     Mean,
@@ -144,8 +143,7 @@ def drift_test(
     if state is None or state.model != model.key or state.names != model.names:
         state = fresh_state(model.key, model.names)
     try:
-        estimate = estimate_with_effects if model.plant.effects else estimate_log
-        found = estimate(model, log, rng)
+        found = estimate_log(model, log, rng)
     except NotIdentifiable as error:
         return _silent(log.name, "not_judged", str(error), {}, None, state)
     if not found.follows:

@@ -22,8 +22,8 @@ class InForce:
     """A machine's model against which its new logs are tested, in SI.
 
     names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
-    key.name; untold: those that the model does not tell, with the reason. drive, stiffness [N/m]:
-    how its fit was driven; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
+    key.name; untold: those that the model does not tell, with the reason. drive: what drove
+    its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is judged, 0 where
     it is not known. key: names the model in a `DriftState`. Raises BadModel where sizes differ.
     """
@@ -34,7 +34,6 @@ class InForce:
     covariance: Array
     rig: Rig
     drive: Drive
-    stiffness: float = 0.0
     chi_square: float = 1.0
     imposed: bool = False
     untold: Mapping[str, str] = field(default_factory=dict)
@@ -95,15 +94,14 @@ def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> 
     if isinstance(fit.actuator, Actuator):
         every |= {"k1": fit.actuator.k1, "k2": fit.actuator.k2}
     return InForce(
-        plant=Plant(friction, fit.actuator),
+        plant=Plant(friction, fit.actuator, fit.effects),
         names=fit.free,
         values=np.array([every[name] for name in fit.free]),
         covariance=fit.covariance,
         rig=rig,
         drive=fit.drive,
-        stiffness=fit.stiffness,
         chi_square=fit.chi_square,
-        imposed=all(np.isnan(one.position_rms) for one in fit.logs),
+        imposed=fit.imposed,
         untold=untold,
         key=key,
         fastest=fastest,

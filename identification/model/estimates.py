@@ -4,7 +4,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from identification.arrays import Array
+from identification.effects._base import Acting
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor
 
@@ -48,9 +51,9 @@ class KarnoppFit:
     """The nine parameters and the actuator, identified from one or more logs.
 
     friction: all nine, those that the logs do not tell at the value assumed for simulation.
-    estimates: the nine (and "k1", "k2" where the command is logged) by name.
+    effects: that the plant has beside them. estimates: the nine ("k1", "k2" where the command is
+    logged, effects' parameters as key.name) by name.
     free: names in the order of `covariance` (d, d) and of `samples` (k, d), equally likely sets.
-    stiffness [N/m]: couples a force-driven run to the measured position, 0 for none.
     noise_y [m], noise_F [N]: standard deviations found in the residual.
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
@@ -63,7 +66,6 @@ class KarnoppFit:
     covariance: Array
     samples: Array
     drive: Drive
-    stiffness: float
     noise_y: float
     noise_F: float
     chi_square: float
@@ -72,3 +74,9 @@ class KarnoppFit:
     breakaways: tuple[int, int]
     evaluations: int
     remarks: tuple[str, ...]
+    effects: tuple[Acting, ...] = ()
+
+    @property
+    def imposed(self) -> bool:
+        """Whether no run was followed, only the force equation of a motion that is imposed."""
+        return all(np.isnan(one.position_rms) for one in self.logs)

@@ -7,8 +7,8 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
-from identification.tracing.regression.stepwise import first_stage
 
 BELOW = 0.05  # of the larger Coulomb level, by which the other has to be negative
 

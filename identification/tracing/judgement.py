@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.refinement import COMPLETE
 from identification.log import Rig
 from identification.model.plant import units_of
 from identification.tracing.constant_force import beyond_friction, constant_remark
 from identification.tracing.free_run.backward_elimination import DECISIVE, equations_explained
-from identification.tracing.free_run.fitted_structure import FittedStructure
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.model_errors import carries, errors_of, share_left
 from identification.tracing.parameter_drift import parameter_drift

@@ -6,18 +6,18 @@ from dataclasses import replace
 import numpy as np
 
 from identification.arrays import Array
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
     MotionLog,
     stacked,
 )
+from identification.estimation.regression.row_fit import RowFit, rms
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.tracing.free_run.fitted_structure import FittedStructure
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, rms
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     FIVE,
@@ -14,12 +15,11 @@ from identification.estimation.regression.equation_rows import (
     column_noise,
     stacked,
 )
+from identification.estimation.regression.row_fit import RowFit
+from identification.estimation.structure_fit import OVERLAP, FittedStructure, band
 from identification.log import Rig
 from identification.model.plant import units_of
-from identification.tracing.free_run.fitted_structure import OVERLAP, FittedStructure, band
 from identification.tracing.model_errors import seen_by
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit
 from identification.tracing.regression.stepwise import Step
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Change

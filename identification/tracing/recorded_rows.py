@@ -8,23 +8,20 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    Fitted,
-    MotionLog,
-    actuator,
-    motion_log,
-    solve_rows,
-    stacked,
+from identification.estimation.recorded_logs import (
+    LINEAR_ACTUATOR,
+    commanded,
+    left_by_actuator,
+    left_share,
 )
+from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
 from identification.estimation.regression.inertia import SPEEDS_APART, speed_ratios
+from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.tracing.regression.candidates import best_of
-from identification.tracing.regression.stepwise import first_stage
 from identification.tracing.remaining_structure import FEWEST_ROWS
 
-LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
 SLIDES, MANY_ROWS = 0.03, 100  # of the log in sliding, and stretches of it, of which one is needed
 OF_SPEED = frozenset({"v", "reversal"})
 
@@ -67,23 +64,17 @@ def imposed_rows(rows: RecordedRows) -> RecordedRows:
 def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
     """Whether an actuator with a logged command is to be judged too: a linear one, or one that
     some effect of the library makes linear."""
-    if rig.kind == "motor" or not all("u" in log and np.ptp(log["u"]) > 0 for log in train):
+    if rig.kind == "motor" or not commanded(train):
         return False
-    logs = [motion_log(log, held=False, by_command=True) for log in train]
-    rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in logs])
-    found = solve_rows(rows)
-
-    def left_by(one: Fitted) -> float:
-        left = float(np.std(one.residual * rows.sd) / max(float(np.std(rows.b)), 1e-300))
-        return left if one.theta[0] > 0 else max(left, 1.0)  # nothing follows the command
-
-    left = left_by(found)
+    left = left_by_actuator(train)
     if left > LINEAR_ACTUATOR:
+        logs = [motion_log(log, held=False, by_command=True) for log in train]
         stage, first = first_stage(logs, True)
         own = [e for e in library.values() if e.place.in_actuator]
         tried = [best_of(stage, effect, first) for effect in own if ACTUATOR in first]
+        rows = first[ACTUATOR].rows if ACTUATOR in first else None
         fits = [c.outcomes[ACTUATOR].fit for c in tried if c is not None]
-        left = min([left, *(left_by(fit) for fit in fits)])
+        left = min([left, *(left_share(one, rows.sd, rows.b) for one in fits if rows is not None)])
     if left > LINEAR_ACTUATOR:
         remarks.append(
             f"a linear actuator leaves {100 * left:.0f} % of the force's rate: effects between"

@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
+from identification.estimation.regression.effect_rows import EffectRows, one_way
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BLOCKS,
@@ -15,6 +16,8 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
+from identification.estimation.regression.row_fit import MUCH_IS_LEFT, RowFit, mean_square, rms
+from identification.estimation.structure_fit import MUCH, FittedStructure, band
 from identification.estimation.windowed_run.refinement import COMPLETE, PERIOD_REACH, soft
 from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
@@ -27,11 +30,8 @@ from identification.tracing.dependence import (
     dependence,
 )
 from identification.tracing.free_run.backward_elimination import equations_explained, first_steps
-from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure, band
-from identification.tracing.regression.effect_rows import EffectRows, one_way
-from identification.tracing.regression.row_fit import RowFit, mean_square, rms
 from identification.tracing.regression.shape_grid import fewest_periods
-from identification.tracing.regression.stepwise import MATERIAL, MUCH_IS_LEFT, Choice, Step
+from identification.tracing.regression.stepwise import MATERIAL, Choice, Step
 from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30

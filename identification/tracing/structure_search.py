@@ -4,8 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.fit import finished
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.estimation.regression.row_fit import mean_square
+from identification.estimation.structure_fit import MUCH, FittedStructure, inertia_is_lost
+from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Rig
+from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     doubted,
@@ -13,11 +18,9 @@ from identification.tracing.free_run.backward_elimination import (
     first_alone,
     suffices,
 )
-from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure, inertia_is_lost
 from identification.tracing.free_run.forward_selection import at_once, judged_forward
 from identification.tracing.free_run.rivals import told_apart
 from identification.tracing.plain_model import PlainModel
-from identification.tracing.regression.row_fit import mean_square
 from identification.tracing.regression.stepwise import Choice, Progress, choose
 from identification.tracing.remaining_structure import MOST_PLACES, before_pieces, places
 
@@ -112,3 +115,22 @@ def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> 
     ):
         return False
     return after.misfit - 1.0 > HELPS * max(before.misfit - 1.0, 0.0)
+
+
+def settled_plain(
+    chosen: Selection, found: Refinement, rng: np.random.Generator, report: Progress
+) -> tuple[Selection, Refinement]:
+    """The same with the plain model as the estimator gives it, where no effect was found.
+
+    Its run is then that of the fit, if this is driven as the logs are judged.
+    """
+    if found.choice.steps:
+        return chosen, found
+    plain, recorded = chosen.plain, chosen.plain.recorded
+    fit = finished(plain.model, recorded, rng, report)
+    model = replace(plain.model, fit=fit)
+    if fit.drive == recorded.drive and not fit.imposed:
+        plant = Plant(fit.friction, fit.actuator)
+        model = replace(model, plant=plant, misfit=misfit(plant, recorded.logs, recorded.drive))
+    chosen = replace(chosen, plain=replace(plain, model=model))
+    return chosen, replace(found, model=model)

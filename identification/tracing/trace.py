@@ -18,7 +18,13 @@ from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
 from identification.tracing.result import Trace
-from identification.tracing.structure_search import Refinement, Selection, refinement, selection
+from identification.tracing.structure_search import (
+    Refinement,
+    Selection,
+    refinement,
+    selection,
+    settled_plain,
+)
 from identification.tracing.verdict import (
     found_effect,
     next_experiment,
@@ -45,17 +51,18 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or (lambda _stage, _share: None)
+    begin, settle, choose = rng.spawn(3)
     rows = recorded_rows(train, rig, library)
     report("tracing", 0.0)
-    plain = plain_model(rows, rig, library, rng)
-    chosen = selection(plain, rig, rng, report)
+    plain = plain_model(rows, rig, library, begin)
+    chosen = selection(plain, rig, choose, report)
     report("refitting", 0.5)
-    found = refinement(chosen, report)
+    chosen, found = settled_plain(chosen, refinement(chosen, report), settle, report)
     seen = [plain.rows.recorded(log) for log in test]
-    return _told(chosen, found, judgement(chosen, found, seen, rig), rig)
+    return _told(chosen, found, judgement(chosen, found, seen, rig))
 
 
-def _told(chosen: Selection, found: Refinement, judged: Judgement, rig: Rig) -> Trace:
+def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
     """All of it as the trace's result."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
@@ -72,8 +79,8 @@ def _told(chosen: Selection, found: Refinement, judged: Judgement, rig: Rig) -> 
         unknown=judged.left,
         drift=judged.drift,
         next_experiment=next_experiment(judged.verdict, choice, judged.left),
-        parameters_before=parameters_of(before, rig),
-        parameters_after=parameters_of(after, rig),
+        parameters_before=parameters_of(before, chosen.plain.recorded),
+        parameters_after=parameters_of(after, chosen.plain.recorded),
         plant=after.plant,
         residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
         run=run_residual(before, after, logs, rows.drive),

@@ -5,19 +5,19 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.effects._base import Param
+from identification.estimation.estimates import of_effect
+from identification.estimation.imposed_motion import imposed_estimates
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.row_fit import RowFit, rms
+from identification.estimation.settling import structure_estimates
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
-from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
-from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, units_of
-from identification.tracing.free_run.fitted_structure import FittedStructure, untold
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, rms
 from identification.tracing.regression.stepwise import Choice, Step, explained_part
 from identification.tracing.remaining_structure import signals_at
 from identification.tracing.result import (
@@ -67,25 +67,13 @@ def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEff
     effect = step.candidate.effect
     acting = next(a for a in after.plant.effects if a.key == effect.key)
     params = {
-        p.name: _of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
+        p.name: of_effect(p, acting.values[p.name], after.sd.get(f"{effect.key}.{p.name}"))
         for p in effect.params
     }
     explained = step.explained
     if explained is None:
         explained = explained_part(step.candidate, step.base)
     return FoundEffect(effect, params, explained, step.p_value)
-
-
-def _of_effect(p: Param, value: float, sd: float | None) -> Estimate:
-    if untold(sd, value, p.typical):
-        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
-    return _estimate(value, p.unit, sd)
-
-
-def _estimate(value: float, unit: str, sd: float | None) -> Estimate:
-    if sd is None:
-        return Estimate(value, unit, reason="held")
-    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
 
 
 def rivals_of(choice: Choice) -> tuple[EffectRival, ...]:
@@ -140,13 +128,13 @@ def listed(signals: Sequence[str]) -> str:
     return ", ".join(SAID.get(name, name) for name in signals)
 
 
-def parameters_of(model: FittedStructure, rig: Rig) -> dict[str, Estimate]:
-    """The nine and the actuator of a model."""
-    values = dict(zip(NAMES, model.plant.friction.array.tolist(), strict=True))
-    if isinstance(model.plant.actuator, Actuator):
-        values |= {"k1": model.plant.actuator.k1, "k2": model.plant.actuator.k2}
-    units = units_of(rig.motion)
-    return {k: _estimate(v, units[k], model.sd.get(k)) for k, v in values.items()}
+def parameters_of(model: FittedStructure, recorded: RecordedLogs) -> dict[str, Estimate]:
+    """The nine and the actuator of a model, those that the logs tell with their intervals."""
+    if model.fit is not None:
+        return {k: e for k, e in model.fit.estimates.items() if "." not in k}
+    if model.imposed:
+        return imposed_estimates(model.plant, model.sd, recorded)
+    return structure_estimates(model.plant, model.sd, recorded)
 
 
 def residuals_of(

@@ -10,7 +10,7 @@ import numpy as np
 
 from design.loop import LoopNoise
 from design.servo import Compensation, simulate_servo
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
@@ -88,7 +88,7 @@ def identify_rig(set_up: SetUp, truth: Karnopp, seed: int) -> IdentifiedRig:
     noise = LoopNoise.draw(len(t), NOISE_Y, NOISE_F, rng)
     run = simulate_servo(set_up.plant(truth), set_up.servo(stiff), reference, set_up.h, noise=noise)
     signals = {"t": run.t, "y": run.y_measured, "F": run.F_measured, "u": run.u}
-    fit = fit_karnopp([Log("rig", signals)], np.random.default_rng(seed), rig=Rig("force"))
+    fit = fit_plant([Log("rig", signals)], np.random.default_rng(seed), rig=Rig("force"))
     return IdentifiedRig(fit, truth)
 
 

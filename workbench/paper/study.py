@@ -7,7 +7,7 @@ import numpy as np
 
 from design.polynomial import multiply, second_order
 from design.rst import RST, design_rst
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.model.karnopp import NAMES
 from workbench.cards.card import load_card
 from workbench.logs.fetch import card_path
@@ -69,7 +69,7 @@ def table_1_errors(seed: int) -> dict[str, tuple[float, float]]:
     if card.recipe is None:
         raise LookupError("the card paper_table1_rich has no recipe")
     log = record(card.name, card.recipe, seed, card.rig())
-    fit = fit_karnopp([log], np.random.default_rng(seed), rig=card.rig())
+    fit = fit_plant([log], np.random.default_rng(seed), rig=card.rig())
     out = {}
     for name in NAMES:
         true, value = getattr(truth, name), fit.estimates[name].value

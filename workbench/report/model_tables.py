@@ -116,8 +116,8 @@ def held(model: Model) -> str:
     """How a run on the measured force was kept near the measured position."""
     from workbench.steps.predict import FORCE_WINDOW
 
+    anew = f"restarted from the measured state every {FORCE_WINDOW:g} s"
+    if model.fit.stiffness == 0.0:
+        return anew
     unit = shown(model.rotary).stiffness
-    return (
-        f"held to the measured position by {model.fit.stiffness:.3g} {unit} and restarted every"
-        f" {FORCE_WINDOW:g} s"
-    )
+    return f"held to the measured position by {model.fit.stiffness:.3g} {unit} and {anew}"

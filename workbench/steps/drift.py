@@ -104,7 +104,6 @@ def model_in_force(model: Model, key: str) -> InForce:
         covariance=_covariance(model, told),
         rig=model.rig,
         drive=model.fit.drive,
-        stiffness=model.fit.stiffness,
         chi_square=model.fit.chi_square,
         imposed=model.imposed,
         untold=untold,

@@ -17,7 +17,7 @@ from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulat
 from identification.arx.order_selection import select_arx
 from identification.arx.residual_tests import residual_tests
 from identification.errors import BadLog, BadModel, NotIdentifiable
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, Estimate, KarnoppFit
 from identification.model.inverse_model import ForceError, Smoothing, force_error
@@ -76,7 +76,7 @@ def identify(
     for log in logs:  # wrong options are refused before the long part
         check_period(options.design_period, log.name, log.duration)
         decimation(log.h, options.design_period)
-    fit = fit_karnopp(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
+    fit = fit_plant(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
     unit = units_of(rig.motion)["F_cp"]
     always = None if fit.adequate else constant_force(logs, held=rig.kind == "motor")
     if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
@@ -95,7 +95,7 @@ def identify(
             plant_reason=reason,
             fit=FitSummary(
                 drive=fit.drive,
-                stiffness=fit.stiffness,
+                stiffness=0.0,
                 noise_y=fit.noise_y,
                 noise_F=fit.noise_F,
                 chi_square=fit.chi_square,

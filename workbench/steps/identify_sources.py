@@ -53,7 +53,7 @@ def _posterior(
     sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
 ) -> dict[str, Any]:
     """What the walkers found, as model.json holds it."""
-    from identification.estimation.output_error.posterior import sample_posterior
+    from identification.estimation.posterior import sample_posterior
 
     report = on_progress or (lambda _stage, _share: None)
     found = sample_posterior(

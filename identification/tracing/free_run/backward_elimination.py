@@ -12,8 +12,17 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._library import Library
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_columns import slow_motion
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
+from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
+from identification.estimation.structure_fit import (
+    MUCH,
+    FittedStructure,
+    band,
+    fitted_structure,
+)
 from identification.estimation.windowed_run.nudged_search import closer, more_load, nearer
 from identification.estimation.windowed_run.refinement import (
     COMPLETE,
@@ -28,16 +37,8 @@ from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.tracing.free_run.fitted_structure import (
-    MUCH,
-    FittedStructure,
-    band,
-    fitted_structure,
-)
 from identification.tracing.regression.candidates import EffectCandidate
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, mean_square
-from identification.tracing.regression.stepwise import Choice, Step, absorb, material, settled_fits
+from identification.tracing.regression.stepwise import Choice, Step, absorb, material
 
 DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
 WALKED = 3.0  # the same, where the noise of a measured force may leave as much
@@ -74,6 +75,11 @@ class Setting:
     doubted: tuple[Step, ...] = ()
     made: dict[frozenset[str], FittedStructure] = field(default_factory=dict)
 
+    @property
+    def recorded(self) -> RecordedLogs:
+        """The logs as the estimator takes them."""
+        return RecordedLogs(tuple(self.logs), self.rig, self.drive)
+
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
     """Misfit up to which a run is not contested: nothing is missing, or the effects that the
@@ -108,8 +114,8 @@ def fitted(choice: Choice, setting: Setting) -> FittedStructure:
 def _model(choice: Choice, setting: Setting) -> FittedStructure:
     near = None if setting.plain.imposed else setting.plain.plant.friction
     model = fitted_structure(
-        choice.end, choice.base, choice.steps, setting.logs, setting.drive, setting.rig,
-        setting.rng, near=near, vain=vain(setting),
+        choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
+        vain=vain(setting),
     )  # fmt: skip
     found = None if model.imposed else insisted(model.plant, model.misfit, setting)
     if found is None:

@@ -16,12 +16,15 @@ from scipy.stats import chi2
 from identification.effects._base import Effect
 from identification.errors import UserError
 from identification.estimation.regression.effect_columns import by_load, equations_of
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
     MotionLog,
     shortened,
 )
+from identification.estimation.regression.row_fit import RowFit, mean_square, rough, settled_fits
+from identification.estimation.structure_fit import MUCH, FittedStructure
 from identification.estimation.windowed_run.nudged_search import (
     BREAKS_RANGE,
     CLOSE_RANGE,
@@ -73,7 +76,6 @@ from identification.tracing.free_run.backward_elimination import (
     seconds,
     with_steps,
 )
-from identification.tracing.free_run.fitted_structure import MUCH, FittedStructure
 from identification.tracing.free_run.trial_structures import (
     Trial,
     driven_only,
@@ -81,16 +83,7 @@ from identification.tracing.free_run.trial_structures import (
     structures,
 )
 from identification.tracing.regression.candidates import EffectCandidate, trial
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, mean_square
-from identification.tracing.regression.stepwise import (
-    CHANCE_LEVEL,
-    Choice,
-    Step,
-    absorb,
-    rough,
-    settled_fits,
-)
+from identification.tracing.regression.stepwise import CHANCE_LEVEL, Choice, Step, absorb
 
 HALF_OF_EXCESS = 0.5  # of the excess misfit before, at most
 ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near

@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.refinement import COMPLETE
 from identification.tracing.free_run.backward_elimination import Setting, fitted, only, seconds
-from identification.tracing.free_run.fitted_structure import FittedStructure
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import LEAST_SHARE, Choice, Step, merit, share
 

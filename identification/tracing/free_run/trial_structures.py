@@ -9,14 +9,14 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import Effect, Param
 from identification.estimation.regression.effect_columns import by_load, slow_motion
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import BREAKAWAY, FIVE, REST, MotionLog
+from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
+from identification.estimation.structure_fit import FittedStructure, inside
 from identification.estimation.windowed_run.refinement import loose
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without
-from identification.tracing.free_run.fitted_structure import FittedStructure, inside
 from identification.tracing.regression.candidates import EffectCandidate, best_of
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, base_fits, mean_square
 from identification.tracing.regression.shape_grid import median_rest, shape_grid
 from identification.tracing.regression.stepwise import ABSORBED, Choice, Step, gives_way
 

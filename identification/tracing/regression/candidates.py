@@ -19,13 +19,12 @@ from identification.estimation.regression.effect_columns import (
     Values,
     admissible,
     equations_of,
-    in_columns,
     needs_rounds,
     shape_params,
 )
+from identification.estimation.regression.effect_rows import EffectRows, with_effect
 from identification.estimation.regression.equation_rows import MECHANICAL, stacked
-from identification.tracing.regression.effect_rows import EffectRows, with_effect
-from identification.tracing.regression.row_fit import RowFit, row_fit
+from identification.estimation.regression.row_fit import RowFit, row_fit, with_sizes
 from identification.tracing.regression.shape_grid import shape_grid
 
 REFINED = 30  # evaluations of the refinement for each parameter
@@ -148,22 +147,3 @@ def refined_shape(
     search: Any = minimize
     found = search(lambda x: score(at(x)), first, method="Nelder-Mead", options=options)
     return at(found.x)
-
-
-def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> dict[str, float]:
-    """All parameters: shape, and the linear ones found; two directions as mean and asymmetry."""
-    values = {p.name: p.default for p in effect.params if p.default is not None} | dict(shape)
-    if not in_columns(effect):
-        return values
-    sizes: dict[str, float] = {}
-    for one in reversed(list(found.values())):
-        sizes |= dict(zip(one.rows.names, one.fit.theta.tolist(), strict=True))
-    for name in effect.linear:
-        full = f"{effect.key}.{name}"
-        if f"{full}+" in sizes:
-            plus, minus = sizes[f"{full}+"], sizes[f"{full}-"]
-            values[name] = 0.5 * (plus + minus)
-            values["asymmetry"] = 0.5 * (plus - minus) / values[name] if values[name] else 0.0
-        else:
-            values[name] = sizes[full]
-    return values

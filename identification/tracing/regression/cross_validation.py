@@ -3,8 +3,8 @@
 import numpy as np
 
 from identification.arrays import Array
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL, Rows, solve_rows, stacked
-from identification.tracing.regression.effect_rows import EffectRows
 
 
 def row_residual(

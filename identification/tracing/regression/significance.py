@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.arrays import Array
+from identification.estimation.regression.effect_rows import EffectRows
+from identification.estimation.regression.row_fit import RowFit
 from identification.tracing.regression.candidates import EffectCandidate
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit
 
 DRAWS = 200  # of the null hypothesis
 SEARCHED = 2.0  # times the gain of columns at one place: the search over shapes finds more

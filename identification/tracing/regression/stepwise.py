@@ -7,8 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from identification.effects._base import Effect
 from identification.effects._library import Library
-from identification.estimation.regression.effect_columns import slow_motion
+from identification.estimation.regression.effect_columns import Values, slow_motion
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
@@ -16,16 +18,22 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
-from identification.tracing.regression.candidates import EffectCandidate, best_of
-from identification.tracing.regression.cross_validation import left_out_error
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, base_fits, mean_square, row_fit
-from identification.tracing.regression.signals_behind_effects import (
+from identification.estimation.regression.row_fit import (
+    RowFit,
+    base_fits,
+    mean_square,
+    rough,
+    row_fit,
+    settled_fits,
+)
+from identification.estimation.regression.signals_behind_effects import (
     command_of,
     driven,
     reached,
     shown_to_true,
 )
+from identification.tracing.regression.candidates import EffectCandidate, best_of
+from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import chance
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
@@ -35,7 +43,6 @@ CHANCE_LEVEL = 0.01  # chance up to which a gain is no luck
 MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
 CARRIES = 0.95  # of the error on logs left out, that an effect may leave
 MOSTLY_EXPLAINED = 0.55  # of what is missing, where much is left in the end
-MUCH_IS_LEFT = 25.0  # square in noise units from which much is left
 SHIFT = 1.0  # of the position's noise
 MATERIAL_RATE = 0.002  # of the spread of dF/dt
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
@@ -74,24 +81,10 @@ class Choice:
     base: Mapping[str, RowFit]
     tried: tuple[EffectCandidate, ...] = ()
 
-
-def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes."""
-    found = base_fits(stage)
-    for _ in range(2):
-        theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
-        theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
-        stage = replace(stage, theta=theta, theta_a=theta_a)
-        found = base_fits(stage)
-    return stage, found
-
-
-def first_stage(
-    logs: Sequence[MotionLog], by_command: bool
-) -> tuple[EffectRows, dict[str, RowFit]]:
-    """The model without effects."""
-    first = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0])
-    return settled_fits(EffectRows(tuple(logs), *first, by_command))
+    @property
+    def effects(self) -> tuple[tuple[Effect, Values], ...]:
+        """The effects taken, at the parameters that the equations give them."""
+        return tuple((s.candidate.effect, s.candidate.values) for s in self.steps)
 
 
 def choose(
@@ -142,11 +135,6 @@ def accepted(
         key = step.candidate.effect.key
         tried = [one for one in tried if one.effect.key != key]
     return None
-
-
-def rough(base: Mapping[str, RowFit]) -> bool:
-    """Whether far more than the sensors' noise is left when nothing more is found."""
-    return any(mean_square(base[e]) > MUCH_IS_LEFT for e in (MECHANICAL, ACTUATOR) if e in base)
 
 
 def trusted(

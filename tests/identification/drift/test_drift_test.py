@@ -8,12 +8,12 @@ import pytest
 
 from identification.arrays import Array
 from identification.drift.drift_test import DriftSettings, DriftTest, drift_test, judged_estimate
-from identification.drift.karnopp_estimate import LogEstimate
+from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.reference_model import InForce, in_force
 from identification.effects._library import built_in
 from identification.errors import BadSpecification
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
@@ -26,7 +26,7 @@ NINE = table(2)
 
 @cache
 def model() -> InForce:
-    fit = fit_karnopp([made_log(NINE, seed=1)], np.random.default_rng(1), rig=FORCE)
+    fit = fit_plant([made_log(NINE, seed=1)], np.random.default_rng(1), rig=FORCE)
     return in_force(fit, FORCE, key="first", fastest=0.2)
 
 
@@ -135,7 +135,7 @@ def two(correlation: float) -> tuple[InForce, LogEstimate]:
     known = InForce(
         Plant(NINE, ACTUATOR), ("m", "F_vp"), values, 1e-6 * np.diag(sd**2), FORCE, "command"
     )
-    return known, LogEstimate(("m", "F_vp"), 1.055 * values, together, {}, 1.0, 2.0, False)
+    return known, LogEstimate(("m", "F_vp"), 1.055 * values, together, {}, 1.0, 2.0)
 
 
 def test_errors_that_go_together_are_one_accident_and_not_two() -> None:

@@ -3,9 +3,8 @@
 import numpy as np
 
 from identification.estimation.regression.equation_rows import FIVE, MECHANICAL, Rows
+from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.tracing.parameter_drift import changes
-from identification.tracing.regression.row_fit import RowFit
-from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import made, seen
 
 

@@ -8,11 +8,12 @@ from scipy.signal import butter, lfilter
 
 from identification.arrays import Array
 from identification.effects._library import built_in
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
+from identification.estimation.regression.row_fit import RowFit, first_stage
+from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.log import Rig
-from identification.tracing.free_run.fitted_structure import FittedStructure, fitted_structure
-from identification.tracing.regression.row_fit import RowFit
-from identification.tracing.regression.stepwise import Choice, Step, choose, first_stage
+from identification.tracing.regression.stepwise import Choice, Step, choose
 from identification.tracing.remaining_structure import (
     at_breakaway,
     before_pieces,
@@ -36,7 +37,7 @@ def found() -> tuple[Choice, FittedStructure]:
     one = seen(made(4, SPRING))
     start, first = first_stage([one], False)
     library, rng = {"spring": built_in()["spring"]}, np.random.default_rng(0)
-    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), RecordedLogs((one,), MOTOR, "command"), rng)
     choice = choose(start, first, library, rng, lambda _stage, _share: None)
     assert [step.candidate.effect.key for step in choice.steps] == ["spring"]
     return choice, replace(plain, plant=plant(SPRING), misfit=40.0)
@@ -169,7 +170,7 @@ def lacking(
     logs = [seen(made(seed, effects, command=shaken() if fast else None)) for seed in seeds]
     start, first = first_stage(logs, False)
     rng = np.random.default_rng(0)
-    plain = fitted_structure(start, first, (), logs, "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), RecordedLogs(tuple(logs), MOTOR, "command"), rng)
     return Choice(start, first, (), start, first), plain
 
 

@@ -10,14 +10,13 @@ from scipy.signal import lfilter
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog, motion_log
 from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.row_fit import base_fits, first_stage
+from identification.estimation.structure_fit import inertia_is_lost
 from identification.log import Log, Rig
-from identification.tracing.free_run.fitted_structure import inertia_is_lost
 from identification.tracing.regression.cross_validation import left_out_error
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import base_fits
-from identification.tracing.regression.stepwise import first_stage
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.tracing.test_trace import PLAIN, made

@@ -8,17 +8,17 @@ import pytest
 
 from identification.effects._library import Library, built_in
 from identification.errors import NotIdentifiable
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.effect_rows import UNEXPLAINED, with_effect
 from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
+from identification.estimation.regression.row_fit import base_fits, first_stage
+from identification.estimation.structure_fit import _limit, fitted_structure
 from identification.estimation.windowed_run.refinement import COMPLETE, Refit, misfit, refit
 from identification.estimation.windowed_run.windows import starts, walks
 from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.signals.differentiate import resolution
-from identification.tracing.free_run.fitted_structure import _limit, fitted_structure
 from identification.tracing.free_run.trial_structures import driven_only
-from identification.tracing.regression.effect_rows import UNEXPLAINED, with_effect
-from identification.tracing.regression.row_fit import base_fits
-from identification.tracing.regression.stepwise import first_stage
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
@@ -121,12 +121,14 @@ def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
         begun.append(start)
         return refit(start, *given, **how)
 
-    monkeypatch.setattr("identification.tracing.free_run.fitted_structure.refit", spied)
+    monkeypatch.setattr("identification.estimation.structure_fit.refit", spied)
     high = replace(NINE, F_cp=8.0, F_cn=7.0, F_sp=22.0, F_sn=-19.0)
     one = seen(made(6, friction=high))
     start, first = first_stage([one], by_command=False)
     told = {key: found for key, found in first.items() if key != BREAKAWAY}
-    model = fitted_structure(start, told, (), [one], "command", RIG, np.random.default_rng(0))
+    model = fitted_structure(
+        start, told, (), RecordedLogs((one,), RIG, "command"), np.random.default_rng(0)
+    )
     assert begun[0].friction.F_sp == pytest.approx(high.F_sp, rel=0.1)
     assert begun[0].friction.F_sn == pytest.approx(high.F_sn, rel=0.1)
     assert model.misfit <= COMPLETE

@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.row_fit import first_stage
+from identification.estimation.structure_fit import fitted_structure
 from identification.estimation.windowed_run.refinement import COMPLETE, Refit
 from identification.log import Rig
 from identification.model.plant import Plant
@@ -29,8 +32,7 @@ from identification.tracing.free_run.backward_elimination import (
     without_growth,
     without_slow,
 )
-from identification.tracing.free_run.fitted_structure import fitted_structure
-from identification.tracing.regression.stepwise import Choice, Step, choose, first_stage
+from identification.tracing.regression.stepwise import Choice, Step, choose
 from tests.identification.motor_logs import K_A, NINE, made, plant, seen
 
 MOTOR = Rig("motor", force_per_command=K_A)
@@ -44,7 +46,7 @@ def found() -> tuple[Setting, Choice]:
     one = seen(made(4, SPRING))
     rng = np.random.default_rng(0)
     start, first = first_stage([one], False)
-    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), RecordedLogs((one,), MOTOR, "command"), rng)
     library = {key: built_in()[key] for key in ("spring", "stribeck")}
     setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
@@ -105,7 +107,7 @@ def test_an_effect_that_is_needed_stays(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     kept = without_slow(choice)
     model = fitted_structure(
-        kept.end, kept.base, kept.steps, setting.logs, "command", MOTOR, np.random.default_rng(1)
+        kept.end, kept.base, kept.effects, setting.recorded, np.random.default_rng(1)
     )
     assert model.misfit <= COMPLETE
     after, same = pruned(kept, model, setting)

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog, shortened
+from identification.estimation.regression.row_fit import MUCH_IS_LEFT, first_stage, mean_square
+from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.nudged_search import less_load
 from identification.estimation.windowed_run.refinement import COMPLETE, even
 from identification.log import Rig
 from identification.tracing.free_run.backward_elimination import Setting
-from identification.tracing.free_run.fitted_structure import FittedStructure, fitted_structure
 from identification.tracing.free_run.forward_selection import (
     Begun,
     RunContender,
@@ -26,14 +28,7 @@ from identification.tracing.free_run.forward_selection import (
 )
 from identification.tracing.free_run.trial_structures import Trial
 from identification.tracing.regression.candidates import EffectCandidate, best_of
-from identification.tracing.regression.row_fit import mean_square
-from identification.tracing.regression.stepwise import (
-    MUCH_IS_LEFT,
-    Choice,
-    Step,
-    choose,
-    first_stage,
-)
+from identification.tracing.regression.stepwise import Choice, Step, choose
 from identification.tracing.trace import trace
 from tests.identification.motor_logs import K_A, made, plant, seen
 
@@ -45,7 +40,7 @@ def setting_of(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     one = seen(made(seed, {"backlash": {"width": width}}))
     start, first = first_stage([one], False)
     rng = np.random.default_rng(0)
-    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), RecordedLogs((one,), MOTOR, "command"), rng)
     return Setting([one], [one], "command", MOTOR, built_in(), start, first, plain, rng), plain
 
 

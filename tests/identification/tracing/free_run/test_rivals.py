@@ -7,12 +7,14 @@ import numpy as np
 import pytest
 
 from identification.effects._library import built_in
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.row_fit import first_stage
+from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.log import Rig
 from identification.tracing.free_run import rivals as module
 from identification.tracing.free_run.backward_elimination import Setting
-from identification.tracing.free_run.fitted_structure import FittedStructure, fitted_structure
 from identification.tracing.free_run.rivals import equal_rivals, told_apart
-from identification.tracing.regression.stepwise import Choice, Step, choose, first_stage
+from identification.tracing.regression.stepwise import Choice, Step, choose
 from identification.tracing.result import Dependence
 from identification.tracing.verdict import rivals_of, verdict_of
 from tests.identification.motor_logs import K_A, made, seen
@@ -27,7 +29,7 @@ def found() -> tuple[Setting, Choice, FittedStructure]:
     one = seen(made(4, {"spring": {"k": 40.0}}))
     rng = np.random.default_rng(0)
     start, first = first_stage([one], False)
-    plain = fitted_structure(start, first, (), [one], "command", MOTOR, rng)
+    plain = fitted_structure(start, first, (), RecordedLogs((one,), MOTOR, "command"), rng)
     library = {"spring": built_in()["spring"]}
     setting = Setting([one], [one], "command", MOTOR, library, start, first, plain, rng)
     choice = choose(start, first, library, rng, lambda _stage, _share: None)

@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from identification.effects._library import built_in
+from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.tracing.free_run.trial_structures import grid, grown, rigid
 from identification.tracing.regression.candidates import best_of
-from identification.tracing.regression.row_fit import base_fits
 from identification.tracing.regression.shape_grid import median_rest, shape_grid
-from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 

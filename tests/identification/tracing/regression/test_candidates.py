@@ -8,10 +8,10 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.tracing.regression.candidates import EffectCandidate, best_of
-from identification.tracing.regression.stepwise import first_stage
 from tests.identification.motor_logs import NINE, made, seen
 
 

@@ -7,17 +7,12 @@ import numpy as np
 
 from benchmarks.outside_rig import EFFECTS, write
 from identification.effects._library import built_in
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, REST, motion_log
+from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log
 from identification.tracing.regression.candidates import best_of
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.stepwise import (
-    choose,
-    explained_part,
-    first_stage,
-    gives_way,
-    trusted,
-)
+from identification.tracing.regression.stepwise import choose, explained_part, gives_way, trusted
 from tests.identification.motor_logs import K_A, NOISE, H, made, seen
 from tests.identification.tracing.test_trace import made as pneumatic
 

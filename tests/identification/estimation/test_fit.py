@@ -7,7 +7,7 @@ import pytest
 
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
+from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
@@ -18,7 +18,7 @@ FORCE = Rig("force")
 
 
 def fitted(log: Log, seed: int = 7) -> KarnoppFit:
-    return fit_karnopp([log], np.random.default_rng(seed), rig=FORCE)
+    return fit_plant([log], np.random.default_rng(seed), rig=FORCE)
 
 
 def errors(fit: KarnoppFit, truth: Karnopp) -> np.ndarray:
@@ -50,7 +50,6 @@ def test_recovers_a_plant_from_the_force_alone() -> None:
     fit = fitted(alone)
     assert fit.drive == "force"
     assert fit.actuator is None
-    assert fit.stiffness > 0
     assert np.max(errors(fit, truth)[:5]) < 0.02
     assert np.max(errors(fit, truth)) < 0.10
 
@@ -58,16 +57,15 @@ def test_recovers_a_plant_from_the_force_alone() -> None:
 def test_motor_is_driven_by_its_command() -> None:
     log = made_log(table(2), seed=4)
     motor = Log(log.name, {"t": log["t"], "y": log["y"], "F": 2.0 * log["u"], "u": log["u"]})
-    fit = fit_karnopp([motor], np.random.default_rng(1), rig=Rig("motor", force_per_command=2.0))
+    fit = fit_plant([motor], np.random.default_rng(1), rig=Rig("motor", force_per_command=2.0))
     assert fit.actuator == Motor(2.0)
-    assert fit.stiffness == 0.0
 
 
 def test_two_logs_make_one_fit_with_smaller_spread() -> None:
     truth = table(3)
     logs = [made_log(truth, seed=seed, seconds=6.0) for seed in (1, 2)]
-    one = fit_karnopp(logs[:1], np.random.default_rng(2), rig=FORCE)
-    both = fit_karnopp(logs, np.random.default_rng(2), rig=FORCE)
+    one = fit_plant(logs[:1], np.random.default_rng(2), rig=FORCE)
+    both = fit_plant(logs, np.random.default_rng(2), rig=FORCE)
     assert both.adequate
     assert len(both.logs) == 2
     assert np.max(errors(both, truth)) < 0.01
@@ -107,20 +105,20 @@ def test_arrays_of_the_caller_are_not_changed() -> None:
 
 def test_progress_is_reported_by_stage() -> None:
     seen: list[tuple[str, float]] = []
-    fit_karnopp(
+    fit_plant(
         [made_log(table(2), seconds=4.0)],
         np.random.default_rng(0),
         rig=FORCE,
         on_progress=lambda stage, share: seen.append((stage, share)),
     )
-    assert {"searching", "refining"} <= {stage for stage, _ in seen}
+    assert {"refining", "weighing"} <= {stage for stage, _ in seen}
     assert all(0.0 <= share <= 1.0 for _, share in seen)
 
 
 def test_a_wrong_structure_is_not_called_adequate() -> None:
     log = made_log(table(2), seed=8, seconds=6.0)
     spring = log.with_signals(F=log["F"] + 300.0 * log["y"] ** 2 / np.max(log["y"]))
-    fit = fit_karnopp([spring], np.random.default_rng(3), rig=FORCE)
+    fit = fit_plant([spring], np.random.default_rng(3), rig=FORCE)
     assert not fit.adequate
     assert any("effect is missing" in r or "no free run follows" in r for r in fit.remarks)
 
@@ -135,4 +133,4 @@ def test_refusals() -> None:
         fitted(still)
     alone = Log("alone", {key: log[key] for key in ("t", "y", "F")})
     with pytest.raises(BadLog, match="no command u"):
-        fit_karnopp([alone], rng, rig=FORCE, drive="command")
+        fit_plant([alone], rng, rig=FORCE, drive="command")

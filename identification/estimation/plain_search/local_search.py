@@ -12,8 +12,8 @@ from itertools import pairwise
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.estimation.output_error.cost import cost_of_lanes
-from identification.estimation.output_error.fitted_runs import FittedRun, total_cost
+from identification.estimation.plain_search.cost import cost_of_lanes
+from identification.estimation.plain_search.fitted_runs import FittedRun, total_cost
 from identification.simulation.karnopp_lanes import WIDTH
 from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, K1, K2, M
 
@@ -149,38 +149,6 @@ def sample(runs: Sequence[FittedRun], optimum: Optimum, rng: np.random.Generator
         covariance = 0.8 * (softened[:, None] * off).T @ off + 0.2 * covariance
     settled = effective > SETTLED_SHARE * CLOUD
     return Cloud(cloud, weight, costs, effective, settled, spent)
-
-
-def robust_covariance(
-    runs: Sequence[FittedRun], optimum: Optimum, cap: float, stretches: int
-) -> Array:
-    """Covariance (d, d) of the unknowns where the residual is not white noise.
-
-    H^-1 (sum of g g') H^-1 with the gradient g of each stretch of the logs: what correlated
-    residuals and a wrong model add shows in the scatter of the stretches (Huber 1967, White 1982).
-    """
-    theta = pack(runs, optimum.p, optimum.starts, optimum.free)
-    k, d = len(optimum.free), len(theta)
-    delta = 0.3 / np.sqrt(np.maximum(np.diag(optimum.hessian), 1e-30))
-    delta = np.clip(delta, 1e-9, 1e-3) * optimum.scale
-    each = max(4, stretches // len(runs))
-    scatter = np.zeros((d, d))
-    low = k
-    for index, run in enumerate(runs):
-        used = np.concatenate([np.arange(k), np.arange(low, low + len(run.open))])
-        low += len(run.open)
-        lanes = np.tile(theta, (WIDTH, 1))
-        lanes[np.arange(1, len(used) + 1), used] += delta[used]
-        sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, lanes)
-        begin = np.ascontiguousarray(begun[index])
-        gram = cost_of_lanes(sets, begin, run.measured, run.windows, cap, each)[1]
-        slopes = np.zeros((each, d))
-        slopes[:, used] = gram[:, 0, 1 : len(used) + 1] / delta[used] * optimum.scale[used]
-        slopes -= slopes.mean(axis=0)
-        scatter += slopes.T @ slopes * each / (each - 1)
-    inverse = np.linalg.pinv(optimum.hessian + 1e-6 * np.eye(d), rcond=1e-14, hermitian=True)
-    total = inverse @ scatter @ inverse
-    return np.asarray(total * np.outer(optimum.scale, optimum.scale))
 
 
 def moved_optimum(

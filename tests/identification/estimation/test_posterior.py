@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
-from identification.estimation.output_error.posterior import sample_posterior
+from identification.estimation.fit import fit_plant
+from identification.estimation.posterior import sample_posterior
 from identification.log import Rig
 from tests.identification.plants import made_log, table
 
@@ -11,7 +11,7 @@ from tests.identification.plants import made_log, table
 def test_posterior_agrees_with_the_fit() -> None:
     log = made_log(table(2), seed=11, seconds=5.0)
     rig = Rig("force")
-    fit = fit_karnopp([log], np.random.default_rng(1), rig=rig)
+    fit = fit_plant([log], np.random.default_rng(1), rig=rig)
     shares: list[float] = []
     found = sample_posterior(
         fit, [log], np.random.default_rng(2), rig=rig, steps=400, on_progress=shares.append
@@ -30,7 +30,7 @@ def test_posterior_agrees_with_the_fit() -> None:
 def test_a_short_chain_says_so() -> None:
     log = made_log(table(3), seed=12, seconds=4.0)
     rig = Rig("force")
-    fit = fit_karnopp([log], np.random.default_rng(1), rig=rig)
+    fit = fit_plant([log], np.random.default_rng(1), rig=rig)
     found = sample_posterior(fit, [log], np.random.default_rng(2), rig=rig, steps=40)
     assert not found.converged
     assert "take more steps" in found.verdict

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.effects._base import Effect
+from identification.estimation.regression.breakaway import breakaway_limits
 from identification.estimation.regression.effect_columns import (
     LEAST_LEFT_BY_LOAD,
     Values,
@@ -27,6 +28,11 @@ from identification.estimation.regression.equation_rows import (
     actuator,
     mechanical,
 )
+from identification.estimation.regression.signals_behind_effects import (
+    driven,
+    reached,
+    shown_to_true,
+)
 from identification.estimation.regression.standstill import (
     Breakaways,
     Rest,
@@ -42,8 +48,6 @@ from identification.simulation.effect_along_motion import (
     elastic_displacement,
     elastic_share,
 )
-from identification.tracing.regression.breakaway import breakaway_limits
-from identification.tracing.regression.signals_behind_effects import driven, reached, shown_to_true
 
 BLURRED = 1e3  # times the noise, of a row that says nothing
 COMMAND_STEP = 1e-6  # of the largest command, a step by which its passing is told

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.arrays import IntArray
-from identification.estimation.output_error.identifiability import Events, estimates, events_of
+from identification.estimation.estimates import Events, estimates, events_of
 from identification.model.karnopp import NAMES
 from identification.simulation.karnopp_step import BAND_P, SLIP_N, SLIP_P, STUCK
 from tests.identification.plants import table

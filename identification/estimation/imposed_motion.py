@@ -5,16 +5,16 @@ free run has nothing to follow there. The parameters then come from the force eq
 those that only a free body shows (mass in slow motion, stick limits, band) are not given.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.arx.residual_tests import effective_samples
-from identification.errors import BadLog, NotIdentifiable
-from identification.estimation.output_error.identifiability import Events, estimates
-from identification.estimation.output_error.problem import Problem
+from identification.errors import NotIdentifiable
+from identification.estimation.estimates import Events, estimates, normal_samples
+from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
     MotionLog,
@@ -24,15 +24,11 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
-from identification.estimation.regression.inertia import (
-    SPEEDS_APART,
-    inertia_has_no_part,
-    speed_ratios,
-)
-from identification.estimation.regression.three_step import FirstEstimate
-from identification.log import Log, Rig
+from identification.estimation.regression.inertia import SPEEDS_APART, speed_ratios
+from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
+from identification.model.plant import Plant
 from identification.signals.initial_state import measured_start
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
@@ -62,20 +58,9 @@ class ForceFit:
     share: float
 
 
-def is_imposed(logs: Sequence[Log], rig: Rig) -> bool:
-    """Whether the logs show imposed motion: no command, and inertia has no part in the force."""
-    if rig.kind == "motor" or any("u" in log for log in logs):
-        return False
-    try:
-        return inertia_has_no_part([motion_log(log, held=False, by_command=False) for log in logs])
-    except BadLog:
-        return False
-
-
 def fit_imposed(
-    problem: Problem,
+    recorded: RecordedLogs,
     rng: np.random.Generator,
-    rig: Rig,
     why: str,
     remarks: Sequence[str] = (),
 ) -> KarnoppFit:
@@ -84,9 +69,11 @@ def fit_imposed(
     why: what kept a free run from being fitted; it stands in the remarks, after `remarks`.
     Raises NotIdentifiable where no log slides enough in both directions.
     """
-    logs, firsts = problem.logs, problem.firsts
+    logs = recorded.plain
+    firsts = [first_estimate(log, held=recorded.held) for log in logs]
+    noise_F = float(np.median([one.noise_F for one in recorded.logs]))
     moved = [motion_log(log, held=False, by_command=False, imposed=True) for log in logs]
-    rows = _rows(moved, _name(logs))
+    rows = _rows(moved, recorded.name)
     fit = _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
@@ -95,7 +82,7 @@ def fit_imposed(
     samples[:, list(fit.used)] = drawn
     nine = _assumed(center, firsts)
     friction = Karnopp.from_array(nine)
-    found = _estimates(fit, nine, samples, rows, rig, _name(logs))
+    found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
     return KarnoppFit(
         friction=friction,
@@ -105,10 +92,9 @@ def fit_imposed(
         covariance=fit.covariance,
         samples=drawn,
         drive="force",
-        stiffness=0.0,
         noise_y=float(np.median([first.motion.noise for first in firsts])),
-        noise_F=problem.noise[1],
-        chi_square=(fit.rms / problem.noise[1]) ** 2,
+        noise_F=noise_F,
+        chi_square=(fit.rms / noise_F) ** 2,
         adequate=False,
         logs=tuple(
             LogFit(
@@ -116,7 +102,7 @@ def fit_imposed(
                 start=measured_start(log),
                 position_rms=float("nan"),
                 force_rms=float(np.std(part)),
-                chi_square=float(np.mean(part**2)) / problem.noise[1] ** 2,
+                chi_square=float(np.mean(part**2)) / noise_F**2,
             )
             for log, part in zip(logs, fit.residuals, strict=True)
         ),
@@ -201,19 +187,49 @@ def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
 
 
 def _estimates(
-    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Rows], rig: Rig, name: str
+    fit: ForceFit, nine: Array, samples: Array, data: Sequence[Rows], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
     """The five with intervals, the others with the reason."""
-    units = ROTARY_UNITS if rig.motion == "rotary" else UNITS
     up = int(sum(np.count_nonzero(part.X[:, 1] > 0.5) for part in data))
     down = int(sum(np.count_nonzero(part.X[:, 2] < -0.5) for part in data))
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
-    # Sliding is all that these parameters need.
-    events = Events((0, 0), (0, 0), (up, down), (fastest, fastest))
     used = [FIVE[i] for i in fit.used]
-    told = estimates(
-        used, fit.theta, samples[:, list(fit.used)], events, rig.motion == "rotary", name
-    )
+    told = _of_sliding(used, fit.theta, samples[:, list(fit.used)], (up, down), fastest, recorded)
+    return _reasoned(told, nine, fit.share, recorded)
+
+
+def imposed_estimates(
+    plant: Plant, sd: Mapping[str, float], recorded: RecordedLogs
+) -> dict[str, Estimate]:
+    """The nine of a plant with effects whose motion is imposed; sd: of the five of sliding.
+
+    The same rules as of a fit along an imposed motion say which of them the logs tell.
+    """
+    names = [name for name in FIVE if name in sd]
+    values = np.array([float(getattr(plant.friction, name)) for name in names])
+    samples = normal_samples(values, np.array([sd[name] for name in names]))
+    up = np.concatenate([one.up for one in recorded.logs])
+    sliding = (int(np.count_nonzero(up)), int(np.count_nonzero(~up)))
+    fastest = float(max(np.max(one.speed, initial=0.0) for one in recorded.logs))
+    told = _of_sliding(names, values, samples, sliding, fastest, recorded)
+    return _reasoned(told, plant.friction.array, 0.0, recorded)
+
+
+def _of_sliding(
+    names: Sequence[str], values: Array, samples: Array, sliding: tuple[int, int], fastest: float,
+    recorded: RecordedLogs,
+) -> Mapping[str, Estimate]:  # fmt: skip
+    """Estimates of parameters that need no more than sliding; so many rows in each direction."""
+    events = Events((0, 0), (0, 0), sliding, (fastest, fastest))
+    rotary = recorded.rig.motion == "rotary"
+    return estimates(names, values, samples, events, rotary, recorded.name)
+
+
+def _reasoned(
+    told: Mapping[str, Estimate], nine: Array, share: float, recorded: RecordedLogs
+) -> dict[str, Estimate]:
+    """All nine: those that are told, and why the others are not; share: of the force, inertia's."""
+    units = ROTARY_UNITS if recorded.rig.motion == "rotary" else UNITS
     out: dict[str, Estimate] = {}
     for key, value in zip(NAMES, nine, strict=True):
         if key in told:
@@ -221,10 +237,6 @@ def _estimates(
             out[key] = one if one.value is not None else replace(one, assumed=float(value))
             continue
         kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
-        reason = f"{name}: " + WHY_NOT[kind].format(share=fit.share)
+        reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=share)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
     return out
-
-
-def _name(logs: Sequence[Log]) -> str:
-    return logs[0].name if len(logs) == 1 else f"{len(logs)} logs"

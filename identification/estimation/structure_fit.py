@@ -7,7 +7,14 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._base import AT_REST, Acting, Effect
-from identification.estimation.regression.effect_columns import by_load, in_columns
+from identification.errors import UserError
+from identification.estimation.estimates import untold
+from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.plain_search.likely_sets import Progress, quiet
+from identification.estimation.plain_search.search import searched_plant
+from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
+from identification.estimation.regression.effect_columns import Values, by_load, in_columns
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
@@ -16,7 +23,15 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     shortened,
 )
+from identification.estimation.regression.row_fit import (
+    RowFit,
+    first_stage,
+    mean_square,
+    rough,
+    with_sizes,
+)
 from identification.estimation.regression.standstill import borne
+from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.nudged_search import (
     NEARLY,
     SEARCHES,
@@ -36,14 +51,9 @@ from identification.estimation.windowed_run.refinement import (
     onward,
     refit,
 )
-from identification.log import Rig
-from identification.model.estimates import Drive
+from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.tracing.regression.candidates import with_sizes
-from identification.tracing.regression.effect_rows import EffectRows
-from identification.tracing.regression.row_fit import RowFit, mean_square
-from identification.tracing.regression.stepwise import Step, rough
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 INERT = 2.0  # times what is left, below which inertia does not show
@@ -52,7 +62,6 @@ SHAPE = 0.03  # relative trust in a searched parameter
 WIDEST_BAND = 0.4  # of the median speed of sliding, that the band can be at most
 EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
-UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
@@ -64,7 +73,7 @@ class FittedStructure:
     """A structure with its numbers: outcomes by equation, the plant, standard deviations by name.
 
     imposed: the motion is, so the plant has no free run to be refined on; misfit: of the free
-    run, 1 where it leaves the sensors' noise.
+    run, 1 where it leaves the sensors' noise; fit: what it settled to, where it has been.
     """
 
     stage: EffectRows
@@ -73,6 +82,7 @@ class FittedStructure:
     sd: Mapping[str, float]
     imposed: bool
     misfit: float = np.inf
+    fit: KarnoppFit | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,9 +98,9 @@ class _Regressed:
 
 
 def fitted_structure(
-    stage: EffectRows, outcomes: Mapping[str, RowFit], steps: Sequence[Step],
-    logs: Sequence[MotionLog], drive: Drive, rig: Rig, rng: np.random.Generator,
-    *, near: Karnopp | None = None, vain: float = np.inf,
+    stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
+    recorded: RecordedLogs, rng: np.random.Generator, *, near: Karnopp | None = None,
+    vain: float = np.inf,
 ) -> FittedStructure:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
@@ -98,23 +108,24 @@ def fitted_structure(
     limits to begin from too, where those of the regression lead nowhere; vain: misfit of short logs
     from which no search is worth its while.
     """
-    told = _regressed(stage, outcomes, steps, logs, rig)
+    logs, drive = recorded.logs, recorded.drive
+    told = _regressed(stage, outcomes, effects, recorded)
     plant, prior = told.plant, dict(told.prior)
     if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
         return FittedStructure(stage, outcomes, plant, {**prior, **told.silent}, True)
     # Where sliding itself is not explained, no other band of a plant with effects will do. A state
     # follows the velocity as the log tells it, so even of the right effect more than noise is left.
-    remembers = any(s.candidate.effect.evolve and s.candidate.effect.place.rubs for s in steps)
+    remembers = any(effect.evolve and effect.place.rubs for effect, _ in effects)
     left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
     missing = max(left) > MUCH**2 and not remembers
-    hopeless = missing and (bool(steps) or rough(outcomes))
+    hopeless = missing and (bool(effects) or rough(outcomes))
     done = _refined(told, logs, drive, near, "rough" if hopeless else "whole")
     free = loose(plant, drive)
     smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
     if smooth and done.misfit > COMPLETE and not hopeless:
         again = replace(onward(done.plant, logs, drive), prior=prior)
         done = again if again.misfit < done.misfit else done
-    followed = NEARLY if steps else COMPLETE
+    followed = NEARLY if effects else COMPLETE
     if free and done.misfit > followed and not hopeless:
         by_loads = any(by_load(one.effect) for one in plant.effects)
         begins = [plant, done.plant]
@@ -155,13 +166,14 @@ def _refined(
 
 
 def _regressed(
-    stage: EffectRows, outcomes: Mapping[str, RowFit], steps: Sequence[Step],
-    logs: Sequence[MotionLog], rig: Rig,
+    stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
+    recorded: RecordedLogs,
 ) -> _Regressed:  # fmt: skip
     """The plant by the equations alone."""
     five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
     sliding = outcomes[MECHANICAL]
     prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
+    logs, rig = recorded.logs, recorded.rig
     up, down = borne(logs)
     stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
     if BREAKAWAY in outcomes:
@@ -178,9 +190,9 @@ def _regressed(
     elif rig.kind == "motor" and rig.force_per_command is not None:
         drives = Motor(rig.force_per_command)
     acting, silent = [], dict[str, float]()
-    for step in steps:
-        values, spreads, unheard = _of_effect(step, outcomes)
-        acting.append(step.candidate.effect.acting(values))
+    for effect, shape in effects:
+        values, spreads, unheard = _of_effect(effect, shape, outcomes)
+        acting.append(effect.acting(values))
         prior |= spreads
         silent |= dict.fromkeys(unheard, np.inf)
     nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
@@ -188,12 +200,11 @@ def _regressed(
 
 
 def _of_effect(
-    step: Step, outcomes: Mapping[str, RowFit]
+    effect: Effect, shape: Values, outcomes: Mapping[str, RowFit]
 ) -> tuple[dict[str, float], dict[str, float], list[str]]:
     """An effect's parameters by the equations, how sure they are of each (as key.name), and those
     (as key.name) of which they tell nothing."""
-    effect = step.candidate.effect
-    values = inside(effect, with_sizes(effect, step.candidate.values, outcomes))
+    values = inside(effect, with_sizes(effect, shape, outcomes))
     spreads = effect_sd(effect, values, outcomes)
     none, unheard = slight(effect, values, spreads), []
     for p in effect.params:  # a signal that is not there tells nothing of its parameter
@@ -220,11 +231,6 @@ def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> floa
     """
     k2 = drives.k2 if isinstance(drives, Actuator) else 0.0
     return max(max(nine.F_vp, nine.F_vn) * h / QUICK, k2 * (h / QUICK) ** 2)
-
-
-def untold(sd: float | None, value: float, typical: float) -> bool:
-    """Whether a deviation is so far beyond its parameter that the logs say nothing of it."""
-    return sd is not None and not sd < UNTOLD * max(abs(value), abs(typical))
 
 
 def inertia_is_lost(o: RowFit) -> bool:
@@ -310,3 +316,73 @@ def band(model: FittedStructure) -> float:
     # A run that is not followed may have any band; most of the sliding is judged all the same.
     widest = WIDEST_BAND * float(np.median(pace)) if len(pace) else np.inf
     return 0.0 if model.imposed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)
+
+
+def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedStructure:
+    """The plant without effects: by the equations, refined on its free run.
+
+    Where these have too few rows of sliding, the run alone is fitted, from a first estimate. A
+    search follows where the equations of an actuator's plant are right but its run is not.
+    """
+    regressed, search = rng.spawn(2)
+    stage, first = first_stage(recorded.logs, recorded.by_command)
+    if MECHANICAL not in first:
+        return _from_first_estimate(stage, first, recorded)
+    model = fitted_structure(stage, first, (), recorded, regressed)
+    if model.imposed or model.misfit <= COMPLETE or hard(model, recorded):
+        return model
+    return searched(model, recorded, search)
+
+
+def hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether a search for the plain plant takes long, or hardly has a chance."""
+    return loose(model.plant, recorded.drive) or rough(model.outcomes)
+
+
+def hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether it takes long and hardly has a chance."""
+    return loose(model.plant, recorded.drive) and rough(model.outcomes)
+
+
+def _from_first_estimate(
+    stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
+) -> FittedStructure:
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = Karnopp.from_array(np.median(found, axis=0))
+    plant = Plant(nine, actuator_of(recorded))
+    if led_by_rig(recorded):
+        return FittedStructure(stage, first, plant, {}, True)
+    done = refit(
+        plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
+        rescues=RESCUES,
+    )  # fmt: skip
+    return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
+
+
+def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
+    """What drives a plant of these logs, by the command's own equation."""
+    if recorded.rig.kind == "motor" and recorded.rig.force_per_command is not None:
+        return Motor(recorded.rig.force_per_command)
+    if not recorded.by_command:
+        return None
+    found = fit_actuator(recorded.plain)
+    return Actuator(max(found.k1, 1e-9), max(found.k2, 0.0))
+
+
+def searched(
+    model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
+    report: Progress = quiet,
+) -> FittedStructure:  # fmt: skip
+    """The plain model from a global search, where that follows the logs better."""
+    try:
+        plant = searched_plant(
+            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report
+        )
+    except UserError:
+        return model
+    found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
+    left_by = misfit(plant, recorded.logs, recorded.drive)
+    best, least = (found.plant, found.misfit) if found.misfit < left_by else (plant, left_by)
+    if least >= model.misfit:
+        return model
+    return replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)

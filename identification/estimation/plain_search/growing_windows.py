@@ -15,12 +15,12 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.estimation.global_search import evolve
-from identification.estimation.output_error.fitted_runs import FittedRun, total_cost
-from identification.estimation.output_error.local_search import Optimum, refine
-from identification.estimation.output_error.problem import ADEQUATE, Problem
-from identification.estimation.output_error.search_bounds import Box
-from identification.estimation.output_error.short_windows import Stretches, stretches
-from identification.estimation.output_error.uncertainty import Progress
+from identification.estimation.plain_search.fitted_runs import FittedRun, total_cost
+from identification.estimation.plain_search.likely_sets import Progress
+from identification.estimation.plain_search.local_search import Optimum, refine
+from identification.estimation.plain_search.problem import ADEQUATE, Problem
+from identification.estimation.plain_search.search_bounds import Box
+from identification.estimation.plain_search.short_windows import Stretches, stretches
 from identification.estimation.regression.sliding_friction import fit_sliding
 from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
 

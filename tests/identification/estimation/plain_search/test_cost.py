@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.estimation.output_error.cost import cost_of_lanes
-from identification.estimation.output_error.fitted_runs import (
+from identification.estimation.plain_search.cost import cost_of_lanes
+from identification.estimation.plain_search.fitted_runs import (
     FittedRun,
     prepare_run,
     rest_windows,

@@ -8,8 +8,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from identification.arrays import Array, IntArray
+from identification.effects._base import Acting, Param
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
@@ -18,6 +20,8 @@ from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_
 EVENTS_NEEDED = 3  # events of a kind that make a parameter identifiable
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 WIDEST_SD = 0.3  # sd relative to the value beyond which the value says nothing
+NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
+UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 
 
@@ -81,6 +85,12 @@ def estimates(
     return found
 
 
+def normal_samples(values: Array, sd: Array) -> Array:
+    """Sets (k, d) of a normal spread about the values (d,), each parameter by itself."""
+    quantiles = norm.ppf((np.arange(NORMAL_SETS) + 0.5) / NORMAL_SETS)
+    return np.asarray(values + sd * quantiles[:, np.newaxis])
+
+
 def _signed(name: str, low: float, high: float) -> tuple[float, float]:
     """An interval cut where the model's sign ends."""
     if name in ("dv_n", "F_sn"):
@@ -135,3 +145,32 @@ def _too_wide(
         f"found {value:.3g} with a standard deviation of {sd:.2g}: the log does not tell it;"
         " excite it more (speeds, reversals, rests) or log for longer"
     )
+
+
+def effect_estimates(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, Estimate]:
+    """Estimates of the effects' parameters, as key.name; sd: deviations by that name."""
+    out = {}
+    for acting in effects:
+        for p in acting.effect.params:
+            name = f"{acting.key}.{p.name}"
+            out[name] = of_effect(p, acting.values[p.name], sd.get(name))
+    return out
+
+
+def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
+    """Estimate of an effect's parameter; None where its deviation says that the logs do not."""
+    if untold(sd, value, p.typical):
+        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
+    return normal(value, p.unit, sd)
+
+
+def normal(value: float, unit: str, sd: float | None) -> Estimate:
+    """Estimate with the interval of a normal spread; without a deviation the value was held."""
+    if sd is None:
+        return Estimate(value, unit, reason="held")
+    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
+
+
+def untold(sd: float | None, value: float, typical: float) -> bool:
+    """Whether a deviation is so far beyond its parameter that the logs say nothing of it."""
+    return sd is not None and not sd < UNTOLD * max(abs(value), abs(typical))

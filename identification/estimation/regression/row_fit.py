@@ -1,28 +1,34 @@
 """Rows of an equation solved for their sizes, and the criterion that compares structures."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.effects._base import Effect
+from identification.estimation.regression.effect_columns import Values, in_columns
+from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
     EQUATIONS,
+    MECHANICAL,
     REST,
     Fitted,
+    MotionLog,
     Rows,
     non_negative,
     of_column,
     solve_rows,
     stacked,
 )
-from identification.tracing.regression.effect_rows import EffectRows
 
 TRIM = 4.0  # what a row counts that is left out for its low speed
 TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that may be left out
 FEWEST_EVENTS = 6
 ROBUST_SQUARE = 9.0  # square from which a row of rest counts less
+MUCH_IS_LEFT = 25.0  # square in noise units from which much is left
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,6 +137,25 @@ def base_fits(stage: EffectRows) -> dict[str, RowFit]:
     }
 
 
+def settled_fits(stage: EffectRows) -> tuple[EffectRows, dict[str, RowFit]]:
+    """The stage with its parameters fitted (rows' noise depends on them), and the outcomes."""
+    found = base_fits(stage)
+    for _ in range(2):
+        theta = found[MECHANICAL].fit.theta[:5] if MECHANICAL in found else stage.theta
+        theta_a = found[ACTUATOR].fit.theta[:3] if ACTUATOR in found else stage.theta_a
+        stage = replace(stage, theta=theta, theta_a=theta_a)
+        found = base_fits(stage)
+    return stage, found
+
+
+def first_stage(
+    logs: Sequence[MotionLog], by_command: bool
+) -> tuple[EffectRows, dict[str, RowFit]]:
+    """The model without effects."""
+    first = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0])
+    return settled_fits(EffectRows(tuple(logs), *first, by_command))
+
+
 def mean_square(o: RowFit) -> float:
     """Mean square of the rows that count."""
     kept = o.fit.residual[o.rows.speed >= o.slowest]
@@ -142,3 +167,27 @@ def mean_square(o: RowFit) -> float:
 def rms(r: Array) -> float:
     """Root mean square; 0 of nothing."""
     return float(np.sqrt(np.mean(r**2))) if len(r) else 0.0
+
+
+def rough(base: Mapping[str, RowFit]) -> bool:
+    """Whether far more than the sensors' noise is left when nothing more is found."""
+    return any(mean_square(base[e]) > MUCH_IS_LEFT for e in (MECHANICAL, ACTUATOR) if e in base)
+
+
+def with_sizes(effect: Effect, shape: Values, found: Mapping[str, RowFit]) -> dict[str, float]:
+    """All parameters: shape, and the linear ones found; two directions as mean and asymmetry."""
+    values = {p.name: p.default for p in effect.params if p.default is not None} | dict(shape)
+    if not in_columns(effect):
+        return values
+    sizes: dict[str, float] = {}
+    for one in reversed(list(found.values())):
+        sizes |= dict(zip(one.rows.names, one.fit.theta.tolist(), strict=True))
+    for name in effect.linear:
+        full = f"{effect.key}.{name}"
+        if f"{full}+" in sizes:
+            plus, minus = sizes[f"{full}+"], sizes[f"{full}-"]
+            values[name] = 0.5 * (plus + minus)
+            values["asymmetry"] = 0.5 * (plus - minus) / values[name] if values[name] else 0.0
+        else:
+            values[name] = sizes[full]
+    return values

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from identification.estimation.output_error.fitted_runs import total_cost
-from identification.estimation.output_error.growing_windows import climb
-from identification.estimation.output_error.karnopp_fit import fit_karnopp
-from identification.estimation.output_error.local_search import _solved, refine
-from identification.estimation.output_error.problem import pose
-from identification.estimation.output_error.short_windows import stretches
+from identification.estimation.fit import fit_plant
+from identification.estimation.plain_search.fitted_runs import total_cost
+from identification.estimation.plain_search.growing_windows import climb
+from identification.estimation.plain_search.local_search import _solved, refine
+from identification.estimation.plain_search.problem import pose
+from identification.estimation.plain_search.short_windows import stretches
 from identification.estimation.regression.sliding_friction import fit_sliding
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
@@ -94,7 +94,7 @@ def test_climb_reaches_the_whole_run() -> None:
 
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_motor_that_begins_in_full_motion_is_found(seed: int) -> None:
-    fit = fit_karnopp([motor_log(seed)], np.random.default_rng(seed), rig=RIG)
+    fit = fit_plant([motor_log(seed)], np.random.default_rng(seed), rig=RIG)
     assert fit.adequate
     assert fit.chi_square == pytest.approx(1.0, abs=0.2)
     assert np.max(np.abs(fit.friction.array / SERVO.array - 1.0)) < 0.02

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.output_error.fitted_runs import impulse_of
+from identification.estimation.plain_search.fitted_runs import impulse_of
 from identification.log import Log
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.estimation.output_error.actuator_fit import fit_actuator
+from identification.estimation.plain_search.actuator_fit import fit_actuator
 from tests.identification.plants import ACTUATOR, made_log, table
 
 

@@ -1,7 +1,7 @@
 """From a regression's sizes to a plant."""
 
 from identification.effects._library import built_in
-from identification.tracing.free_run.fitted_structure import EQUATION_DEVIATIONS, left_open, slight
+from identification.estimation.structure_fit import EQUATION_DEVIATIONS, left_open, slight
 
 KEY = "position_dependent_friction"
 

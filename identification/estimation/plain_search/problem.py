@@ -7,15 +7,15 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.errors import BadLog
-from identification.estimation.output_error.actuator_fit import ActuatorFit, fit_actuator
-from identification.estimation.output_error.fitted_runs import (
+from identification.estimation.plain_search.actuator_fit import ActuatorFit, fit_actuator
+from identification.estimation.plain_search.fitted_runs import (
     FittedRun,
     impulse_of,
     prepare_run,
     signal_noise,
 )
-from identification.estimation.output_error.local_search import Optimum
-from identification.estimation.output_error.search_bounds import Box, search_box
+from identification.estimation.plain_search.local_search import Optimum
+from identification.estimation.plain_search.search_bounds import Box, search_box
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.log import Log, Rig
 from identification.model.estimates import Drive

@@ -8,12 +8,12 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.ensemble import ensemble
-from identification.estimation.output_error.local_search import pack, refine
-from identification.estimation.output_error.problem import pose
-from identification.estimation.output_error.uncertainty import granted_samples, log_cost, reweighed
+from identification.estimation.plain_search.likely_sets import granted_samples, log_cost, reweighed
+from identification.estimation.plain_search.local_search import pack, refine
+from identification.estimation.plain_search.problem import pose
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
-from identification.simulation.karnopp_step import kernel_parameters
+from identification.simulation.karnopp_step import K2, kernel_parameters
 
 POSTERIOR_WALKERS = 64
 POSTERIOR_STEPS = 6000
@@ -59,9 +59,8 @@ def sample_posterior(
     The walkers start around the fit. Where the fit leaves more than noise, a set's likelihood is
     that of as many independent samples as the residual's correlation leaves.
     """
-    drive = "force" if fit.stiffness > 0 else fit.drive
-    problem = pose(logs, rig, None if rig.kind == "motor" else drive)
-    k1, k2 = 0.0, fit.stiffness
+    problem = pose(logs, rig, None if rig.kind == "motor" else fit.drive)
+    k1, k2 = 0.0, float(problem.row[K2])
     if problem.drive == "command":
         k1, k2 = (float(fit.estimates[name].value or 0.0) for name in ("k1", "k2"))
     row = kernel_parameters(fit.friction.array, k1, k2)

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.estimation.output_error.cost import START_G, START_V, START_Y, RestartWindows
-from identification.estimation.output_error.fitted_runs import FittedRun, rest_windows
+from identification.estimation.plain_search.cost import START_G, START_V, START_Y, RestartWindows
+from identification.estimation.plain_search.fitted_runs import FittedRun, rest_windows
 
 HALVES = (15, 7)  # samples either side of a moving start that a cubic is put through
 CUBIC = 3

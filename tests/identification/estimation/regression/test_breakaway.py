@@ -4,8 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.estimation.regression.breakaway import _cost, breakaway_limits
 from identification.log import Log
-from identification.tracing.regression.breakaway import _cost, breakaway_limits
 from tests.identification.motor_logs import NINE, made, seen
 
 

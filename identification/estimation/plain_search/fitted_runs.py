@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.estimation.output_error.cost import (
+from identification.estimation.plain_search.cost import (
     COMMAND,
     HELD_FORCE,
     START_G,

@@ -1,0 +1,72 @@
+"""What one new log says of a known machine: the fit of that log, begun from the model in force."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.drift.reference_model import InForce
+from identification.errors import NotIdentifiable
+from identification.estimation.fit import fit_plant
+from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.plain_search.problem import ADEQUATE
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.windowed_run.refinement import values_of
+from identification.log import Log
+from identification.model.estimates import KarnoppFit
+from identification.model.plant import Plant
+
+# Chi-square from which a log is not followed; a stop lost here or there leaves less
+NOT_FOLLOWED = 2.0
+LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
+
+
+@dataclass(frozen=True, eq=False)
+class LogEstimate:
+    """Parameters of one log: values (d,) and covariance (d, d) by `names`.
+
+    untold: parameters that the log does not tell, with the reason; they are among `names` all the
+    same. chi_square: what the best fit leaves per value; allowed: up to which the structure fits.
+    """
+
+    names: tuple[str, ...]
+    values: Array
+    covariance: Array
+    untold: Mapping[str, str]
+    chi_square: float
+    allowed: float
+
+    @property
+    def follows(self) -> bool:
+        """Whether the structure of the model in force follows the log."""
+        return self.chi_square <= self.allowed
+
+
+def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
+    """The parameters of a model in force, as this log alone tells them.
+
+    Raises NotIdentifiable where nothing moves, or where effects would have to show under an imposed
+    motion, BadLog where a signal is missing.
+    """
+    drive = None if model.rig.kind == "motor" else model.drive
+    if model.imposed:
+        if model.plant.effects:
+            raise NotIdentifiable(
+                f"{log.name}: the motion is imposed, and effects then show in the force equation"
+                " only; trace this log together with those of the model"
+            )
+        recorded = recorded_logs([log], model.rig, drive)
+        found = fit_imposed(recorded, rng, "as the model in force")
+        return _of_fit(found, LIKE * max(model.chi_square, 1.0))
+    found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
+    allowed = NOT_FOLLOWED if model.chi_square <= ADEQUATE else LIKE * model.chi_square
+    # Of a body that is not led, the force equation alone says that its run is not followed.
+    return _of_fit(found, 0.0 if found.imposed else allowed)
+
+
+def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:
+    plant = Plant(found.friction, found.actuator, found.effects)
+    untold = {name: e.reason or "" for name, e in found.estimates.items() if e.value is None}
+    values = values_of(plant, found.free)
+    return LogEstimate(found.free, values, found.covariance, untold, found.chi_square, allowed)

@@ -1,0 +1,130 @@
+"""The one estimator: from logs of a machine to its parameters, with intervals and reasons.
+
+The nine of friction, the actuator's, and those of effects; driven by the command, by the measured
+force, or along a motion that a rig imposes; from nothing, or from the model that was in force.
+
+1. The equations in weak form give a start (or the model in force does).
+2. The free run in windows from measured states, the states' uncertainty taken out, refines it.
+3. Where more than noise is left, a search for the plain plant looks for another start.
+4. The fit settles (`settling`): whole runs where they are followed, windows elsewhere, the mean of
+   what does about as well where the model lacks something. Events and spread say what is told.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.plain_search.likely_sets import Progress, quiet
+from identification.estimation.recorded_logs import RecordedLogs, led_by_rig, recorded_logs
+from identification.estimation.settling import settled
+from identification.estimation.structure_fit import (
+    FittedStructure,
+    hard,
+    hopeless,
+    plain_structure,
+    searched,
+)
+from identification.estimation.windowed_run.refinement import (
+    COMPLETE,
+    RESCUES,
+    Refit,
+    even,
+    refit,
+)
+from identification.log import Log, Rig
+from identification.model.estimates import Drive, KarnoppFit
+from identification.model.plant import Plant
+
+IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
+LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+NO_RUN = 50.0  # misfit from which a run by the measured force is not the body's own motion
+ACTUATOR_MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
+ACTUATOR_SHARE = 0.02  # of the force, that it has to leave as well
+
+
+def fit_plant(
+    logs: Sequence[Log],
+    rng: np.random.Generator,
+    *,
+    rig: Rig,
+    drive: Drive | None = None,
+    prior: Plant | None = None,
+    on_progress: Progress | None = None,
+) -> KarnoppFit:
+    """The parameters of a machine from its logs.
+
+    logs: each with y [m] and F [N] (F_e), and u [V] for a drive by command, on an even clock.
+    drive: "command" or "force"; by default the command where a linear actuator explains the
+    force. prior: the plant that was in force, from which the fit begins, with the effects that it
+    has. Raises BadLog where a signal is missing, NotIdentifiable where nothing moves.
+    """
+    report = on_progress or quiet
+    report("refining", 0.0)
+    recorded = recorded_logs(logs, rig, drive)
+    begin, settle = rng.spawn(2)
+    if prior is not None and prior.effects:
+        return _with_effects(prior, recorded, settle, report)
+    if prior is not None:
+        near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+        if near.misfit <= COMPLETE:
+            return settled(near.plant, recorded, near.misfit, settle, report)
+    found = plain_structure(recorded, begin)
+    return finished(found, recorded, settle, report, by=drive)
+
+
+def finished(
+    found: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
+    *, by: Drive | None = None,
+) -> KarnoppFit:  # fmt: skip
+    """The fit that a plain structure leads to: searched where more than noise is left, settled.
+
+    by: the drive that was asked for; without one, a run by command that a nonlinear actuator
+    spoils is driven by the measured force instead.
+    """
+    search, other, settle = rng.spawn(3)
+    if found.imposed and led_by_rig(recorded):
+        return fit_imposed(recorded, settle, IMPOSED_WHY)
+    left = found.imposed or (found.misfit > COMPLETE and hard(found, recorded))
+    if left and not hopeless(found, recorded):
+        found = searched(found, recorded, search, report)
+    if by is None and recorded.by_command and found.misfit > COMPLETE:
+        said = _not_linear(recorded, found.misfit)
+        if said:
+            forced = recorded_logs(recorded.plain, recorded.rig, "force")
+            again = finished(plain_structure(forced, other), forced, settle, report, by="force")
+            return replace(again, remarks=(said, *again.remarks))
+    if recorded.drive == "force" and (found.imposed or found.misfit > NO_RUN):
+        why = LOST_WHY if found.imposed else f"no free run follows (misfit {found.misfit:.3g})"
+        return fit_imposed(recorded, settle, why)
+    return settled(found.plant, recorded, found.misfit, settle, report)
+
+
+def _with_effects(
+    prior: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
+) -> KarnoppFit:
+    """The fit of a plant with effects, from where it was; once more with its band looked for,
+    where that leaves more than noise."""
+    logs, drive = recorded.logs, recorded.drive
+    held = even(prior)
+    best: Refit = refit(prior, logs, drive, prior=held, effort="near")
+    if best.misfit > COMPLETE:
+        p = prior.friction
+        band = max(p.dv_p, -p.dv_n)
+        again = refit(prior, logs, drive, prior=held, band=band, rescues=RESCUES)
+        best = again if again.misfit < best.misfit else best
+    return settled(best.plant, recorded, best.misfit, rng, report, prior=held)
+
+
+def _not_linear(recorded: RecordedLogs, misfit: float) -> str:
+    """What to say where a linear actuator leaves much of the force; "" where it does not."""
+    found = fit_actuator(recorded.plain)
+    noise = [one.noise_F**2 + (found.k2 * one.noise_y) ** 2 for one in recorded.logs]
+    if found.relative <= ACTUATOR_SHARE or found.rms <= ACTUATOR_MISFIT * np.sqrt(np.mean(noise)):
+        return ""
+    return (
+        f"the linear actuator leaves {100 * found.relative:.1f} % of the force (misfit"
+        f" {misfit:.3g}), so the run was driven by the logged force"
+    )

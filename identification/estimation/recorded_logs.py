@@ -1,0 +1,128 @@
+"""Logs as the estimator takes them: with their motion, and with what drives a run of them."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog, NotIdentifiable
+from identification.estimation.regression.equation_rows import (
+    Fitted,
+    MotionLog,
+    actuator,
+    motion_log,
+    solve_rows,
+    stacked,
+)
+from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.signals.check import check_driven
+
+LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedLogs:
+    """Logs of one machine with their motion; drive: what drives their runs."""
+
+    logs: tuple[MotionLog, ...]
+    rig: Rig
+    drive: Drive
+
+    @property
+    def held(self) -> bool:
+        """Whether a motor drives them, whose force is that of its command."""
+        return self.rig.kind == "motor"
+
+    @property
+    def by_command(self) -> bool:
+        """Whether an actuator's equation is fitted beside the mechanical one."""
+        return self.drive == "command" and not self.held
+
+    @property
+    def name(self) -> str:
+        """The log's name, or how many there are."""
+        return self.logs[0].log.name if len(self.logs) == 1 else f"{len(self.logs)} logs"
+
+    @property
+    def plain(self) -> tuple[Log, ...]:
+        """The logs as they were given."""
+        return tuple(one.log for one in self.logs)
+
+    def record(self, log: Log, *, imposed: bool = False) -> MotionLog:
+        """Another log of the machine with its motion; imposed: by a rig that leads it."""
+        return motion_log(
+            log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
+            imposed=imposed,
+        )  # fmt: skip
+
+    def as_imposed(self) -> "RecordedLogs":
+        """The same logs as a rig's that leads the body along a path."""
+        return replace(self, logs=tuple(self.record(one.log, imposed=True) for one in self.logs))
+
+
+def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
+    """The logs with their motion; drive: by default the command where an actuator follows it.
+
+    Raises BadLog where a signal is missing, or the asked drive is not to be had, NotIdentifiable
+    where nothing moves.
+    """
+    for log in logs:
+        check_driven(log)
+    chosen = chosen_drive(logs, rig, drive)
+    empty = RecordedLogs((), rig, chosen)
+    found = replace(empty, logs=tuple(empty.record(log) for log in logs))
+    for one in found.logs:
+        if not np.any(one.signals["d"]):
+            raise NotIdentifiable(
+                f"{one.log.name}: no motion above the noise of the velocity"
+                f" ({one.v_noise:.3g} m/s); record a run that moves"
+            )
+    return found
+
+
+def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:
+    """The drive asked for, or by default the command where one is logged and explains the force."""
+    name = logs[0].name
+    if rig.kind == "motor":
+        if not rig.force_per_command:
+            raise BadLog(
+                f"{name}: a motor needs its force_per_command, not 0; set it in the card"
+                " (1 where it is not known: a force is then in units of the command)"
+            )
+        if drive == "force":
+            raise BadLog(f"{name}: a motor is driven by its command; leave out the drive by force")
+        return "command"
+    logged = commanded(logs)
+    if drive == "command" and not logged:
+        raise BadLog(f"{name}: drive by command asked for, but no command u is logged")
+    if drive is not None:
+        return drive
+    return "command" if logged and left_by_actuator(logs) <= LINEAR_ACTUATOR else "force"
+
+
+def commanded(logs: Sequence[Log]) -> bool:
+    """Whether every log has a command that is not constant."""
+    return all("u" in log and np.ptp(log["u"]) > 0 for log in logs)
+
+
+def left_by_actuator(logs: Sequence[Log]) -> float:
+    """Share of the force's rate that a linear actuator with the logged command leaves."""
+    seen = [motion_log(log, held=False, by_command=True) for log in logs]
+    rows = stacked([actuator(one, np.array([1.0, 0.0, 0.0])) for one in seen])
+    return left_share(solve_rows(rows), rows.sd, rows.b)
+
+
+def left_share(found: Fitted, sd: Array, rate: Array) -> float:
+    """Share of the force's rate (r,) that a fit leaves, at least 1 where nothing follows u."""
+    left = float(np.std(found.residual * sd) / max(float(np.std(rate)), 1e-300))
+    return left if found.theta[0] > 0 else max(left, 1.0)
+
+
+def led_by_rig(recorded: RecordedLogs) -> bool:
+    """Whether a rig leads the body along a path, so that no run of its own is to be followed."""
+    if recorded.held or commanded(recorded.plain):
+        return False
+    return inertia_has_no_part(recorded.logs)

@@ -1,0 +1,328 @@
+"""The last step of a fit: from a plant that follows the logs to values, intervals and reasons.
+
+Where a plain plant follows whole runs by the command down to the sensors' noise, nothing tells
+more than they do: their likelihood has the last word. Where it leaves much more than noise whatever
+its parameters are, the mean of all that do about as well is given. Everywhere else (driven by a
+measured force, by a command with noise of its own, with effects) runs in windows from measured
+states tell, and by how much one window differs from the next.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.estimation.estimates import (
+    Events,
+    effect_estimates,
+    estimates,
+    events_of,
+    normal_samples,
+)
+from identification.estimation.gauss_newton import FOLLOWED
+from identification.estimation.plain_search.likely_sets import (
+    Progress,
+    Solution,
+    weigh_misfit,
+    weigh_noise,
+)
+from identification.estimation.plain_search.local_search import Optimum, refine
+from identification.estimation.plain_search.problem import (
+    ADEQUATE,
+    Problem,
+    plant_of,
+    pose,
+    simulated,
+    start_of,
+)
+from identification.estimation.plain_search.search import opened, searched_plant
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.windowed_run.refinement import (
+    COMPLETE,
+    Refit,
+    even,
+    names_of,
+    refit,
+    values_of,
+)
+from identification.estimation.windowed_run.windows import position_errors, starts, window_run
+from identification.model.estimates import Estimate, KarnoppFit, LogFit
+from identification.model.karnopp import NAMES
+from identification.model.plant import Actuator, Plant
+from identification.signals.initial_state import measured_start
+from identification.simulation.free_run import FreeRun
+from identification.simulation.karnopp_step import K1, K2, kernel_parameters
+
+DRAWN = 1024  # parameter sets that stand for a normal spread
+# Relative deviations that the force between its samples adds where it drives the run, by name;
+# from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
+BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
+SPREAD = 0.15  # of the search's box, in which sets that do about as well are looked for
+NOT_FOLLOWED = 8.0  # misfit from which a plain plant's parameters are averaged over whole runs
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """A plant, names (d,) of what was free, sets (k, d) that do about as well, what is left."""
+
+    plant: Plant
+    names: tuple[str, ...]
+    samples: Array
+    chi_square: float
+    adequate: bool
+    noise: tuple[float, float]
+    evaluations: int
+    logs: tuple[LogFit, ...]
+    events: Events
+    remarks: tuple[str, ...] = ()
+
+
+def settled(
+    plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
+    report: Progress, *, prior: dict[str, float] | None = None,
+) -> KarnoppFit:  # fmt: skip
+    """The fit of a plant that a search or refinement has come to, near its minimum.
+
+    misfit: what it leaves in windows; prior: deviations by name that hold effects' shapes.
+    """
+    exact = recorded.drive == "command" and not plant.effects
+    spread = None
+    if exact and misfit <= FOLLOWED:
+        spread = _over_whole_runs(plant, recorded, rng, report)
+    elif exact and misfit > NOT_FOLLOWED:
+        spread = _over_likely_sets(plant, recorded, rng, report)
+    if spread is None:
+        spread = _over_windows(plant, recorded, misfit, rng, prior)
+    return _told(spread, recorded)
+
+
+def _over_whole_runs(
+    plant: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
+) -> Spread | None:
+    """By the likelihood of whole runs; None where these are not followed to the noise."""
+    problem = _posed(recorded)
+    problem = opened(problem) if problem.hold else problem
+    optimum = _nearest(problem, plant)
+    if optimum.cost > COMPLETE * problem.count:
+        # A stop that turns on less than the noise makes minima beside the right one.
+        other = searched_plant(
+            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report
+        )
+        optimum = min(optimum, _nearest(problem, other), key=lambda one: one.cost)
+    if optimum.cost > ADEQUATE * problem.count:
+        return None
+    solution = weigh_noise(problem, optimum, rng, optimum.evaluations, report)
+    return _of_solution(problem, solution)
+
+
+def _nearest(problem: Problem, plant: Plant) -> Optimum:
+    """The minimum over whole runs that is nearest to a plant."""
+    row = _row(problem, plant)
+    # Its start first, or the first step goes astray.
+    begun = refine(problem.long_runs, row, problem.free[:0])
+    return refine(begun.runs(problem.long_runs), row, problem.free)
+
+
+def _over_likely_sets(
+    plant: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
+) -> Spread:
+    """By the mean over all sets that explain whole runs about as well."""
+    # Begun in the measured state: a fitted one would take up what the model lacks.
+    problem = _posed(recorded)
+    box = problem.box.wider(2.0)
+    row = _row(problem, plant)
+    row[box.free] = box.moved_inside(row[np.newaxis, box.free])[0]
+    optimum = refine(problem.long_runs, row, problem.free, cap=problem.cap)
+    optimum = refine(optimum.runs(problem.long_runs), optimum.p, problem.free)
+    members = box.rows(box.around(row, 64, SPREAD, rng))
+    solution = weigh_misfit(problem, optimum, members, rng, optimum.evaluations, report)
+    return _of_solution(problem, solution)
+
+
+def _posed(recorded: RecordedLogs) -> Problem:
+    drive = None if recorded.held else recorded.drive
+    return pose(recorded.plain, recorded.rig, drive)
+
+
+def _row(problem: Problem, plant: Plant) -> Array:
+    """Kernel parameters (11,) of a plant."""
+    k1, k2 = float(problem.row[K1]), float(problem.row[K2])
+    if isinstance(plant.actuator, Actuator):
+        k1, k2 = plant.actuator.k1, plant.actuator.k2
+    return kernel_parameters(plant.friction.array, k1, k2)
+
+
+def _of_solution(problem: Problem, solution: Solution) -> Spread:
+    optimum = solution.optimum
+    runs = [simulated(problem, optimum, i) for i in range(len(problem.logs))]
+    return Spread(
+        plant=plant_of(problem, optimum),
+        names=tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free),
+        samples=solution.samples[:, : len(problem.free)],
+        chi_square=solution.chi_square,
+        adequate=solution.adequate,
+        noise=solution.noise,
+        evaluations=solution.evaluations,
+        logs=tuple(_whole_log(problem, optimum, run, i) for i, run in enumerate(runs)),
+        events=events_of([run.mode for run in runs], [run.v for run in runs]),
+    )
+
+
+def _whole_log(problem: Problem, optimum: Optimum, run: FreeRun, index: int) -> LogFit:
+    log = problem.logs[index]
+    position = run.y - log["y"]
+    weight = problem.runs[index].measured.weight_y
+    force = None if problem.hold else float(np.sqrt(np.mean((run.F - log["F"]) ** 2)))
+    return LogFit(
+        log=log.name,
+        start=start_of(problem, optimum, index),
+        position_rms=float(np.sqrt(np.mean(position**2))),
+        force_rms=force,
+        chi_square=float(np.mean((position * weight) ** 2)),
+    )
+
+
+def _over_windows(
+    plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
+    prior: dict[str, float] | None,
+) -> Spread:  # fmt: skip
+    """By runs in windows from measured states, within which what is left walks together."""
+    held = even(plant) if prior is None else prior
+    near = refit(plant, recorded.logs, recorded.drive, prior=held, effort="near")
+    if near.misfit <= misfit:
+        plant = near.plant
+    names = near.names
+    values = values_of(plant, names)
+    left = min(near.misfit, misfit)
+    events = _events(plant, recorded)
+    covariance = _covariance(near, recorded, values, events)
+    samples = rng.multivariate_normal(values, covariance, DRAWN, check_valid="ignore")
+    said = [] if left > ADEQUATE or recorded.drive == "force" else [WINDOWS_ONLY]
+    return Spread(
+        plant=plant,
+        names=names,
+        samples=samples,
+        chi_square=left,
+        adequate=left <= ADEQUATE,
+        noise=(
+            float(np.median([one.noise_y for one in recorded.logs])),
+            float(np.median([one.noise_F for one in recorded.logs])),
+        ),
+        evaluations=0,
+        logs=tuple(_window_log(plant, recorded, i) for i in range(len(recorded.logs))),
+        events=events,
+        remarks=tuple(said),
+    )
+
+
+WINDOWS_ONLY = (
+    "the model follows the logs in windows of 2 s from measured states, but not the whole: a stop"
+    " turns on less than the noise there, or the logged command has noise of its own"
+)
+
+
+def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Events) -> Array:
+    """Covariance (d, d) of the free parameters."""
+    covariance = near.covariance.copy()
+    # What changes nothing in the run is not known, rather than known exactly.
+    silent = ~(np.diag(covariance) > 0.0)
+    covariance[silent, silent] = _of_silent(near.plant, near.names, values, events)[silent] ** 2
+    if recorded.drive == "force":
+        floor = np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
+        covariance = covariance + np.diag(floor**2)
+    if not np.all(np.isfinite(covariance)):
+        covariance = np.diag(np.abs(values) ** 2)
+    return np.asarray(covariance)
+
+
+def _of_silent(plant: Plant, names: Sequence[str], values: Array, events: Events) -> Array:
+    """Deviations (d,) of parameters of which the logs say nothing: as large as they could be."""
+    p = plant.friction
+    force = max(p.F_cp, p.F_cn, p.F_sp, -p.F_sn)
+    speed = max(*events.fastest, p.dv_p, -p.dv_n)
+    largest = {"dv_p": speed, "dv_n": speed, "F_vp": force / speed, "F_vn": force / speed}
+    largest |= dict.fromkeys(("F_cp", "F_cn", "F_sp", "F_sn"), force)
+    return np.maximum(np.abs(values), [largest.get(name, 0.0) for name in names])
+
+
+def _window_log(plant: Plant, recorded: RecordedLogs, index: int) -> LogFit:
+    one = recorded.logs[index]
+    errors = position_errors(plant, one, recorded.drive)
+    rms = float("inf") if errors is None else float(np.sqrt(np.mean(errors**2)))
+    return LogFit(
+        log=one.log.name,
+        start=measured_start(one.log),
+        position_rms=rms,
+        force_rms=None,
+        chi_square=(rms / one.noise_y) ** 2,
+    )
+
+
+def _told(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
+    """The spread as estimates with intervals and reasons."""
+    center = values_of(spread.plant, spread.names)
+    own = [i for i, name in enumerate(spread.names) if "." not in name]
+    sd = dict(zip(spread.names, np.std(spread.samples, axis=0).tolist(), strict=True))
+    told = {
+        **estimates(
+            [spread.names[i] for i in own], center[own], spread.samples[:, own], spread.events,
+            recorded.rig.motion == "rotary", recorded.name,
+        ),
+        **effect_estimates(spread.plant.effects, sd),
+    }  # fmt: skip
+    return KarnoppFit(
+        friction=spread.plant.friction,
+        actuator=spread.plant.actuator,
+        effects=spread.plant.effects,
+        estimates=told,
+        free=spread.names,
+        covariance=np.atleast_2d(np.cov(spread.samples.T)),
+        samples=spread.samples,
+        drive=recorded.drive,
+        noise_y=spread.noise[0],
+        noise_F=spread.noise[1],
+        chi_square=spread.chi_square,
+        adequate=spread.adequate,
+        logs=spread.logs,
+        breakaways=spread.events.breakaways,
+        evaluations=spread.evaluations,
+        remarks=(*_remarks(spread, recorded), *spread.remarks),
+    )
+
+
+def _remarks(spread: Spread, recorded: RecordedLogs) -> Sequence[str]:
+    out = []
+    if not spread.adequate:
+        out.append(
+            f"the model leaves {np.sqrt(spread.chi_square):.3g} times the sensors' noise:"
+            " an effect is missing, or the structure is wrong; intervals are widened for it"
+        )
+    if recorded.drive == "force":
+        out.append("driven by the measured force in windows: no command explains the force")
+    return out
+
+
+def structure_estimates(
+    plant: Plant, sd: Mapping[str, float], recorded: RecordedLogs
+) -> dict[str, Estimate]:
+    """The nine and the actuator's of a plant that has been refined already; sd: by name.
+
+    The same rules as of a fit say which of them the logs tell.
+    """
+    names = [name for name in names_of(plant, recorded.drive) if "." not in name]
+    values = values_of(plant, names)
+    events = _events(plant, recorded)
+    own = np.array([sd.get(name, 0.0) for name in names])
+    own = np.where(own > 0.0, own, _of_silent(plant, names, values, events))
+    samples = normal_samples(values, own)
+    rotary = recorded.rig.motion == "rotary"
+    return dict(estimates(names, values, samples, events, rotary, recorded.name))
+
+
+def _events(plant: Plant, recorded: RecordedLogs) -> Events:
+    """What happens in the plant's run in windows."""
+    runs = [window_run(plant, one, recorded.drive, starts(one, recorded.drive))
+            for one in recorded.logs]  # fmt: skip
+    followed = [run for run in runs if run is not None]
+    return events_of([run.mode for run in followed], [run.v for run in followed])
