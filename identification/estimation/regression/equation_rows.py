@@ -269,7 +269,9 @@ def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float =
         + one.noise_y**2 * noise_gain(theta[0] * second + viscous * first)
         for viscous in (theta[3], theta[4])
     ]
-    sd = np.sqrt(np.where(up, spread[0], spread[1]))
+    # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
+    least = OF_FORCE * float(np.std(one.log["F"]))
+    sd = np.maximum(np.sqrt(np.where(up, spread[0], spread[1])), least)
     return Rows(b, X, sd, _blocks(w, len(one.log)), one.speed, FIVE)
 
 

@@ -1,0 +1,170 @@
+"""Which rules of the tracer change what it says: each switched off, or its number doubled.
+
+    python benchmarks/ablation.py [--first 700] [--how off] [--rules DOUBTFUL ...] [--jobs 2]
+
+A rule is a number that decides; off is the value at which it never does. The cases are those of
+the blind benchmark (benchmarks/blind_cases.py), one of every kind that a verdict can go wrong in,
+on fixed seeds; what a rule changes is the verdict, the effects named, or the signal that a rest
+depends on. `--how double` and `--how halve` change the number instead.
+"""
+
+import argparse
+import contextlib
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from benchmarks.blind_cases import Made, case_of, make
+from benchmarks.blind_effects import HOLDS
+from identification.effects._library import built_in
+from identification.errors import UserError
+from identification.tracing.trace import trace
+
+SECONDS = 40.0
+CASES = (
+    "clean:motor:-:0:{0}",
+    "clean:force:-:0:{0}",
+    "single:table2:presliding:0.2:{0}",
+    "single:random:stribeck:0.2:{0}",
+    "single:force:backlash:0.2:{0}",
+    "single:table2:valve_dead_zone:0.2:{0}",
+    "single:random:rising_stiction:0.2:{0}",
+    "single:force:warmup:0.2:{0}",
+    "two:table2:spring+load_dependent_friction:0.2:{0}",
+    "removed:random:cogging:0.2:{0}",
+    "removed:table2:spring:0.2:{0}",
+    "removed:force:stribeck:0.2:{0}",
+    "drift:table2:-:0.1:{0}",
+)
+ALL, NONE = float("inf"), 0.0
+# The value at which a rule never decides.
+RULES: dict[str, float] = {
+    "CARRIED": ALL, "OF_MISSING": NONE, "SLIDES": NONE, "BELOW": ALL, "SHARE_LEFT": ALL,
+    "ROUGH_LEFT": NONE, "IMPOSED_LEFT": ALL, "STRUCTURED": ALL, "RESTLESS": ALL, "ASTRAY": ALL,
+    "OFF": NONE, "DOUBTFUL": ALL, "MOST_PLACES": 99, "CLEARLY": NONE, "SLIGHT_SHARE": ALL,
+    "LUCK_IN_GAIN": NONE, "RIGID_CONTACT": NONE, "RIVALS_TRIED": 0, "BRAKES": NONE,
+    "DECISIVE": 1.0, "WALKED": 1.5, "BENT": 1.5, "UNCONTESTED": NONE, "NEARLY_FOLLOWED": NONE,
+    "LEAST_MASS": NONE, "EARNS": ALL, "NO_SEARCH_WILL_DO": ALL, "VAIN": ALL, "ONCE_MORE": 0,
+    "NEEDLESS": NONE, "DOES_NOTHING": NONE, "HALF_OF_EXCESS": ALL, "ALONE": NONE, "OF_STEPS": 1.0,
+    "MAY_BE_UNEVEN": NONE, "GOES_ON": ALL, "WORTH": 1.0, "FINALISTS": 1, "AHEAD": 99,
+    "FAR_BEHIND": ALL, "BEHIND": ALL, "LARGER": 1, "LOST_MISFIT": ALL, "HUNDREDTH": NONE,
+    "HELPS": ALL, "LEAST_DEPENDENCE": NONE, "SECOND_SIGNAL": ALL, "APART": ALL, "SWINGS": NONE,
+    "CALLED": NONE, "SEARCHED": 1.0, "LEAST_SHARE": NONE, "CHANCE_LEVEL": 1.0, "MATERIAL": NONE,
+    "CARRIES": ALL, "MOSTLY_EXPLAINED": NONE, "SHIFT": NONE, "MATERIAL_RATE": NONE,
+    "ELASTIC": ALL, "REFUSED": 1, "HARDLY": NONE, "PENALTY": NONE, "DRIFT_GAIN": NONE,
+    "DRIFT_SHARE": NONE, "MOTION_SHARE": NONE, "DRIFT_LEAST": NONE, "INERT": NONE,
+    "WIDEST_BAND": ALL, "SLIGHT": NONE, "MUCH": ALL, "MUCH_IS_LEFT": ALL, "TRIM": ALL,
+    "FEWEST_EVENTS": 99999, "ROBUST_SQUARE": 1e9, "SPEEDS_APART": NONE, "NEARLY": 1.1,
+    "COMPLETE": 1.5, "PROMISING_MISFIT": ALL, "POOR": 99, "LUCKY_WINDOWS": NONE,
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Said:
+    """What a trace said of a case, and the time [s]."""
+
+    verdict: str
+    effects: tuple[str, ...]
+    depends_on: tuple[str, ...]
+    seconds: float
+
+    def same(self, other: "Said") -> bool:
+        """Whether both say the same."""
+        return (self.verdict, self.effects, self.depends_on[:1]) == (
+            other.verdict, other.effects, other.depends_on[:1],
+        )  # fmt: skip
+
+
+def made(first: int) -> list[Made]:
+    """The cases as simulated; one that its loop does not bear is left out."""
+    out = []
+    for name in CASES:
+        with contextlib.suppress(UserError, RuntimeError):
+            out.append(make(case_of(name.format(first)), SECONDS))
+    return out
+
+
+def said_of(one: Made) -> Said:
+    """What the tracer says of a case."""
+    hidden = one.case.effects if one.case.mode == "removed" else ()
+    removed = {key for name in hidden for key in (name, *HOLDS.get(name, ()))}
+    library = {k: e for k, e in built_in().items() if k not in removed}
+    begin = time.perf_counter()
+    try:
+        found = trace(
+            [one.train.log], [one.test.log], one.machine.rig, library, np.random.default_rng(0)
+        )
+    except UserError as error:
+        return Said(type(error).__name__, (), (), time.perf_counter() - begin)
+    keys = tuple(e.effect.key for e in found.effects)
+    return Said(found.verdict, keys, found.unknown.depends_on, time.perf_counter() - begin)
+
+
+@contextlib.contextmanager
+def changed(rule: str, how: str) -> Iterator[None]:
+    """The rule's number changed in every module that names it."""
+    places = [
+        module for name, module in list(sys.modules.items())
+        if name.startswith("identification.") and hasattr(module, rule)
+    ]  # fmt: skip
+    before = getattr(places[0], rule)
+    value = {"off": RULES[rule], "double": 2 * before, "halve": before / 2}[how]
+    value = int(value) if isinstance(before, int) and np.isfinite(value) else value
+    for module in places:
+        setattr(module, rule, value)
+    try:
+        yield
+    finally:
+        for module in places:
+            setattr(module, rule, before)
+
+
+def tried(rule: str, first: int, how: str) -> tuple[str, list[Said]]:
+    """What is said of every case with this rule changed."""
+    cases = made(first)
+    with changed(rule, how) if rule else contextlib.nullcontext():
+        return rule, [said_of(one) for one in cases]
+
+
+def told(rule: str, cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]) -> str:
+    """A line of the table."""
+    off = [
+        f"{one.case.name}: {a.verdict} {' '.join(a.effects)} -> {b.verdict} {' '.join(b.effects)}"
+        f" {' '.join(b.depends_on[:1])}"
+        for one, a, b in zip(cases, usual, found, strict=True)
+        if not a.same(b)
+    ]
+    took = sum(b.seconds for b in found) / max(sum(a.seconds for a in usual), 1e-9)
+    return f"{rule:20s} {len(off)} of {len(cases)} changed, {took:.2f} of the time; " + "; ".join(
+        off
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=700)
+    parser.add_argument("--how", choices=("off", "double", "halve"), default="off")
+    parser.add_argument("--rules", nargs="*", default=list(RULES))
+    parser.add_argument("--jobs", type=int, default=2)
+    asked = parser.parse_args()
+    cases = made(asked.first)
+    _, usual = tried("", asked.first, asked.how)
+    for one, said in zip(cases, usual, strict=True):
+        print(
+            f"{one.case.name:60s} {said.verdict} {' '.join(said.effects)}"
+            f" {' '.join(said.depends_on)} {said.seconds:.1f} s",
+            flush=True,
+        )
+    with ProcessPoolExecutor(asked.jobs) as pool:
+        run = partial(tried, first=asked.first, how=asked.how)
+        for rule, found in pool.map(run, asked.rules):
+            print(told(rule, cases, usual, found), flush=True)
+
+
+if __name__ == "__main__":
+    main()
