@@ -10,16 +10,12 @@ from identification.drift.reference_model import InForce
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
-from identification.estimation.plain_search.problem import ADEQUATE
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.windowed_run.refinement import values_of
 from identification.log import Log
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant
-
-# Chi-square from which a log is not followed; a stop lost here or there leaves less
-NOT_FOLLOWED = 2.0
-LIKE = 4.0  # times the chi-square of the model in force, where that leaves more than noise
+from identification.thresholds import ADEQUATE, FOLLOWED, LIKE
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +56,7 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
         found = fit_imposed(recorded, rng, "as the model in force")
         return _of_fit(found, LIKE * max(model.chi_square, 1.0))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    allowed = NOT_FOLLOWED if model.chi_square <= ADEQUATE else LIKE * model.chi_square
+    allowed = FOLLOWED if model.chi_square <= ADEQUATE else LIKE * model.chi_square
     # Of a body that is not led, the force equation alone says that its run is not followed.
     return _of_fit(found, 0.0 if found.imposed else allowed)
 

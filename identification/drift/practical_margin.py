@@ -12,9 +12,7 @@ from scipy.optimize import lsq_linear
 from scipy.stats import chi2
 
 from identification.arrays import Array
-
-# Chance of a gain as large without a change, shared by the parameters that are tried
-GAIN_CHANCE = 0.01
+from identification.thresholds import CHANCE_LEVEL
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +54,7 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
     makes needless. Parameters that a log cannot tell apart do not all move.
     """
     d = len(change)
-    sure = float(chi2.isf(GAIN_CHANCE / max(d, 1), 1))
+    sure = float(chi2.isf(CHANCE_LEVEL / max(d, 1), 1))
     chosen: list[int] = []
     left = beyond_margin(change, covariance, margin).square
     while left > 0.0 and len(chosen) < d:

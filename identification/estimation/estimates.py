@@ -16,10 +16,9 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
 from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
+from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
 
-EVENTS_NEEDED = 3  # events of a kind that make a parameter identifiable
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
-WIDEST_SD = 0.3  # sd relative to the value beyond which the value says nothing
 NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small

@@ -27,20 +27,14 @@ from identification.estimation.structure_fit import (
     plain_structure,
     searched,
 )
-from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
-    RESCUES,
-    Refit,
-    even,
-    refit,
-)
+from identification.estimation.windowed_run.refinement import RESCUES, Refit, even, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Plant
+from identification.thresholds import COMPLETE, NO_RUN
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
-NO_RUN = 50.0  # misfit from which a run by the measured force is not the body's own motion
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 ACTUATOR_SHARE = 0.02  # of the force, that it has to leave as well
 

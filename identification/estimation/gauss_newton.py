@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.thresholds import FOLLOWED
 
-FOLLOWED = 2.0  # mean square up to which hardly more than noise is left
 WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
 # Near it: what tells the scale common to masses and forces is a small difference of large columns.
 FINE_STEP = 1e-7

@@ -24,12 +24,13 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
-from identification.estimation.regression.inertia import SPEEDS_APART, speed_ratios
+from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.model.plant import Plant
 from identification.signals.initial_state import measured_start
+from identification.thresholds import SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_ROWS = 4  # in each direction

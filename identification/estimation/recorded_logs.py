@@ -19,8 +19,7 @@ from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.signals.check import check_driven
-
-LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator may leave, to be one at all
+from identification.thresholds import LINEAR_ACTUATOR
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from identification.estimation.estimates import (
     events_of,
     normal_samples,
 )
-from identification.estimation.gauss_newton import FOLLOWED
 from identification.estimation.plain_search.likely_sets import (
     Progress,
     Solution,
@@ -29,7 +28,6 @@ from identification.estimation.plain_search.likely_sets import (
 )
 from identification.estimation.plain_search.local_search import Optimum, refine
 from identification.estimation.plain_search.problem import (
-    ADEQUATE,
     Problem,
     plant_of,
     pose,
@@ -39,7 +37,6 @@ from identification.estimation.plain_search.problem import (
 from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     Refit,
     even,
     names_of,
@@ -53,13 +50,13 @@ from identification.model.plant import Actuator, Plant
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
+from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED, NEARLY_FOLLOWED
 
 DRAWN = 1024  # parameter sets that stand for a normal spread
 # Relative deviations that the force between its samples adds where it drives the run, by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
 SPREAD = 0.15  # of the search's box, in which sets that do about as well are looked for
-NOT_FOLLOWED = 8.0  # misfit from which a plain plant's parameters are averaged over whole runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +87,7 @@ def settled(
     spread = None
     if exact and misfit <= FOLLOWED:
         spread = _over_whole_runs(plant, recorded, rng, report)
-    elif exact and misfit > NOT_FOLLOWED:
+    elif exact and misfit > NEARLY_FOLLOWED:
         spread = _over_likely_sets(plant, recorded, rng, report)
     if spread is None:
         spread = _over_windows(plant, recorded, misfit, rng, prior)

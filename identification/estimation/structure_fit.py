@@ -33,14 +33,12 @@ from identification.estimation.regression.row_fit import (
 from identification.estimation.regression.standstill import borne
 from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.nudged_search import (
-    NEARLY,
     SEARCHES,
     STICK_PER_COULOMB,
     closest,
     loaded,
 )
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     RESCUES,
     Effort,
     Refit,
@@ -54,15 +52,14 @@ from identification.estimation.windowed_run.refinement import (
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.thresholds import ADEQUATE, COMPLETE, INERT, MUCH
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
-INERT = 2.0  # times what is left, below which inertia does not show
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 WIDEST_BAND = 0.4  # of the median speed of sliding, that the band can be at most
 EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
-MUCH = 2.0  # times the sensors' noise, at which something is missing from the equations
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is judged
@@ -125,7 +122,7 @@ def fitted_structure(
     if smooth and done.misfit > COMPLETE and not hopeless:
         again = replace(onward(done.plant, logs, drive), prior=prior)
         done = again if again.misfit < done.misfit else done
-    followed = NEARLY if effects else COMPLETE
+    followed = ADEQUATE if effects else COMPLETE
     if free and done.misfit > followed and not hopeless:
         by_loads = any(by_load(one.effect) for one in plant.effects)
         begins = [plant, done.plant]

@@ -7,12 +7,11 @@ import numpy as np
 from scipy.fft import rfft
 
 from identification.arrays import Array, BoolArray, IntArray
+from identification.thresholds import LEAST_DEPENDENCE
 from identification.tracing.result import Dependence
 
 BINS = (3, 10, 60, 200)  # levels of a signal, by quantiles; straight lines in between
 FEW_VALUES = 8  # values of a signal (a switch, a gear) that are told apart each by itself
-# Share of the residual, on blocks left out, from which it depends on a signal
-LEAST_DEPENDENCE = 0.08
 MOST_SIGNALS = 3  # signals named
 OVERLAPPING, SEPARATE = 20, 8  # rows to a level, where they share samples and where each is alone
 SECOND_SIGNAL = 0.15  # share of what is left that a second signal must explain

@@ -7,20 +7,16 @@ import numpy as np
 
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.refinement import COMPLETE
 from identification.log import Rig
 from identification.model.plant import units_of
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, IMPOSED_LEFT, MOST_PLACES
 from identification.tracing.constant_force import beyond_friction, constant_remark
-from identification.tracing.free_run.backward_elimination import DECISIVE, equations_explained
+from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.model_errors import carries, errors_of, share_left
 from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import (
-    ASTRAY,
-    DOUBTFUL,
-    IMPOSED_LEFT,
-    MOST_PLACES,
     at_breakaway,
     in_run,
     places,
@@ -75,9 +71,9 @@ def judgement(
 def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependence:
     """On what the rest depends: in the equations, else in the run, else at the breakaways."""
     # A refinement may end short of its minimum.
-    most = DECISIVE if choice.steps else COMPLETE
+    most = ADEQUATE if choice.steps else COMPLETE
     left = NOTHING if after.misfit <= most else remaining_structure(choice, after)
-    if not (left.depends_on or choice.steps or after.imposed) and after.misfit > DOUBTFUL:
+    if not (left.depends_on or choice.steps or after.imposed) and after.misfit > ADEQUATE:
         rows = chosen.plain.rows
         left = in_run(after, list(rows.logs), rows.drive)
         left = left if left.depends_on else at_breakaway(choice)

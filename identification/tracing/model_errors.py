@@ -17,12 +17,10 @@ from identification.estimation.regression.row_fit import RowFit, rms
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
+from identification.thresholds import CARRIED, ROUGH_LEFT
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
-
-CARRIED = 2.0  # times the training logs' force error, up to which a structure carries over
-OF_MISSING = 0.05  # of the square that was missing, that may be left beyond that
 
 
 def errors_of(
@@ -63,7 +61,7 @@ def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
     own, other, missing = (x.force_rms for x in (after["train"], after["test"], before["test"]))
     if own is None or other is None or missing is None:
         return True
-    little = OF_MISSING * (missing**2 - own**2)
+    little = ROUGH_LEFT * (missing**2 - own**2)
     return other <= CARRIED * own or other**2 - own**2 <= little
 
 

@@ -19,15 +19,13 @@ from identification.estimation.regression.row_fit import RowFit
 from identification.estimation.structure_fit import OVERLAP, FittedStructure, band
 from identification.log import Rig
 from identification.model.plant import units_of
+from identification.thresholds import DRIFT_GAIN, DRIFT_LEAST, DRIFT_SHARE
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.stepwise import Step
 from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Change
 
-DRIFT_GAIN = 30.0  # chi-square that a parameter freed has to gain
-DRIFT_SHARE = 0.1  # of the test logs' square error that it has to take away
 MOTION_SHARE = 0.3  # share of a column's square that is motion and not noise, at least
-DRIFT_LEAST = 0.01  # of its value, that it changes at least
 
 
 def parameter_drift(

@@ -11,10 +11,10 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.row_fit import RowFit, base_fits
 from identification.estimation.structure_fit import FittedStructure, band, plain_structure
-from identification.estimation.windowed_run.refinement import COMPLETE, misfit
+from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Rig
+from identification.thresholds import ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
-from identification.tracing.remaining_structure import ASTRAY
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,17 +8,13 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
-from identification.estimation.recorded_logs import (
-    LINEAR_ACTUATOR,
-    commanded,
-    left_by_actuator,
-    left_share,
-)
+from identification.estimation.recorded_logs import commanded, left_by_actuator, left_share
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
-from identification.estimation.regression.inertia import SPEEDS_APART, speed_ratios
+from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.thresholds import LINEAR_ACTUATOR, SPEEDS_APART
 from identification.tracing.regression.candidates import best_of
 from identification.tracing.remaining_structure import FEWEST_ROWS
 

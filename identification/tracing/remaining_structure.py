@@ -16,36 +16,34 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
-from identification.estimation.regression.row_fit import MUCH_IS_LEFT, RowFit, mean_square, rms
-from identification.estimation.structure_fit import MUCH, FittedStructure, band
-from identification.estimation.windowed_run.refinement import COMPLETE, PERIOD_REACH, soft
+from identification.estimation.regression.row_fit import RowFit, mean_square, rms
+from identification.estimation.structure_fit import FittedStructure, band
+from identification.estimation.windowed_run.refinement import PERIOD_REACH, soft
 from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
 from identification.model.estimates import Drive
-from identification.tracing.dependence import (
+from identification.thresholds import (
+    ASTRAY,
+    COMPLETE,
+    IMPOSED_LEFT,
     LEAST_DEPENDENCE,
-    MOST_SIGNALS,
-    OVERLAPPING,
-    SEPARATE,
-    dependence,
+    MATERIAL,
+    MOST_PLACES,
+    MUCH,
+    MUCH_IS_LEFT,
+    ROUGH_LEFT,
+    SHARE_LEFT,
+    STRUCTURED,
 )
+from identification.tracing.dependence import MOST_SIGNALS, OVERLAPPING, SEPARATE, dependence
 from identification.tracing.free_run.backward_elimination import equations_explained, first_steps
 from identification.tracing.regression.shape_grid import fewest_periods
-from identification.tracing.regression.stepwise import MATERIAL, Choice, Step
+from identification.tracing.regression.stepwise import Choice, Step
 from identification.tracing.result import Dependence
 
 FEWEST_ROWS = 30
-SHARE_LEFT = 0.01  # of what was missing, that may be left with structure
-ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the sensors' noise
-IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
-STRUCTURED = 0.3  # square, in noise units, from which what is left is structure
 NOT_SIGNALS = frozenset({"d", "a", "smooth", "r", "F_logged"})
-RESTLESS = 3.0  # square in noise units from which rest or breakaway are not as they should be
-ASTRAY = 3.0  # misfit of a free run from which something is missing though nothing was found,
 OFF = 1e-3  # if its error is this share of the position's spread
-DOUBTFUL = 1.5  # the same, if its error depends on a signal; of 200 clean logs none reaches it
-# Effects of place in one machine, which rather are pieces of one that no library has
-MOST_PLACES = 3
 BEND = 0.05  # s, half of the stretch on which an error's rate and curvature are told
 THINNED = 10  # samples of a free run of which one is judged
 CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
@@ -65,7 +63,7 @@ def remaining_structure(
     # A body that creeps in short stops is no rest, and a run that is followed does it too.
     calm = not after.imposed and after.misfit <= ASTRAY
     for equation, o in choice.base.items():
-        if o.robust and ((calm and not any_size) or mean_square(o) < RESTLESS):
+        if o.robust and ((calm and not any_size) or mean_square(o) < ASTRAY):
             continue
         keep = judged_rows(o, after) if equation == MECHANICAL else o.rows.speed >= o.slowest
         if equation == ACTUATOR and choice.end.play:

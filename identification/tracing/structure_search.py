@@ -7,10 +7,11 @@ import numpy as np
 from identification.estimation.fit import finished
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.row_fit import mean_square
-from identification.estimation.structure_fit import MUCH, FittedStructure, inertia_is_lost
+from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
 from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
+from identification.thresholds import HELPS, MOST_PLACES, MUCH, SHARE_LEFT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     doubted,
@@ -22,10 +23,7 @@ from identification.tracing.free_run.forward_selection import at_once, judged_fo
 from identification.tracing.free_run.rivals import told_apart
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, Progress, choose
-from identification.tracing.remaining_structure import MOST_PLACES, before_pieces, places
-
-HUNDREDTH = 0.01  # of the square that is missing, left by effects that are there without a doubt
-HELPS = 0.75  # of the run's excess misfit, that effects which leave much may leave at most
+from identification.tracing.remaining_structure import before_pieces, places
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +108,7 @@ def useless(choice: Choice, before: FittedStructure, after: FittedStructure) -> 
     told = [e for e in (MECHANICAL, ACTUATOR) if e in choice.base]
     lacked = any(mean_square(choice.first[e]) > MUCH**2 for e in told)
     if lacked and all(
-        mean_square(choice.base[e]) <= max(MUCH**2, HUNDREDTH * mean_square(choice.first[e]))
+        mean_square(choice.base[e]) <= max(MUCH**2, SHARE_LEFT * mean_square(choice.first[e]))
         for e in told
     ):
         return False

@@ -24,8 +24,8 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.check import check_driven
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.karnopp_step import K1, K2
+from identification.thresholds import ADEQUATE
 
-ADEQUATE = 1.5  # normalised chi-square up to which a fit counts as found
 LONGEST_RUN = 40.0  # s; a run without a stiffness that holds it is compared at most this long
 
 

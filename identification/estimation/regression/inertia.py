@@ -17,7 +17,6 @@ SPEED_RANGE = (
     0.05,
     0.95,
 )  # quantiles of speed, of which the higher must be so many times the lower
-SPEEDS_APART = 4.0  # to tell friction that depends on speed alone
 
 
 def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:

@@ -23,12 +23,12 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
+from identification.thresholds import MUCH_IS_LEFT
 
 TRIM = 4.0  # what a row counts that is left out for its low speed
 TRIMS = (0.0, 0.02, 0.05, 0.1, 0.15, 0.2, 0.3, 0.4)  # shares of the rows that may be left out
 FEWEST_EVENTS = 6
 ROBUST_SQUARE = 9.0  # square from which a row of rest counts less
-MUCH_IS_LEFT = 25.0  # square in noise units from which much is left
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,7 +31,6 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.standstill import rest_stretches
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     SHORT_WINDOW,
     Judge,
     Refit,
@@ -50,6 +49,7 @@ from identification.estimation.windowed_run.refinement import (
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
+from identification.thresholds import ADEQUATE, COMPLETE
 
 TAU = 0.1  # s, in which a nudged body takes on the log's velocity
 STRONG = 1.5  # times the body's own viscous friction, with which it is nudged at least
@@ -96,7 +96,6 @@ PROMISING_MISFIT, POOR = (
 )  # misfit on the short logs, of effects worth a search; so many more at most
 SAME_PLACE = 1.1  # relative misfit of two searches that have ended in the same place
 MIDDLE = 30.0  # s, those of a plant with effects, whose runs take longer, searched close by
-NEARLY = 1.5  # misfit of a plant with effects that is not searched anew; a bristle's steps err
 SCALED = [0, 1, 2, 3, 4, 7, 8]  # of the nine, those that a share of the force scales
 KNOWN_SLIDING = 0.002  # share within which sliding is searched where an effect acts in stops alone
 ASYMMETRY_REACH = 0.15  # by which an asymmetry that is not 0 is searched
@@ -166,7 +165,7 @@ def closest(
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
         poor += not hopes
-        if best.misfit <= (NEARLY if plant.effects else COMPLETE) or twice or poor == POOR:
+        if best.misfit <= (ADEQUATE if plant.effects else COMPLETE) or twice or poor == POOR:
             break
     assert best is not None
     return best
@@ -185,10 +184,10 @@ def _on_whole(
 ) -> Refit:  # fmt: skip
     """What was found on short logs, refined on the whole; searched closer where it falls short."""
     plant = begun.plant
-    if searches > 0 and begun.misfit > (NEARLY if plant.effects else COMPLETE):
+    if searches > 0 and begun.misfit > (ADEQUATE if plant.effects else COMPLETE):
         return closer(plant, logs, drive, rng, searches, around, done=done)
     found = refit(plant, logs, drive, prior=even(plant), effort="near")
-    if searches == 0 or found.misfit <= (NEARLY if on_bristle(plant) else COMPLETE):
+    if searches == 0 or found.misfit <= (ADEQUATE if on_bristle(plant) else COMPLETE):
         return found
     again = closer(plant, logs, drive, rng, searches, around, done=done)
     return again if again.misfit < found.misfit else found
@@ -207,7 +206,7 @@ def closer(
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
     slow = on_bristle(plant)
-    enough = NEARLY if slow else COMPLETE
+    enough = ADEQUATE if slow else COMPLETE
     best = None if slow else onward(plant, logs, drive)
     for _ in range(searches):
         if best is not None and (best.misfit <= enough or best.misfit > hopeless):

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.effects._base import Param
-from identification.estimation.gauss_newton import FINE_STEP, FOLLOWED, Minimum, gauss_newton
+from identification.estimation.gauss_newton import FINE_STEP, Minimum, gauss_newton
 from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.windowed_run.windows import (
     COARSE,
@@ -32,6 +32,7 @@ from identification.model.estimates import Drive
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.simulation.effect_table import LONGEST_BRISTLE
+from identification.thresholds import COMPLETE, FOLLOWED, NEARLY_FOLLOWED
 
 SHORT_WINDOW = 1.0  # s, of the windows in which the search begins
 # Windows [s] with hardly a stop in each, and the share of their residuals that counts in full:
@@ -41,12 +42,10 @@ BRIEF_SAMPLES = 20  # that a brief window has at least
 # Of a parameter, or of so much of its unit, that it changes in them
 BRIEF_REACH, LEAST_OF_UNIT = 0.4, 0.5
 PASSING = 0.03  # share of the cost, below which a step that only leads on is the last
-SLIDING_MISFIT = 8.0  # mean square, from which a run that sliding does not explain is not followed
 RESCUES = 3  # searches beside, of a run that leaves more than noise
 NO_USE = 0.8  # of the misfit, above which another search is of no use
 BAND_GRID = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 STICK_GRID = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
-COMPLETE = 1.1  # misfit of a free run up to which nothing is missing
 REACHED = 60.0  # misfit up to which brief windows may lead to the minimum
 # Of `onward` at most, each to leave this share of the misfit before
 ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
@@ -340,7 +339,7 @@ def refit(
     at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
-    hopeless = effort == "rough" and at.mean > SLIDING_MISFIT
+    hopeless = effort == "rough" and at.mean > NEARLY_FOLLOWED
     rounds = [] if quick or hopeless else [RUN_WINDOW]
     steady = drive == "command" and not any(walks(one, drive) for one in logs)
     longest = MOTOR_WINDOW if plant_is_motor(plant) else WHOLE

@@ -17,15 +17,9 @@ from identification.estimation.regression.effect_columns import slow_motion
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
-from identification.estimation.structure_fit import (
-    MUCH,
-    FittedStructure,
-    band,
-    fitted_structure,
-)
+from identification.estimation.structure_fit import FittedStructure, band, fitted_structure
 from identification.estimation.windowed_run.nudged_search import closer, more_load, nearer
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     Refit,
     even,
     loose,
@@ -37,22 +31,26 @@ from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.thresholds import (
+    ADEQUATE,
+    ASTRAY,
+    COMPLETE,
+    DOES_NOTHING,
+    EARNS,
+    FOLLOWED,
+    MUCH,
+    NEARLY_FOLLOWED,
+    NEEDLESS,
+    UNCONTESTED,
+)
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, Step, absorb, material
 
-DECISIVE = 1.5  # misfit up to which a structure found in the run is taken
-WALKED = 3.0  # the same, where the noise of a measured force may leave as much
-BENT = 2.0  # the same, of a bristle where nothing holds the run to the log
-UNCONTESTED = 0.1  # of the plain model's excess misfit, left by effects that need no contest
-NEARLY_FOLLOWED = 8.0  # misfit up to which a run is nearly followed
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
-EARNS = 0.8  # of the excess misfit with fewer, that one effect more may leave
 # Times what it stands against, that brief windows leave where no search will do
 NO_SEARCH_WILL_DO = 2.0
 VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
 ONCE_MORE = 2  # searches of a run that is all but followed
-NEEDLESS = 1.02  # relative misfit without an effect that is not needed
-DOES_NOTHING = 1.002  # the same, of the plant as it is, without one that does nothing in the run
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +83,8 @@ def enough(setting: Setting, steps: Sequence[Step]) -> float:
     """Misfit up to which a run is not contested: nothing is missing, or the effects that the
     equations call for are beyond doubt in it too."""
     if not steps:
-        return DECISIVE
-    least = DECISIVE if setting.drive == "command" else WALKED
+        return ADEQUATE
+    least = ADEQUATE if setting.drive == "command" else ASTRAY
     return max(least, 1.0 + UNCONTESTED * (setting.plain.misfit - 1.0))
 
 
@@ -169,7 +167,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
             best = part, model
     if free and best is not None and best[1].misfit > vain(setting):
         return only(choice, (), [step.candidate for step in choice.steps]), setting.plain
-    if best is not None and (not unsure or best[1].misfit <= WALKED):
+    if best is not None and (not unsure or best[1].misfit <= ASTRAY):
         return best
     less = without_slow(choice) if unsure else choice
     if best is not None and len(less.steps) == len(best[0].steps):
@@ -183,8 +181,8 @@ def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
         return min(enough(setting, choice.steps), NEARLY_FOLLOWED)
     bristle = any(step.candidate.effect.place.elastic for step in choice.steps)
     if bristle and loose(setting.plain.plant, setting.drive):  # minima are many and narrow
-        return BENT
-    return DECISIVE if bristle or setting.drive == "force" else COMPLETE
+        return FOLLOWED
+    return ADEQUATE if bristle or setting.drive == "force" else COMPLETE
 
 
 def equations_explained(base: Mapping[str, RowFit]) -> bool:
@@ -346,7 +344,7 @@ def insisted(plant: Plant, left: float, setting: Setting) -> Refit | None:
     if on_bristle(plant) or not free:
         return best
     for _ in range(ONCE_MORE):
-        if not COMPLETE < left <= DECISIVE:
+        if not COMPLETE < left <= ADEQUATE:
             break
         found = closer(plant, setting.logs, setting.drive, setting.rng, 1)
         plant = found.plant  # what has left a minimum for a worse one may find a better one next

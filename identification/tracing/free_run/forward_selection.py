@@ -24,7 +24,7 @@ from identification.estimation.regression.equation_rows import (
     shortened,
 )
 from identification.estimation.regression.row_fit import RowFit, mean_square, rough, settled_fits
-from identification.estimation.structure_fit import MUCH, FittedStructure
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.nudged_search import (
     BREAKS_RANGE,
     CLOSE_RANGE,
@@ -32,7 +32,6 @@ from identification.estimation.windowed_run.nudged_search import (
     FINER_RANGE,
     GROWTH_RANGE,
     MIDWAY_RANGE,
-    NEARLY,
     SHORT_SECONDS,
     SIDES_RANGE,
     SLIDING_RANGE,
@@ -43,7 +42,6 @@ from identification.estimation.windowed_run.nudged_search import (
     nudged_search,
 )
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     Refit,
     briefly,
     even,
@@ -64,10 +62,18 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.tracing.free_run.backward_elimination import (
-    DECISIVE,
+from identification.thresholds import (
+    ADEQUATE,
+    ALONE,
+    ASTRAY,
+    CHANCE_LEVEL,
+    COMPLETE,
     EARNS,
+    HALF_OF_EXCESS,
+    MUCH,
     NEARLY_FOLLOWED,
+)
+from identification.tracing.free_run.backward_elimination import (
     Setting,
     enough,
     known,
@@ -83,10 +89,8 @@ from identification.tracing.free_run.trial_structures import (
     structures,
 )
 from identification.tracing.regression.candidates import EffectCandidate, trial
-from identification.tracing.regression.stepwise import CHANCE_LEVEL, Choice, Step, absorb
+from identification.tracing.regression.stepwise import Choice, Step, absorb
 
-HALF_OF_EXCESS = 0.5  # of the excess misfit before, at most
-ALONE = 0.15  # share of any rival's excess, up to which it is taken too where that is near
 OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
 MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
 GOES_ON = 0.6  # of the misfit before, that the best may leave on the short logs to go on
@@ -96,8 +100,6 @@ AHEAD = 4  # first of those begun, tried where two effects are there already: ea
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
-# Misfit after a first search, of one no longer tried where another is followed by then
-LOST_MISFIT = 3.0
 Report = Callable[[str, float], None]
 
 
@@ -199,8 +201,8 @@ def contest(
         begun += _begun(attempt, setting)
         report("judging", 0.5 * (i + 1) / len(tried))
     # What a sensor shows leads the run astray, so its loss tells nothing.
-    begun.sort(key=lambda one: (one.misfit > NEARLY, one.loss))
-    if quickly and not (begun and begun[0].misfit <= NEARLY):
+    begun.sort(key=lambda one: (one.misfit > ADEQUATE, one.loss))
+    if quickly and not (begun and begun[0].misfit <= ADEQUATE):
         return None
     many = len(choice.steps) > 1
     begun = begun[:AHEAD] if many else begun
@@ -262,9 +264,9 @@ def screening(
         found = _screened(one, setting, promising)
         if found is not None:
             screened.append(found)
-            if found.misfit <= NEARLY:
+            if found.misfit <= ADEQUATE:
                 settled_at = min(settled_at, BEHIND * one.loss)
-                lost = LOST_MISFIT if one.misfit <= NEARLY else lost
+                lost = ASTRAY if one.misfit <= ADEQUATE else lost
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
     return sorted(screened, key=lambda one: one.misfit)
 
@@ -284,7 +286,7 @@ def decisive(before: float, others: Sequence[RunContender]) -> float:
     rival = min((one.misfit for one in others), default=before)
     least = min(before, rival)
     return max(
-        min(DECISIVE, 1.0 + HALF_OF_EXCESS * (before - 1.0)),
+        min(ADEQUATE, 1.0 + HALF_OF_EXCESS * (before - 1.0)),
         min(NEARLY_FOLLOWED, 1.0 + ALONE * (least - 1.0)),
     )
 

@@ -4,12 +4,10 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.refinement import COMPLETE
+from identification.thresholds import COMPLETE, LEAST_SHARE, LUCK_IN_GAIN
 from identification.tracing.free_run.backward_elimination import Setting, fitted, only, seconds
 from identification.tracing.regression.candidates import EffectCandidate
-from identification.tracing.regression.stepwise import LEAST_SHARE, Choice, Step, merit, share
-
-LUCK_IN_GAIN = 10.0  # gain by which two effects that explain equally may differ
+from identification.tracing.regression.stepwise import Choice, Step, merit, share
 
 
 def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:

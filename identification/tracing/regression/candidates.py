@@ -25,11 +25,11 @@ from identification.estimation.regression.effect_columns import (
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
 from identification.estimation.regression.equation_rows import MECHANICAL, stacked
 from identification.estimation.regression.row_fit import RowFit, row_fit, with_sizes
+from identification.thresholds import CALLED
 from identification.tracing.regression.shape_grid import shape_grid
 
 REFINED = 30  # evaluations of the refinement for each parameter
 SUBSTITUTIONS = 4  # of substitution where a contribution depends on the friction itself
-CALLED = 10.0  # criterion that each parameter has to gain, to leave its default
 OUT_OF_BOUNDS = 1e12  # criterion of parameters outside their bounds
 
 

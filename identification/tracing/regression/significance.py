@@ -7,10 +7,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit
+from identification.thresholds import SEARCHED
 from identification.tracing.regression.candidates import EffectCandidate
 
 DRAWS = 200  # of the null hypothesis
-SEARCHED = 2.0  # times the gain of columns at one place: the search over shapes finds more
 
 
 def chance(

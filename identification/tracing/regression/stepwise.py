@@ -32,23 +32,24 @@ from identification.estimation.regression.signals_behind_effects import (
     reached,
     shown_to_true,
 )
+from identification.thresholds import (
+    CARRIES,
+    CHANCE_LEVEL,
+    ELASTIC,
+    LEAST_SHARE,
+    MATERIAL,
+    MOSTLY_EXPLAINED,
+    PENALTY,
+)
 from identification.tracing.regression.candidates import EffectCandidate, best_of
 from identification.tracing.regression.cross_validation import left_out_error
 from identification.tracing.regression.significance import chance
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 MOST_EFFECTS = 4  # effects in one machine
-LEAST_SHARE = 0.25  # of what is missing that an effect has to explain; less is another's shadow
-CHANCE_LEVEL = 0.01  # chance up to which a gain is no luck
-MATERIAL = 0.002  # of the Coulomb level, smallest effect that is spoken of
-CARRIES = 0.95  # of the error on logs left out, that an effect may leave
-MOSTLY_EXPLAINED = 0.55  # of what is missing, where much is left in the end
 SHIFT = 1.0  # of the position's noise
-MATERIAL_RATE = 0.002  # of the spread of dF/dt
-ELASTIC = 0.3  # of the motion seen at rest, that a bristle may leave
 REFUSED = 3  # candidates tried in turn
 HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
-PENALTY = 5.0  # criterion that each parameter more has to gain
 Progress = Callable[[str, float], None]
 
 
@@ -346,7 +347,7 @@ def material(candidate: EffectCandidate, stage: EffectRows, base: Mapping[str, R
         size = contribution_rms(candidate, base, equation, stage.band)
         if equation == MECHANICAL and size > MATERIAL * level:
             return True
-        if equation == ACTUATOR and size > MATERIAL_RATE * float(np.std(base[equation].rows.b)):
+        if equation == ACTUATOR and size > MATERIAL * float(np.std(base[equation].rows.b)):
             return True
         if equation == REST and size > float(np.median(base[equation].rows.sd)):
             return True

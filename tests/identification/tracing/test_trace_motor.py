@@ -13,11 +13,12 @@ from identification.estimation.regression.effect_rows import UNEXPLAINED, with_e
 from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
 from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.estimation.structure_fit import _limit, fitted_structure
-from identification.estimation.windowed_run.refinement import COMPLETE, Refit, misfit, refit
+from identification.estimation.windowed_run.refinement import Refit, misfit, refit
 from identification.estimation.windowed_run.windows import starts, walks
 from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.signals.differentiate import resolution
+from identification.thresholds import COMPLETE
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.result import Trace
 from identification.tracing.trace import trace

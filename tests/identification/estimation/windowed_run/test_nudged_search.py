@@ -26,7 +26,6 @@ from identification.estimation.windowed_run.nudged_search import (
     nudging,
 )
 from identification.estimation.windowed_run.refinement import (
-    COMPLETE,
     even,
     judge,
     loss,
@@ -39,6 +38,7 @@ from identification.estimation.windowed_run.windows import FAST_SHARE, starts
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.thresholds import COMPLETE
 from tests.identification.motor_logs import NINE, made, plant, seen
 
 OFF = Karnopp(3.05, 12.2, 9.9, 81.0, 99.0, 0.004, -0.02, 13.0, -15.5)

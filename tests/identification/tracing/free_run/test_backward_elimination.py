@@ -9,12 +9,11 @@ from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.structure_fit import fitted_structure
-from identification.estimation.windowed_run.refinement import COMPLETE, Refit
+from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Rig
 from identification.model.plant import Plant
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.free_run.backward_elimination import (
-    DECISIVE,
-    WALKED,
     Setting,
     enough,
     equations_explained,
@@ -68,7 +67,7 @@ def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, C
     alone = first_alone(part, setting)
     assert alone is not None and suffices(alone, part, setting)
     assert fewest(part, setting, False)[1].plant is alone.plant  # made once
-    assert not suffices(replace(alone, misfit=1.01 * WALKED), part, setting)
+    assert not suffices(replace(alone, misfit=1.01 * ASTRAY), part, setting)
     missing = replace(part, base=setting.first)  # the spring is not explained
     assert not equations_explained(missing.base) and first_alone(missing, setting) is None
     assert not suffices(None, part, setting)
@@ -256,6 +255,6 @@ def test_without_effects_a_measured_force_is_contested_sooner(
 ) -> None:
     setting, choice = found
     forced = replace(setting, drive="force", plain=replace(setting.plain, misfit=2.0))
-    assert enough(forced, ()) == DECISIVE < WALKED == enough(forced, choice.steps)
+    assert enough(forced, ()) == ADEQUATE < ASTRAY == enough(forced, choice.steps)
     astray = replace(forced, plain=replace(setting.plain, misfit=200.0))
-    assert enough(astray, ()) == DECISIVE < WALKED < enough(astray, choice.steps)
+    assert enough(astray, ()) == ADEQUATE < ASTRAY < enough(astray, choice.steps)

@@ -8,11 +8,12 @@ import pytest
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog, shortened
-from identification.estimation.regression.row_fit import MUCH_IS_LEFT, first_stage, mean_square
+from identification.estimation.regression.row_fit import first_stage, mean_square
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.nudged_search import less_load
-from identification.estimation.windowed_run.refinement import COMPLETE, even
+from identification.estimation.windowed_run.refinement import even
 from identification.log import Rig
+from identification.thresholds import COMPLETE, MUCH_IS_LEFT
 from identification.tracing.free_run.backward_elimination import Setting
 from identification.tracing.free_run.forward_selection import (
     Begun,
