@@ -3,7 +3,8 @@
 Each is a value to which one statistic is compared; numbers that only steer a search stand where it
 is. `benchmarks/ablation.py` shows what each changes on the blind benchmark, off, halved or doubled;
 `benchmarks/blind.py` (seeds below 3100), `nine_parameters.py` (below 600) and `drift.py` (below
-9000) served to choose them. A misfit is a mean square in units of the sensors' noise.
+9000) served to choose them. `tests/identification/test_thresholds.py` holds for each what it
+decides on either side. A misfit is a mean square in units of the sensors' noise.
 """
 
 # Misfit of a free run in windows, chi-square of whole runs: mean squares in units of the noise.

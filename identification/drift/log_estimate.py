@@ -56,9 +56,13 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
         found = fit_imposed(recorded, rng, "as the model in force")
         return _of_fit(found, LIKE * max(model.chi_square, 1.0))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    allowed = FOLLOWED if model.chi_square <= ADEQUATE else LIKE * model.chi_square
     # Of a body that is not led, the force equation alone says that its run is not followed.
-    return _of_fit(found, 0.0 if found.imposed else allowed)
+    return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
+
+
+def allowed_misfit(in_force: float) -> float:
+    """Misfit up to which a log's run is followed; in_force: what the model left of its own."""
+    return FOLLOWED if in_force <= ADEQUATE else LIKE * in_force
 
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:

@@ -90,10 +90,15 @@ def finished(
             forced = recorded_logs(recorded.plain, recorded.rig, "force")
             again = finished(plain_structure(forced, other), forced, settle, report, by="force")
             return replace(again, remarks=(said, *again.remarks))
-    if recorded.drive == "force" and (found.imposed or found.misfit > NO_RUN):
+    if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else f"no free run follows (misfit {found.misfit:.3g})"
         return fit_imposed(recorded, settle, why)
     return settled(found.plant, recorded, found.misfit, settle, report)
+
+
+def is_no_run(misfit: float) -> bool:
+    """Whether a run by the measured force that leaves so much is not the body's own motion."""
+    return misfit > NO_RUN
 
 
 def _with_effects(

@@ -195,13 +195,13 @@ def _over_windows(
     events = _events(plant, recorded)
     covariance = _covariance(near, recorded, values, events)
     samples = rng.multivariate_normal(values, covariance, DRAWN, check_valid="ignore")
-    said = [] if left > ADEQUATE or recorded.drive == "force" else [WINDOWS_ONLY]
+    said = [] if not is_adequate(left) or recorded.drive == "force" else [WINDOWS_ONLY]
     return Spread(
         plant=plant,
         names=names,
         samples=samples,
         chi_square=left,
-        adequate=left <= ADEQUATE,
+        adequate=is_adequate(left),
         noise=(
             float(np.median([one.noise_y for one in recorded.logs])),
             float(np.median([one.noise_F for one in recorded.logs])),
@@ -217,6 +217,11 @@ WINDOWS_ONLY = (
     "the model follows the logs in windows of 2 s from measured states, but not the whole: a stop"
     " turns on less than the noise there, or the logged command has noise of its own"
 )
+
+
+def is_adequate(left: float) -> bool:
+    """Whether a fit of which this mean square is left, in units of the noise, will do."""
+    return left <= ADEQUATE
 
 
 def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Events) -> Array:

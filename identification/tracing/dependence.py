@@ -53,14 +53,15 @@ def explained_by(r: Array, X: Array, block: IntArray) -> tuple[float, Array]:
 
 def dependence(
     r: Array, signals: Mapping[str, Array], up: BoolArray, block: IntArray,
-    each: int = OVERLAPPING, least: float = LEAST_DEPENDENCE,
+    each: int = OVERLAPPING, least: float | None = None,
 ) -> Dependence:  # fmt: skip
     """Signals on which a whitened residual (n,) depends, most of all first.
 
     signals: at the rows, (n,) each; up: moves in positive direction; block: stretches of time,
     left out in turn; each: rows that a level of a signal needs; least: share of the residual from
-    which a signal is named. Each signal may act otherwise in the two directions.
+    which a signal is named, None: the usual. Each signal may act otherwise in the two directions.
     """
+    least = LEAST_DEPENDENCE if least is None else least
     best = {name: smooth_share(r, x, up, block, each) for name, x in signals.items()}
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:

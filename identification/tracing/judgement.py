@@ -9,7 +9,7 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.model.plant import units_of
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, IMPOSED_LEFT, MOST_PLACES
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, IMPOSED_LEFT
 from identification.tracing.constant_force import beyond_friction, constant_remark
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
@@ -18,6 +18,7 @@ from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import (
     at_breakaway,
+    in_pieces,
     in_run,
     places,
     remaining_structure,
@@ -101,8 +102,7 @@ def _doubts(
         carried = share_left(before, after) <= IMPOSED_LEFT
     else:
         carried = not equations_explained(choice.base) or carries(before, after)
-    pieces = places(choice) >= MOST_PLACES
-    pieces = pieces or (chosen.pieces and places(choice) > 1 and model.misfit > COMPLETE)
+    pieces = in_pieces(choice) or (chosen.pieces and places(choice) > 1 and model.misfit > COMPLETE)
     doubts = {
         PIECES: pieces,
         LONGER: not model.imposed and unrepeated(model),

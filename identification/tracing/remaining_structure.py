@@ -26,7 +26,6 @@ from identification.thresholds import (
     ASTRAY,
     COMPLETE,
     IMPOSED_LEFT,
-    LEAST_DEPENDENCE,
     MATERIAL,
     MOST_PLACES,
     MUCH,
@@ -49,7 +48,7 @@ THINNED = 10  # samples of a free run of which one is judged
 CLEARLY = 1.5  # times the share of anything else, that few breakaways must tell
 SLIGHT_SHARE = 0.03  # share of an error's rate or curvature, by thousands of samples no luck
 LEFT_OUT_STRETCHES = 64  # of a log, every eighth of which is left out together
-LEFT_LEAST = {MECHANICAL: MATERIAL, BREAKAWAY: 0.1}  # of the Coulomb level, structure of account
+LEAST_AT_BREAKAWAY = 0.1  # of the Coulomb level, structure of account
 
 
 def remaining_structure(
@@ -78,13 +77,20 @@ def remaining_structure(
             size = float(np.sqrt(left) * np.median(o.rows.sd[keep]))
             whole = _excess(choice.first[equation]) if equation in choice.first else 0.0
             rough = bool(choice.steps) and mean_square(o) > MUCH_IS_LEFT
-            part = ROUGH_LEFT if rough else SHARE_LEFT
-            least = LEFT_LEAST.get(equation, 0.0) * _level(choice)
-            if left < STRUCTURED or size**2 < part * whole or size < least:
+            least = {MECHANICAL: MATERIAL, BREAKAWAY: LEAST_AT_BREAKAWAY}.get(equation, 0.0)
+            if size < least * _level(choice) or is_slight(left, size**2, whole, rough):
                 continue
         if (much := left * np.count_nonzero(keep)) > most:
             best, most = named, much
     return best
+
+
+def is_slight(left: float, square: float, missing: float, rough: bool) -> bool:
+    """Whether structure is of no account: `left` [noise units], `square` of the `missing` [N**2].
+
+    rough: on a machine that no model follows down to the noise.
+    """
+    return left < STRUCTURED or square < (ROUGH_LEFT if rough else SHARE_LEFT) * missing
 
 
 def at_breakaway(choice: Choice) -> Dependence:
@@ -206,6 +212,11 @@ def places(choice: Choice) -> int:
     return sum(_of_place(step) for step in choice.steps)
 
 
+def in_pieces(choice: Choice) -> bool:
+    """Whether the effects of place are too many to be one machine's own."""
+    return places(choice) >= MOST_PLACES
+
+
 def before_pieces(choice: Choice) -> Choice:
     """The choice up to the effect of place that is one too many."""
     many = [i for i, step in enumerate(choice.steps) if _of_place(step)][MOST_PLACES - 1 :]
@@ -267,12 +278,12 @@ def strongest(
 
 
 def in_run(
-    after: FittedStructure, logs: Sequence[MotionLog], drive: Drive, least: float = LEAST_DEPENDENCE
+    after: FittedStructure, logs: Sequence[MotionLog], drive: Drive, least: float | None = None
 ) -> Dependence:  # fmt: skip
     """Signals on which the free run's position error depends, or its rate, or its curvature (the
     force that is missing); or else how large they are, where their sign is a matter of luck.
 
-    least: share of the rate or curvature that a signal explains where it is named.
+    least: share of the rate or curvature that a signal explains where it is named; None: as usual.
     """
     errors: list[Array] = []
     rates: list[Array] = []

@@ -11,7 +11,7 @@ from identification.estimation.structure_fit import FittedStructure, inertia_is_
 from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
-from identification.thresholds import HELPS, MOST_PLACES, MUCH, SHARE_LEFT
+from identification.thresholds import HELPS, MUCH, SHARE_LEFT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
     doubted,
@@ -23,7 +23,7 @@ from identification.tracing.free_run.forward_selection import at_once, judged_fo
 from identification.tracing.free_run.rivals import told_apart
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, Progress, choose
-from identification.tracing.remaining_structure import before_pieces, places
+from identification.tracing.remaining_structure import before_pieces, in_pieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def selection(plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Pro
     alone = first_alone(begun, setting)
     if begun.steps and not suffices(alone, begun, setting):
         choice = choose(start, first, library, rng, report, begun)
-    pieces = not plain.model.imposed and places(choice) >= MOST_PLACES
+    pieces = not plain.model.imposed and in_pieces(choice)
     choice = before_pieces(choice) if pieces else choice
     return Selection(plain, setting, begun, alone, choice, pieces)
 

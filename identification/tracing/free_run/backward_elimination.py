@@ -163,7 +163,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
         model = fitted(part, setting)
         if model.imposed or model.misfit <= followed_up_to(part, setting, whole):
             return part, model
-        if best is None or model.misfit - 1.0 < EARNS * max(best[1].misfit - 1.0, 0.0):
+        if best is None or model.misfit < earned(best[1].misfit):
             best = part, model
     if free and best is not None and best[1].misfit > vain(setting):
         return only(choice, (), [step.candidate for step in choice.steps]), setting.plain
@@ -173,6 +173,11 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
     if best is not None and len(less.steps) == len(best[0].steps):
         return best
     return less, fitted(less, setting) if less.steps else setting.plain
+
+
+def earned(before: float) -> float:
+    """Misfit below which one effect more earns its place; before: what is left without it."""
+    return 1.0 + EARNS * max(before - 1.0, 0.0)
 
 
 def followed_up_to(choice: Choice, setting: Setting, whole: bool) -> float:
@@ -253,7 +258,7 @@ def doubted(
             other = again if again.misfit < other.misfit else other
         beyond = replace(step.stage, band=band(after))
         shows = material(step.candidate, beyond, step.base)
-        if not shows or other.misfit <= NEEDLESS * after.misfit:
+        if not shows or is_needless(other.misfit, after.misfit):
             choice, after = less, other
     return choice, after
 
@@ -271,7 +276,7 @@ def pruned(
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
         bare = keeping(model.plant, stay)
-        if free and misfit(bare, setting.logs, setting.drive) <= DOES_NOTHING * model.misfit:
+        if free and does_nothing(misfit(bare, setting.logs, setting.drive), model.misfit):
             found = refit(bare, setting.logs, setting.drive, prior=even(bare), effort="near")
         elif (
             free
@@ -290,11 +295,21 @@ def pruned(
                 base = replace(base, friction=levelled(base.friction, less.end.theta))
             found = refined_near(base, setting, model.misfit)
             found = insisted(found.plant, found.misfit, setting) or found
-        if found.misfit > max(COMPLETE, NEEDLESS * model.misfit):
+        if found.misfit > COMPLETE and not is_needless(found.misfit, model.misfit):
             continue
         choice = less
         model = FittedStructure(less.end, less.base, found.plant, found.sd, False, found.misfit)
     return choice, model
+
+
+def is_needless(without: float, before: float) -> bool:
+    """Whether a plant fitted anew without an effect leaves about as small a misfit as before."""
+    return without <= NEEDLESS * before
+
+
+def does_nothing(without: float, before: float) -> bool:
+    """Whether a plant leaves the same misfit as before, an effect just taken out of it."""
+    return without <= DOES_NOTHING * before
 
 
 def keeping(plant: Plant, stay: Sequence[Step]) -> Plant:

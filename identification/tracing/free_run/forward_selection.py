@@ -66,15 +66,14 @@ from identification.thresholds import (
     ADEQUATE,
     ALONE,
     ASTRAY,
-    CHANCE_LEVEL,
     COMPLETE,
-    EARNS,
     HALF_OF_EXCESS,
     MUCH,
     NEARLY_FOLLOWED,
 )
 from identification.tracing.free_run.backward_elimination import (
     Setting,
+    earned,
     enough,
     known,
     pruned,
@@ -89,6 +88,7 @@ from identification.tracing.free_run.trial_structures import (
     structures,
 )
 from identification.tracing.regression.candidates import EffectCandidate, trial
+from identification.tracing.regression.significance import by_luck
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
 OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
@@ -210,7 +210,7 @@ def contest(
     short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
     promising = max(NEARLY_FOLLOWED, GOES_ON * short)
     promising = min(promising, earning(choice, model, setting))
-    needed = 1.0 + EARNS * (model.misfit - 1.0) if choice.steps else np.inf
+    needed = earned(model.misfit) if choice.steps else np.inf
     screened = screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
@@ -234,7 +234,7 @@ def contest(
     if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
         return None
     taken = _taken(winner, done, rivals, setting, model.misfit)
-    return taken if taken[0].steps[-1].p_value <= CHANCE_LEVEL else None
+    return None if by_luck(taken[0].steps[-1].p_value) else taken
 
 
 def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
@@ -245,7 +245,7 @@ def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
     if not choice.steps:
         return np.inf
     without = _near(model.plant, model.plant, setting).misfit
-    return np.inf if without <= COMPLETE else 1.0 + EARNS * (without - 1.0)
+    return np.inf if without <= COMPLETE else earned(without)
 
 
 def screening(

@@ -7,7 +7,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.row_fit import RowFit
-from identification.thresholds import SEARCHED
+from identification.thresholds import CHANCE_LEVEL, SEARCHED
 from identification.tracing.regression.candidates import EffectCandidate
 
 DRAWS = 200  # of the null hypothesis
@@ -55,6 +55,11 @@ def chance(
             gains = np.maximum(gains, np.sum((P.T @ noise) ** 2, axis=0))
         largest += gains / stage.scale(equation)
     return float((1 + np.sum(SEARCHED * largest >= best.gain)) / (DRAWS + 1))
+
+
+def by_luck(p_value: float) -> bool:
+    """Whether a gain of this chance where no effect is missing may be luck."""
+    return p_value > CHANCE_LEVEL
 
 
 def effect_directions(o: RowFit, base: RowFit) -> Array:

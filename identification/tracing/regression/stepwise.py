@@ -34,7 +34,6 @@ from identification.estimation.regression.signals_behind_effects import (
 )
 from identification.thresholds import (
     CARRIES,
-    CHANCE_LEVEL,
     ELASTIC,
     LEAST_SHARE,
     MATERIAL,
@@ -43,7 +42,7 @@ from identification.thresholds import (
 )
 from identification.tracing.regression.candidates import EffectCandidate, best_of
 from identification.tracing.regression.cross_validation import left_out_error
-from identification.tracing.regression.significance import chance
+from identification.tracing.regression.significance import by_luck, chance
 
 ABSORBED = frozenset({"constant_force"})  # by unequal F_cp and F_cn, F_sp and F_sn
 MOST_EFFECTS = 4  # effects in one machine
@@ -156,15 +155,20 @@ def trusted(
         without = left_out_error(after, slowest)
         if error > 0 and MECHANICAL in step.candidate.outcomes:
             less = mean_square(base[MECHANICAL]) - mean_square(found[MECHANICAL])
-            carries = without < CARRIES * error
-            explains = less / max(missing, 1e-300)
+            stays = is_trusted(without / error, less / max(missing, 1e-300))
         else:
-            carries, explains = False, share(step.candidate, step.base)
-        if not carries and explains < MOSTLY_EXPLAINED:
+            stays = is_trusted(np.inf, share(step.candidate, step.base))
+        if not stays:
             break
         kept.append(step)
         stage, base, error = after, found, without
     return stage, base, kept
+
+
+def is_trusted(left: float, explained: float) -> bool:
+    """Whether an effect carries over, or explains most; left: share of the error on logs left out,
+    explained: of what is missing."""
+    return left < CARRIES or explained >= MOSTLY_EXPLAINED
 
 
 def _report(report: Progress, turn: int, part: float) -> None:
@@ -237,7 +241,7 @@ def next_step(
     best = worth[0]
     ranked = [best, *(c for c in ranked if c is not best)]
     p_value = chance(best, ranked, scaled, base, rng)
-    if p_value > CHANCE_LEVEL or merit(best) <= 0:
+    if by_luck(p_value) or merit(best) <= 0:
         return None
     return Step(best, p_value, tuple(ranked[1:]), scaled, base)
 

@@ -1,0 +1,488 @@
+"""What each number of `identification.thresholds` decides, a little below it and a little above.
+
+A statistic at four fifths and one at five quarters of a number: halved or doubled, the number lets
+one of the two fall on the wrong side. The numbers are written out here, so that one which has
+slipped shows.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification import thresholds
+from identification.arrays import Array
+from identification.drift.log_estimate import LogEstimate, allowed_misfit
+from identification.drift.practical_margin import moved
+from identification.effects._base import Param
+from identification.effects._library import built_in
+from identification.estimation.estimates import Events, estimates
+from identification.estimation.fit import is_no_run
+from identification.estimation.gauss_newton import Minimum
+from identification.estimation.recorded_logs import chosen_drive
+from identification.estimation.regression.effect_rows import EffectRows
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    FIVE,
+    MECHANICAL,
+    REST,
+    Fitted,
+    MotionLog,
+    Rows,
+)
+from identification.estimation.regression.row_fit import RowFit, rough
+from identification.estimation.settling import is_adequate
+from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.tracing.dependence import dependence
+from identification.tracing.free_run.backward_elimination import (
+    Setting,
+    does_nothing,
+    earned,
+    enough,
+    equations_explained,
+    is_needless,
+    known,
+)
+from identification.tracing.free_run.forward_selection import decisive
+from identification.tracing.free_run.rivals import equal_rivals
+from identification.tracing.model_errors import carries
+from identification.tracing.parameter_drift import changes
+from identification.tracing.recorded_rows import told_by_speed
+from identification.tracing.regression.candidates import EffectCandidate, shaped
+from identification.tracing.regression.significance import by_luck, chance
+from identification.tracing.regression.stepwise import (
+    Choice,
+    Step,
+    gives_way,
+    is_trusted,
+    material,
+    merit,
+)
+from identification.tracing.remaining_structure import in_pieces, is_slight, too_much
+from identification.tracing.result import Errors
+from identification.tracing.structure_search import useless
+from tests.identification.motor_logs import K_A, NOISE, H, plant, seen
+
+N = 100  # rows
+
+
+@cache
+def log() -> MotionLog:
+    """A motor's log of 4 s, to and fro at up to 60 mm/s."""
+    t = H * np.arange(2000.0)
+    y = 0.01 * np.sin(2.0 * np.pi * t) + NOISE * np.random.default_rng(0).standard_normal(2000)
+    u = np.cos(2.0 * np.pi * t)
+    return seen(Log("to and fro", {"t": t, "y": y, "u": u, "F": K_A * u}))
+
+
+def signs(n: int = N) -> Array:
+    """Alternately 1 and -1, (n,)."""
+    return np.resize([1.0, -1.0], n)
+
+
+def rows_of(X: Array, b: Array | None = None) -> Rows:
+    """Rows of noise 1, all of them fast enough to count."""
+    n, k = X.shape
+    right = np.zeros(n) if b is None else b
+    block = np.zeros(n, dtype=np.int64)
+    return Rows(right, X, np.ones(n), block, np.ones(n), FIVE[:k])
+
+
+def leaving(square: float, *, robust: bool = False, criterion: float = 0.0) -> RowFit:
+    """An equation that leaves this mean square, in units of the noise."""
+    size = np.sqrt(0.455 * square if robust else square)
+    fit = Fitted(np.zeros(1), size * signs(), N * square)
+    return RowFit(rows_of(np.zeros((N, 1))), fit, criterion, 0.0, robust)
+
+
+def stage(*, imposed: bool = False, coulomb: float = 10.0) -> EffectRows:
+    """A plant of this Coulomb level [N] in either direction."""
+    theta = np.array([1.0, coulomb, coulomb, 0.0, 0.0])
+    return EffectRows((replace(log(), imposed=imposed),), theta, np.zeros(3), False)
+
+
+def candidate(key: str, gain: float = 0.0, **outcomes: RowFit) -> EffectCandidate:
+    """An effect of the library that gains so much."""
+    effect = built_in()[key]
+    return EffectCandidate(effect, {p.name: p.typical for p in effect.params}, outcomes, gain)
+
+
+def choice(*keys: str, first: float = 1.0, base: float = 1.0) -> Choice:
+    """Effects taken; first, base: what sliding leaves without them and with them."""
+    before, after = {MECHANICAL: leaving(first)}, {MECHANICAL: leaving(base)}
+    steps = tuple(Step(candidate(key), 0.001, (), stage(), before) for key in keys)
+    return Choice(stage(), before, steps, stage(), after)
+
+
+def run(misfit: float, *, imposed: bool = False) -> FittedStructure:
+    """A plant of which the free run leaves this."""
+    return FittedStructure(stage(imposed=imposed), {}, plant(), {}, imposed, misfit)
+
+
+def setting(plain: float, *, first: float = 1.0) -> Setting:
+    """A trace of which the plain run, and its equation of sliding, leave this."""
+    before = {MECHANICAL: leaving(first)}
+    rig, rng = Rig("motor", force_per_command=K_A), np.random.default_rng(0)
+    return Setting([log()], [log()], "command", rig, {}, stage(), before, run(plain), rng)
+
+
+def test_complete() -> None:
+    """Nothing is missing from a run that hardly leaves more than noise, whatever sliding leaves."""
+    lacking = choice(base=9.0)
+    assert not too_much(lacking, run(1.05))
+    assert too_much(lacking, run(1.2))
+
+
+def test_adequate() -> None:
+    """A fit that leaves little more than noise is called adequate."""
+    assert is_adequate(1.2)
+    assert not is_adequate(1.9)
+
+
+def test_followed() -> None:
+    """A search that lost a stop here or there has still followed the log."""
+    found = Minimum(lambda x: x, np.zeros(1), 1.6)
+    assert found.followed
+    assert not replace(found, mean=2.5).followed
+
+
+def test_astray() -> None:
+    """Something is missing from a run that leaves this, though its equations leave but noise."""
+    assert not too_much(choice("spring"), run(2.4))
+    assert too_much(choice("spring"), run(3.75))
+
+
+def test_nearly_followed() -> None:
+    """A plain run that is near is known well enough to search on from it."""
+    assert known(setting(6.4, first=100.0))
+    assert not known(setting(10.0, first=100.0))
+
+
+def test_no_run() -> None:
+    """A run by the measured force that leaves this is given up for the force equation."""
+    assert not is_no_run(40.0)
+    assert is_no_run(62.5)
+
+
+def test_like() -> None:
+    """A model that left twice the noise of its own logs may leave so much more of the next."""
+
+    def follows(left: float) -> bool:
+        allowed = allowed_misfit(2.0)
+        return LogEstimate((), np.zeros(0), np.zeros((0, 0)), {}, left, allowed).follows
+
+    assert follows(6.4)
+    assert not follows(10.0)
+
+
+def test_much() -> None:
+    """An equation that leaves more than so many times its noise (rms) lacks something."""
+    assert equations_explained({MECHANICAL: leaving(1.6**2)})
+    assert not equations_explained({MECHANICAL: leaving(2.5**2)})
+    assert not equations_explained({MECHANICAL: leaving(1.0), ACTUATOR: leaving(2.5**2)})
+
+
+def test_much_is_left() -> None:
+    """A machine of which so much is left is one that no model follows."""
+    assert not rough({MECHANICAL: leaving(20.0)})
+    assert rough({MECHANICAL: leaving(31.0)})
+
+
+def test_inert() -> None:
+    """Inertia shows beside what is left, or it does not and the motion counts as imposed."""
+
+    def of(inertia: float) -> RowFit:
+        fit = Fitted(np.array([inertia]), signs(), 0.0)
+        return RowFit(rows_of(signs()[:, np.newaxis]), fit, 0.0, 0.0)
+
+    assert inertia_is_lost(of(1.6))
+    assert not inertia_is_lost(of(2.5))
+
+
+def test_penalty() -> None:
+    """A spring has two parameters, stiffness and its cube: each has to gain that much."""
+    assert merit(candidate("spring", 8.0)) < 0.0
+    assert merit(candidate("spring", 12.5)) > 0.0
+
+
+def test_called() -> None:
+    """An exponent leaves its default only where the log calls for another one."""
+    free = [Param("delta", "1", 0.5, 4.0, 2.0, "exponent", default=2.0)]
+
+    def found(gain: float) -> float:
+        """The exponent that is settled on, where 1 gains so much over 2."""
+        best = shaped(free, [(0.5, 4.0)], {"delta": 2.0}, lambda x: gain * (x["delta"] - 1.0) ** 2)
+        return best["delta"]
+
+    assert found(8.0) == 2.0
+    assert found(12.5) == pytest.approx(1.0, abs=0.1)
+
+
+def test_chance_level() -> None:
+    """A gain of so small a chance is no luck, of an effect and of a parameter that has drifted."""
+    assert not by_luck(0.008)
+    assert by_luck(0.0125)
+    # The second of two: chances of 0.4 % and 0.7 %, half of the level for each of them.
+    assert moved(np.array([9.0, 2.9]), np.eye(2), np.zeros(2)) == (0, 1)
+    assert moved(np.array([9.0, 2.7]), np.eye(2), np.zeros(2)) == (0,)
+
+
+def test_searched() -> None:
+    """By luck a search over shapes finds more than columns at one place, which gain 4 here."""
+    at_one_row = np.zeros((40, 1))
+    at_one_row[0] = 1.0
+    after = RowFit(rows_of(at_one_row), Fitted(np.zeros(1), 2.0 * signs(40), 0.0), 0.0, 0.0)
+    before = replace(after, rows=rows_of(np.zeros((40, 0))))
+
+    def p_value(gain: float) -> float:
+        one = candidate("spring", gain, mechanical=after)
+        return chance(one, [], stage(), {MECHANICAL: before}, np.random.default_rng(0))
+
+    assert p_value(6.4) == 1.0
+    assert p_value(10.0) < 0.005
+
+
+def test_material() -> None:
+    """What adds less than this share of the Coulomb level, here 10 N, is not spoken of."""
+
+    def matters(size: float) -> bool:
+        before = leaving(4.0)
+        less = replace(before.fit, residual=before.fit.residual - size * signs())
+        one = candidate("spring", mechanical=replace(before, fit=less))
+        return material(one, stage(coulomb=10.0), {MECHANICAL: before})
+
+    assert not matters(0.016)
+    assert matters(0.025)
+
+
+def rivals(gain: float, mine: float) -> int:
+    """Rivals of equal worth, where one gains so much and the effect taken `mine`, of 400."""
+    base = {MECHANICAL: leaving(5.0, criterion=500.0)}
+    rival, own = (candidate("spring", x, mechanical=leaving(1.0)) for x in (gain, mine))
+    return len(equal_rivals(Step(own, 0.001, (rival,), stage(), base)))
+
+
+def test_least_share() -> None:
+    """An effect that explains less of what is missing is no rival, but another's shadow."""
+    assert rivals(80.0, 80.0) == 0
+    assert rivals(125.0, 125.0) == 1
+
+
+def test_luck_in_gain() -> None:
+    """A rival that gains hardly less explains as much, but for luck."""
+    assert rivals(200.0, 208.0) == 1
+    assert rivals(200.0, 212.5) == 0
+
+
+def test_mostly_explained() -> None:
+    """Where much is left, an effect that does not carry over has to explain most of it."""
+    assert not is_trusted(1.0, 0.44)
+    assert is_trusted(1.0, 0.69)
+
+
+def test_carries() -> None:
+    """Where much is left, an effect has to lower the error on the logs left out."""
+    assert is_trusted(0.9, 0.0)
+    assert not is_trusted(0.99, 0.0)
+
+
+def test_elastic() -> None:
+    """A bristle found at rest explains most of the motion there: what creeps is none."""
+
+    def bends(excess: float) -> bool:
+        """Whether one does that leaves so much more than noise, of 100."""
+        at_rest = leaving(1.0 + excess, robust=True, criterion=500.0)
+        one = candidate("presliding", 500.0, rest=at_rest)
+        return gives_way(one, {REST: leaving(101.0, robust=True, criterion=1000.0)})
+
+    assert bends(24.0)
+    assert not bends(37.5)
+
+
+def test_helps() -> None:
+    """Effects that do not explain sliding have to help the run, which lacked 40 without them."""
+    found = choice("spring", first=100.0, base=9.0)
+    assert not useless(found, run(41.0), run(1.0 + 24.0))
+    assert useless(found, run(41.0), run(1.0 + 37.5))
+
+
+def test_earns() -> None:
+    """One effect more has to take its part of what a run lacks, 10 here, or it is left out."""
+    assert 1.0 + 6.4 < earned(11.0) < 1.0 + 10.0
+
+
+def test_half_of_excess() -> None:
+    """An effect that the run alone shows halves what is missing, however little that is."""
+    assert 1.0 + 0.24 < decisive(1.6, ()) < 1.0 + 0.375
+
+
+def test_alone() -> None:
+    """Where much is left, an effect is taken that leaves far less than any other, of 20 here."""
+    assert 1.0 + 2.4 < decisive(21.0, ()) < 1.0 + 3.75
+
+
+def test_uncontested() -> None:
+    """A run with effects that leaves a tenth of what it lacked, 40 here, needs no other."""
+    assert 1.0 + 3.2 < enough(setting(41.0), choice("spring").steps) < 1.0 + 5.0
+
+
+def test_needless() -> None:
+    """An effect goes without which a plant fitted anew follows all but as well."""
+    assert is_needless(5.05, 5.0)
+    assert not is_needless(5.2, 5.0)
+
+
+def test_does_nothing() -> None:
+    """An effect goes without which the plant as it is follows as well, to a trifle."""
+    assert does_nothing(5.005, 5.0)
+    assert not does_nothing(5.02, 5.0)
+
+
+def test_share_left() -> None:
+    """Effects that explain sliding to a hundredth of what was missing are no mere stand-ins."""
+    before, after = run(41.0), run(41.0)
+    assert not useless(choice("spring", first=1000.0, base=8.0), before, after)
+    assert useless(choice("spring", first=1000.0, base=12.5), before, after)
+    # A force of which no effect is known has to be as small beside what was missing.
+    assert is_slight(9.0, 8.0, 1000.0, False)
+    assert not is_slight(9.0, 12.5, 1000.0, False)
+
+
+def errors(train: float, test: float) -> dict[str, Errors]:
+    """Errors of the force [N] on the logs of the fit and on others."""
+    return {name: Errors(x, None, None, None) for name, x in (("train", train), ("test", test))}
+
+
+def test_rough_left() -> None:
+    """Test logs may be left more than the others where it is little of the 10 N**2 missing."""
+    before = errors(3.2, np.sqrt(10.01))
+    assert carries(before, errors(0.1, np.sqrt(0.01 + 0.4)))
+    assert not carries(before, errors(0.1, np.sqrt(0.01 + 0.625)))
+
+
+def test_imposed_left() -> None:
+    """Of an imposed motion effects may leave a good part of what was missing, 100 here."""
+    assert not too_much(choice("spring", first=101.0, base=1.0 + 24.0), run(np.inf, imposed=True))
+    assert too_much(choice("spring", first=101.0, base=1.0 + 37.5), run(np.inf, imposed=True))
+
+
+def test_structured() -> None:
+    """What a signal explains of the rest is structure where it stands out of the noise."""
+    assert is_slight(0.24, 1.0, 1.0, False)
+    assert not is_slight(0.375, 1.0, 1.0, False)
+
+
+def test_carried() -> None:
+    """What explains the logs of the fit explains others too, if not quite as well."""
+    assert carries(errors(1.2, 1.2), errors(1.0, 1.6))
+    assert not carries(errors(1.2, 1.2), errors(1.0, 2.5))
+
+
+def test_least_dependence() -> None:
+    """A rest of which a signal explains this little depends on none."""
+    valve = np.repeat(signs(48), 10)
+
+    def named(share: float) -> tuple[str, ...]:
+        """On what a rest depends, of which a valve's two states explain this share."""
+        r = np.sqrt(share) * valve + np.sqrt(1.0 - share) * signs(480)
+        found = dependence(r, {"valve": valve}, valve < 2.0, np.arange(480) // 60)
+        assert found.explained == pytest.approx(share, rel=0.01)
+        return found.depends_on
+
+    assert named(0.064) == ()
+    assert named(0.1) == ("valve",)
+
+
+def test_most_places() -> None:
+    """Two effects of place may be one machine's own, three are pieces of another law."""
+    assert not in_pieces(choice("spring", "cogging", "stribeck"))
+    assert in_pieces(choice("spring", "cogging", "stribeck", "tight_spot"))
+
+
+def drifted(change: float, n: int, level: float = 10.0) -> bool:
+    """Whether a friction of this level [N] has changed by so much, in n rows of noise 1 N."""
+    X = np.ones((n, 1))
+    before = RowFit(rows_of(X), Fitted(np.array([level]), signs(n), float(n)), 0.0, 0.0)
+    after = rows_of(X, level + change + signs(n))
+    return bool(changes(before, after, np.ones(n, dtype=np.bool_), FIVE[:1], np.zeros(1)))
+
+
+def test_drift_gain() -> None:
+    """A parameter has changed where that is sure: 24 or 37.6 by the rows, of which 2.5 count as
+    one."""
+    assert not drifted(np.sqrt(0.5), 120)
+    assert drifted(np.sqrt(0.5), 188)
+
+
+def test_drift_share() -> None:
+    """However sure, a change that takes away little of the error is none: 8 % or 12.5 %."""
+    assert not drifted(np.sqrt(0.08 / 0.92), 2000)
+    assert drifted(np.sqrt(0.125 / 0.875), 2000)
+
+
+def test_drift_least() -> None:
+    """Nor is a change by this little of the parameter's value: 0.8 % or 1.25 %."""
+    assert not drifted(0.8, 2000, level=100.0)
+    assert drifted(1.25, 2000, level=100.0)
+
+
+def told(name: str, relative: float, events: int) -> bool:
+    """Whether a value is given of this deviation and so many breakaways and crossings."""
+    samples = 10.0 + 10.0 * relative * signs()[:, np.newaxis]
+    happened = Events((events, 9), (events, 9), (900, 900), (1.0, 1.0))
+    found = estimates((name,), np.array([10.0]), samples, happened, False, "log")
+    return found[name].value is not None
+
+
+@pytest.mark.parametrize("name", ["F_sp", "dv_p"])
+def test_events_needed(name: str) -> None:
+    """Fewer breakaways tell no stick limit, and fewer crossings no band."""
+    assert not told(name, 0.01, 2)
+    assert told(name, 0.01, 3)
+
+
+def test_widest_sd() -> None:
+    """A value as unsure as this is not given."""
+    assert told("F_sp", 0.24, 9)
+    assert not told("F_sp", 0.375, 9)
+
+
+def test_speeds_apart() -> None:
+    """Strokes of a rig at much the same speed tell no friction of speed alone."""
+    library = {"stribeck": built_in()["stribeck"]}
+
+    def tried(ratio: float) -> bool:
+        speed = np.repeat([1.0, ratio], 40)
+        rig = replace(log(), speed=speed, up=signs(80) > 0, imposed=True)
+        return bool(told_by_speed(library, [rig])[0])
+
+    assert not tried(3.2)
+    assert tried(5.0)
+
+
+def test_linear_actuator() -> None:
+    """The command drives the run where a linear actuator explains some of the force's rate."""
+
+    def drive(left: float) -> Drive:
+        """Of a log whose force follows the command's integral, but for this share of its rate."""
+        t = H * np.arange(4000.0)
+        command, other = (2.0 * np.pi * f for f in (1.0, 1.5))  # rad/s
+        force = np.sqrt(1.0 - left**2) * np.sin(command * t) / command
+        force = force + left * np.sin(other * t) / other
+        y = 1e-2 * np.sin(2.0 * np.pi * 0.25 * t)
+        one = Log("valve", {"t": t, "u": np.cos(command * t), "F": 1e3 * force, "y": y})
+        return chosen_drive([one], Rig("force"), None)
+
+    assert drive(0.9) == "command"
+    assert drive(0.99) == "force"
+
+
+def test_every_threshold_has_a_test() -> None:
+    """A new number is held on either side too: by `test_<its name>` above."""
+    numbers = {f"test_{name.lower()}" for name in vars(thresholds) if name.isupper()}
+    tests = {name for name in globals() if name.startswith("test_")}
+    assert tests - numbers == {"test_every_threshold_has_a_test"}
+    assert numbers - tests == set()
