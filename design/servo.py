@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
 from design.filters import PASS, CompensatorFilters, sampled
-from design.loop import ForcePI, LoopNoise, LoopRun, prepared_loop
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
 from design.pid import INTEGRATOR
 from design.polynomial import divide, trim
@@ -130,9 +130,8 @@ def simulate_servo(
     cannot be followed.
     """
     ratio = max(1, round(servo.linear.h / h))
-    loop, p = prepared_loop(
-        [plant], servo.linear, servo.force, reference, h, noise, servo.control_limit, start, ratio
-    )
+    cascade = Cascade(servo.linear, servo.force, servo.control_limit)
+    loop, p = prepared_loop([plant], cascade, reference, h, noise, start, ratio)
     n, table = len(loop.reference), effect_table(plant.effects)
     codes = np.where(table.codes == ACTUATOR, -1, table.codes) if loop.motor else table.codes
     base, gain = effect_signals(plant.effects, signals or {}, n)

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -29,6 +30,25 @@ Tracking = Literal["all-poles", "keep-dominant", "unit-static", "R"]
 LEAST_DAMPING = 0.1  # of a plant zero that the controller may cancel
 NEAREST_TO_ONE = 1e-12
 LEAST = 1e-150
+ONE = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class RSTSpecification:
+    """What an RST loop is asked for.
+
+    dominant: (w_n [rad/s], zeta). auxiliary: further poles as values of z, the rest are at 0. H_R,
+    H_S: fixed parts of R and S (integrator: H_S = [1, -1]). T: see `tracking_polynomial`. cancel:
+    factor of B that S cancels (a pole of the loop then). model: (w_n, zeta) of the tracking model.
+    """
+
+    dominant: Sequence[float]
+    auxiliary: ArrayLike = ()
+    H_R: ArrayLike = ONE
+    H_S: ArrayLike = ONE
+    T: Tracking = "all-poles"
+    cancel: ArrayLike = ONE
+    model: Sequence[float] | None = None
 
 
 def normalised_plant(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:

@@ -16,7 +16,7 @@ from design.margins import Margins, margins
 from design.pid import PID, design_pid, pid_gains
 from design.polynomial import ComplexArray, frequency_and_damping, roots, trim
 from design.rst import RST, design_rst
-from design.specification import normalised_plant, pole_pair
+from design.specification import RSTSpecification, normalised_plant, pole_pair
 from design.tracking import (
     Demand,
     Followed,
@@ -110,11 +110,8 @@ def tune_rst(
     def design(
         dominant: tuple[float, float], auxiliary: tuple[complex, ...]
     ) -> tuple[RST, PID | None]:
-        controller = design_rst(
-            A, B, h, dominant=dominant, auxiliary=auxiliary, H_R=[1.0, 1.0], H_S=H_S,
-            T="unit-static",
-        )  # fmt: skip
-        return controller, None
+        wanted = RSTSpecification(dominant, auxiliary, H_R=[1.0, 1.0], H_S=H_S, T="unit-static")
+        return design_rst(A, B, h, wanted), None
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
@@ -76,14 +76,13 @@ def _in_loop(
     assert loop is not None
     force = ForcePI(loop.force.k_i, loop.force.T_i) if loop.force else None
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
-    parts = (recipe.plant, _position(recipe), force, reference, recipe.h)
+    cascade = Cascade(_position(recipe), force, loop.control_limit)
+    parts = (recipe.plant, cascade, reference, recipe.h)
     run: LoopRun
     if recipe.plant.effects:
-        run = simulate_effect_loop(
-            *parts, noise=noise, control_limit=loop.control_limit, signals=chambers
-        )
+        run = simulate_effect_loop(*parts, noise=noise, signals=chambers)
     else:
-        run = simulate_loop(*parts, noise=noise, control_limit=loop.control_limit)
+        run = simulate_loop(*parts, noise=noise)
     return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
 
 
