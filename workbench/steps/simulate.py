@@ -27,8 +27,8 @@ from workbench.cards.units import Motion
 from workbench.documents.model import as_number
 from workbench.files import ABSURD
 
-PASSES = 30  # of an open loop in which friction follows pressures, and they the force
-SETTLED = 1e-9  # relative change of the force from which it has settled
+MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
+SETTLED_CHANGE = 1e-9  # relative change of the force from which it has settled
 Chambers = dict[str, OfForce]
 
 
@@ -110,16 +110,16 @@ def _open_run(recipe: Recipe, u: Array, chambers: Chambers) -> FreeRun:
     blank = Log("recipe", {"t": recipe.t, "y": np.zeros(len(u)), "u": u, "F": force})
     start = (0.0, 0.0, float(force[0]))
     circular = any(name in chambers for one in recipe.plant.effects for name in one.effect.signals)
-    for _ in range(PASSES):
+    for _ in range(MOST_PASSES):
         known = blank.with_signals(**{name: of(force) for name, of in chambers.items()})
         run = free_run(recipe.plant, known, start, "command")
         change = float(np.max(np.abs(run.F - force)))
-        if not circular or change <= SETTLED * float(np.max(np.abs(run.F))):
+        if not circular or change <= SETTLED_CHANGE * float(np.max(np.abs(run.F))):
             return run
         force = run.F
     raise BadModel(
-        f"pressures and friction do not agree after {PASSES} passes (the force still changes by"
-        f" {change:.3g} N); close the loop, or weaken the effect of the pressures"
+        f"pressures and friction do not agree after {MOST_PASSES} passes (the force still changes"
+        f" by {change:.3g} N); close the loop, or weaken the effect of the pressures"
     )
 
 
