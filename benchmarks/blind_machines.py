@@ -19,7 +19,7 @@ from typing import cast
 import numpy as np
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise, LoopRun
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce
 from design.pid import pid_to_rst
 from design.rst import RST
@@ -253,9 +253,8 @@ def simulated(
     noise = LoopNoise.draw(n, NOISE_Y, 0.0 if one.kind == "motor" else NOISE_F, noise_rng)
     at = chambers(one, n, stream(seed, one.name, part, "pressure"))
     plant = Plant(friction or one.friction, one.drive, effects)
-    run = simulate_effect_loop(
-        plant, one.controller(H), one.force, r, H, noise=noise, control_limit=one.limit, signals=at
-    )
+    cascade = Cascade(one.controller(H), one.force, one.limit)
+    run = simulate_effect_loop(plant, cascade, r, H, noise=noise, signals=at)
     true = {key: np.asarray(of(run.F), dtype=np.float64) for key, of in at.items()}
     signals: dict[str, Array] = {"t": run.t, "r": run.r, "y": run.y_measured}
     # A motor's logged force is its command's: dead zone and delay do not show in it.

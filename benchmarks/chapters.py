@@ -24,7 +24,7 @@ from identification.log import Log
 from identification.tracing.result import Errors, FoundEffect, Trace
 from workbench.cards.card import load_card
 from workbench.cards.units import Motion
-from workbench.logs.fetch import VARIABLE, card_path
+from workbench.logs.fetch import DATA_VARIABLE, card_path
 from workbench.logs.sources import Sources, read_sources
 from workbench.steps.trace import Traced, effect_estimates, trace_sources
 
@@ -84,7 +84,7 @@ def _split(card: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 def data_folder() -> Path:
     """Folder of the measured sets: WORKBENCH_DATA, else ../shared/data beside the checkout."""
-    return Path(os.environ.setdefault(VARIABLE, str(ROOT.parent / "shared" / "data")))
+    return Path(os.environ.setdefault(DATA_VARIABLE, str(ROOT.parent / "shared" / "data")))
 
 
 def traced(chapter: Chapter) -> Traced:

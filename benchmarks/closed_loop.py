@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from design.loop import ForcePI, LoopNoise, loop_costs, prepared_loop, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, loop_costs, prepared_loop, simulate_loop
 from design.loop_kernels import RECORDS, loop_kernel, loops_kernel
 from design.pid import pid_to_rst
 from identification.arrays import Array, IntArray
@@ -27,7 +27,7 @@ ACTUATOR = Actuator(19530.0, 10405.0)
 H = 1e-3
 LIMIT = 5.0
 CONTROLLER = pid_to_rst(1754.0, 0.072, 0.018, 0.2, H)
-FORCE = ForcePI(0.02, 0.05)
+CASCADE = Cascade(CONTROLLER, ForcePI(0.02, 0.05), LIMIT)
 MANY = 64
 ROUNDS = 12
 
@@ -84,8 +84,8 @@ def main(n: int) -> None:
     spread = 1.0 + 0.1 * rng.uniform(-1.0, 1.0, (MANY, 9))
     one = Plant(TABLE_1, ACTUATOR)
     many = [Plant(Karnopp.from_array(TABLE_1.array * row), ACTUATOR) for row in spread]
-    loop, p_1 = prepared_loop([one], CONTROLLER, FORCE, reference, H, noise, LIMIT)
-    _, p = prepared_loop(many, CONTROLLER, FORCE, reference, H, noise, LIMIT)
+    loop, p_1 = prepared_loop([one], CASCADE, reference, H, noise)
+    _, p = prepared_loop(many, CASCADE, reference, H, noise)
     n_y, n_f = (np.ascontiguousarray(a[:, 0]) for a in (loop.noise.y, loop.noise.F))
     settings = np.array([H, *loop.R, *loop.S[1:], *loop.pi, LIMIT])
     tables_1, tables = tables_of(p_1), tables_of(p)
@@ -117,9 +117,7 @@ def main(n: int) -> None:
                 "1 plant, C": (lambda: c.loop_one(*given, *signals, size, *results), n),
                 "1 plant, ours": (ours_one, n),
                 "1 plant, simulate_loop": (
-                    lambda: simulate_loop(
-                        one, CONTROLLER, FORCE, reference, H, noise=noise, control_limit=LIMIT
-                    ),
+                    lambda: simulate_loop(one, CASCADE, reference, H, noise=noise),
                     n,
                 ),
                 "1 plant, C, 10 Euler sub-steps": (
@@ -134,9 +132,7 @@ def main(n: int) -> None:
                 ),
                 "64 plants, ours": (ours_many, n * MANY),
                 "64 plants, loop_costs": (
-                    lambda: loop_costs(
-                        many, CONTROLLER, FORCE, reference, H, noise=noise, control_limit=LIMIT
-                    ),
+                    lambda: loop_costs(many, CASCADE, reference, H, noise=noise),
                     n * MANY,
                 ),
             }

@@ -10,9 +10,10 @@ from identification.arrays import Array
 from identification.compiled import compiled_inline
 from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
+from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
 
-# A compensator as the kernels take it.
-F_CP, F_CN, F_VP, F_VN, DV_P, DV_N, F_SP, F_SN, DV_P1, DV_N1, E_T, INNER, STICK = range(13)
+# A compensator as the kernels take it: the nine in the order of karnopp.NAMES, then its own.
+DV_P1, DV_N1, E_T, INNER, STICK = range(9, 14)
 Inner = Literal["zero-velocity", "stick", "none"]
 INNERS: tuple[Inner, ...] = ("zero-velocity", "stick", "none")
 INNER_ZERO, INNER_STICK, INNER_NONE = range(3)
@@ -20,7 +21,7 @@ INNER_ZERO, INNER_STICK, INNER_NONE = range(3)
 
 @compiled_inline
 def compensation_force(law: Array, v: float, e_y: float, F: float) -> float:
-    """F_comp [N] of the compensator `law` (13,) at velocity v [m/s], error e_y [m], force F [N].
+    """F_comp [N] of the compensator `law` (14,) at velocity v [m/s], error e_y [m], force F [N].
 
     Source: paper, eqs. (1)-(4).
     """
@@ -79,12 +80,12 @@ class Compensator:
 
     @property
     def law(self) -> Array:
-        """The compensator as `compensation_force` takes it, (13,)."""
+        """The compensator as `compensation_force` takes it, (14,)."""
         p, viscous = self.friction, float(self.viscous)
+        slip = [p.F_cp, p.F_cn, viscous * p.F_vp, viscous * p.F_vn]
         bands = [p.dv_p, p.dv_n, p.F_sp, p.F_sn, self.dv_p1, self.dv_n1]
         terms = [float(INNERS.index(self.inner)), float(self.stick)]
-        slip = [p.F_cp, p.F_cn, viscous * p.F_vp, viscous * p.F_vn]
-        return np.array([*slip, *bands, self.e_T, *terms])
+        return np.array([p.m, *slip, *bands, self.e_T, *terms])
 
     def force(self, v: float, e_y: float, F: float) -> float:
         """F_comp [N] at velocity v [m/s], position error e_y = r - y [m], applied force F [N]."""

@@ -47,6 +47,19 @@ class ForcePI:
 
 
 @dataclass(frozen=True, eq=False)
+class Cascade:
+    """Position controller above a force loop, the command |u| [V] at most `control_limit`.
+
+    position: (T r - R y)/S gives the force reference [N], with a Motor the command [V]; force:
+    from the force error to the command, None with a Motor.
+    """
+
+    position: RST
+    force: ForcePI | None
+    control_limit: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
 class LoopNoise:
     """Noise of the sensors, added to y [m] and F [N] at every sample: (n,), or (n, plants)."""
 
@@ -105,30 +118,24 @@ class PreparedLoop:
 
 def simulate_loop(
     plant: Plant,
-    controller: RST,
-    force_controller: ForcePI | None,
+    cascade: Cascade,
     reference: ArrayLike,
     h: float,
     *,
     noise: LoopNoise | None = None,
-    control_limit: float | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> LoopRun:
     """The loop of figure 5 (figure 10) with an Actuator, of figure 1 with a Motor.
 
-    controller: (T r - R y)/S gives the force reference [N], with a Motor the command [V], sampled
-    at h [s]; force_controller: from the force error to the command, None with a Motor; reference:
-    r [m], (n,); control_limit: |u| [V] at most. start: y [m], v [m/s], F [N] at the first sample,
-    before which the loop was at rest with r = y and no command.
+    cascade: sampled at h [s]; reference: r [m], (n,); start: y [m], v [m/s], F [N] at the first
+    sample, before which the loop was at rest with r = y and no command.
 
     A clipped command holds the PI's integral while the error would drive it further; with a Motor
     the controller's recursion takes the command as clipped. The plant is stepped exactly: the run
     does not depend on an internal step. Raises BadModel where the parts do not fit together.
     """
     _refuse_effects([plant])
-    loop, p = prepared_loop(
-        [plant], controller, force_controller, reference, h, noise, control_limit, start
-    )
+    loop, p = prepared_loop([plant], cascade, reference, h, noise, start)
     return one_run(loop, p, h)
 
 
@@ -155,23 +162,19 @@ def one_run(loop: PreparedLoop, p: Array, h: float) -> LoopRun:
 
 def simulate_loops(
     plants: Sequence[Plant],
-    controller: RST,
-    force_controller: ForcePI | None,
+    cascade: Cascade,
     reference: ArrayLike,
     h: float,
     *,
     noise: LoopNoise | None = None,
-    control_limit: float | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
 ) -> LoopRun:
-    """`simulate_loop` for many plants under one controller, all at once: traces (n, plants).
+    """`simulate_loop` for many plants under one cascade, all at once: traces (n, plants).
 
     noise: (n,) for all plants, or (n, plants). All plants have an Actuator, or all a Motor.
     """
     _refuse_effects(plants)
-    loop, p = prepared_loop(
-        plants, controller, force_controller, reference, h, noise, control_limit, start
-    )
+    loop, p = prepared_loop(plants, cascade, reference, h, noise, start)
     traces, _ = _many(p, loop, h, (0, 0), record=True)
     keep = traces[:, :, : len(plants)]
     y, F = keep[RECORD_Y], keep[RECORD_F]
@@ -190,13 +193,11 @@ def simulate_loops(
 
 def loop_costs(
     plants: Sequence[Plant],
-    controller: RST,
-    force_controller: ForcePI | None,
+    cascade: Cascade,
     reference: ArrayLike,
     h: float,
     *,
     noise: LoopNoise | None = None,
-    control_limit: float | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     window: tuple[int, int] | None = None,
 ) -> LoopCosts:
@@ -205,9 +206,7 @@ def loop_costs(
     window: first sample and the one after the last; all samples where it is None.
     """
     _refuse_effects(plants)
-    loop, p = prepared_loop(
-        plants, controller, force_controller, reference, h, noise, control_limit, start
-    )
+    loop, p = prepared_loop(plants, cascade, reference, h, noise, start)
     _, costs = _many(p, loop, h, window or (0, len(loop.feed)), record=False)
     return LoopCosts(costs[0, : len(plants)], costs[1, : len(plants)])
 
@@ -260,12 +259,10 @@ def _actuation(plant: Plant) -> tuple[float, float]:
 
 def prepared_loop(
     plants: Sequence[Plant],
-    controller: RST,
-    force_controller: ForcePI | None,
+    cascade: Cascade,
     reference: ArrayLike,
     h: float,
     noise: LoopNoise | None = None,
-    control_limit: float | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     ratio: int = 1,
 ) -> tuple[PreparedLoop, Array]:
@@ -274,14 +271,15 @@ def prepared_loop(
     ratio: samples h of the force loop in one of the position controller. Raises BadModel where the
     parts do not fit together.
     """
-    r = frozen(reference)
+    r, controller = frozen(reference), cascade.position
+    force, limit = cascade.force, cascade.control_limit
     motors = {isinstance(plant.actuator, Motor) for plant in plants}
     if len(motors) != 1:
         raise BadModel(
             f"{len(plants)} plants, of {len(motors)} kinds: need one or more of one kind"
         )
     motor = motors.pop()
-    if motor == (force_controller is not None):
+    if motor == (force is not None):
         need = "no force controller" if motor else "a force controller"
         raise BadModel(
             f"the loop of a plant with {'a motor' if motor else 'an actuator'} has {need}"
@@ -292,10 +290,10 @@ def prepared_loop(
         )
     if r.ndim != 1 or r.size == 0 or not np.all(np.isfinite(r)):
         raise BadModel(f"reference of shape {r.shape}: need finite values, one per sample")
-    if control_limit is not None and not control_limit > 0:
-        raise BadModel(f"control limit {control_limit:g} V, must be > 0")
+    if limit is not None and not limit > 0:
+        raise BadModel(f"control limit {limit:g} V, must be > 0")
     R, S, x = _observer_form(controller, start[0])
-    k_i, T_i = (force_controller.k_i, force_controller.T_i) if force_controller else (0.0, 1.0)
+    k_i, T_i = (force.k_i, force.T_i) if force else (0.0, 1.0)
     loop = PreparedLoop(
         motor=motor,
         ratio=ratio,
@@ -305,7 +303,7 @@ def prepared_loop(
         S=S,
         x=x,
         pi=(k_i, k_i * h / T_i),
-        limit=math.inf if control_limit is None else control_limit,
+        limit=math.inf if limit is None else limit,
         noise=checked_noise(noise, len(r), len(plants), motor),
         start=(0.0 + start[0], 0.0 + start[1], 0.0 + start[2]),
     )

@@ -11,9 +11,9 @@ from identification.arrays import Array, IntArray
 from identification.compiled import compiled, compiled_inline
 from identification.simulation.karnopp_lanes import (
     GAIN,
-    ROWS,
     V_OLD,
     WIDTH,
+    WORK_ROWS,
     F,
     V,
     Y,
@@ -41,9 +41,10 @@ from identification.simulation.karnopp_step import (
 
 Leading = tuple[float, float, float, float, float]
 # Rows that a loop adds to the work array of a block, the last being the controller's state.
-MEASURED, WANTED, INTEGRAL, NOISE_Y, NOISE_F, ERRORS, COMMANDS, U, Y_OLD, F_OLD, STATE = range(
-    ROWS, ROWS + 11
-)
+(
+    Y_MEASURED, RST_OUTPUT, INTEGRAL, Y_NOISE, F_NOISE, SQUARED_ERROR, SQUARED_COMMAND,
+    U_OLD, Y_OLD, F_OLD, RST_STATE,
+) = range(WORK_ROWS, WORK_ROWS + 11)  # fmt: skip
 # What a block records.
 RECORD_Y, RECORD_F, RECORD_V, RECORD_U, RECORD_MODE = range(5)
 RECORDS = 5
@@ -171,20 +172,20 @@ def motor_kernel(
 def shift_lane(s: Array, i: int, leading: Leading, y: float, u: float) -> None:
     """`shift` of lane `i`, the first two entries; a PID has no more."""
     _, r_1, r_2, s_1, s_2 = leading
-    at = STATE * WIDTH + i
+    at = RST_STATE * WIDTH + i
     s[at] = s[at + WIDTH] - r_1 * y - s_1 * u
     s[at + WIDTH] = s[at + 2 * WIDTH] - r_2 * y - s_2 * u
-    s[MEASURED * WIDTH + i] = y
-    s[WANTED * WIDTH + i] = u
+    s[Y_MEASURED * WIDTH + i] = y
+    s[RST_OUTPUT * WIDTH + i] = u
 
 
 @compiled_inline
 def shift_rest(s: Array, R: Array, S: Array, lanes: int) -> None:
     """`shift` of all lanes, the entries from the third on."""
     for j in range(2, len(R) - 1):
-        r_j, s_j, x = R[j + 1], S[j + 1], (STATE + j) * WIDTH
+        r_j, s_j, x = R[j + 1], S[j + 1], (RST_STATE + j) * WIDTH
         for i in range(lanes):
-            y, u = s[MEASURED * WIDTH + i], s[WANTED * WIDTH + i]
+            y, u = s[Y_MEASURED * WIDTH + i], s[RST_OUTPUT * WIDTH + i]
             s[x + i] = s[x + WIDTH + i] - r_j * y - s_j * u
 
 
@@ -202,15 +203,15 @@ def record_sample(s: Array, modes: IntArray, base: int, k: int, traces: Array) -
         traces[RECORD_Y, k, base + i] = s[Y_OLD * WIDTH + i]
         traces[RECORD_V, k, base + i] = s[V_OLD * WIDTH + i]
         traces[RECORD_F, k, base + i] = s[F_OLD * WIDTH + i]
-        traces[RECORD_U, k, base + i] = s[U * WIDTH + i]
+        traces[RECORD_U, k, base + i] = s[U_OLD * WIDTH + i]
         traces[RECORD_MODE, k, base + i] = modes[i]
 
 
 @compiled_inline
 def count(s: Array, i: int, error: float, u: float, weight: float) -> None:
     """Add the squares to the sums of lane `i`."""
-    s[ERRORS * WIDTH + i] += weight * (error * error)
-    s[COMMANDS * WIDTH + i] += weight * (u * u)
+    s[SQUARED_ERROR * WIDTH + i] += weight * (error * error)
+    s[SQUARED_COMMAND * WIDTH + i] += weight * (u * u)
 
 
 @compiled
@@ -245,19 +246,19 @@ def march_loop(
         n_y = noise_y[k, 0] if common_y else 0.0
         n_f = noise_f[k, 0] if common_f else 0.0
         if not common_y:
-            draw_noise(s, NOISE_Y, noise_y, k, lanes)
+            draw_noise(s, Y_NOISE, noise_y, k, lanes)
         if not common_f:
-            draw_noise(s, NOISE_F, noise_f, k, lanes)
+            draw_noise(s, F_NOISE, noise_f, k, lanes)
         for i in range(WIDTH):
             y, force = s[Y * WIDTH + i], s[F * WIDTH + i]
-            measured = y + (n_y + s[NOISE_Y * WIDTH + i])
-            wanted = fed - leading[0] * measured + s[STATE * WIDTH + i]
-            felt = force + (n_f + s[NOISE_F * WIDTH + i])
+            measured = y + (n_y + s[Y_NOISE * WIDTH + i])
+            wanted = fed - leading[0] * measured + s[RST_STATE * WIDTH + i]
+            felt = force + (n_f + s[F_NOISE * WIDTH + i])
             u, s[INTEGRAL * WIDTH + i] = force_command(
                 wanted, felt, s[INTEGRAL * WIDTH + i], k_p, k_int, limit
             )
             shift_lane(s, i, leading, measured, wanted)
-            s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U * WIDTH + i] = y, force, u
+            s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U_OLD * WIDTH + i] = y, force, u
             count(s, i, r - y, u, weight)
             flagged |= advance(s, i, h, force, s[GAIN * WIDTH + i] * u)
         shift_rest(s, R, S, lanes)
@@ -292,14 +293,14 @@ def march_motor(
         fed, r, weight, flagged = feed[k], reference[k], weights[k], 0
         n_y = noise_y[k, 0] if common_y else 0.0
         if not common_y:
-            draw_noise(s, NOISE_Y, noise_y, k, lanes)
+            draw_noise(s, Y_NOISE, noise_y, k, lanes)
         for i in range(WIDTH):
             y = s[Y * WIDTH + i]
-            measured = y + (n_y + s[NOISE_Y * WIDTH + i])
-            u = min(max(fed - leading[0] * measured + s[STATE * WIDTH + i], -limit), limit)
+            measured = y + (n_y + s[Y_NOISE * WIDTH + i])
+            u = min(max(fed - leading[0] * measured + s[RST_STATE * WIDTH + i], -limit), limit)
             force = s[GAIN * WIDTH + i] * u
             shift_lane(s, i, leading, measured, u)
-            s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U * WIDTH + i] = y, force, u
+            s[Y_OLD * WIDTH + i], s[F_OLD * WIDTH + i], s[U_OLD * WIDTH + i] = y, force, u
             s[F * WIDTH + i] = force
             count(s, i, r - y, u, weight)
             outside = (force < s[F_LO * WIDTH + i]) | (force > s[F_HI * WIDTH + i])
@@ -345,7 +346,7 @@ def loops_kernel(
     the squared error and command, weighted by weights (n,).
     """
     _, modes, tables = work_space()
-    s = np.zeros((STATE + len(x)) * WIDTH)
+    s = np.zeros((RST_STATE + len(x)) * WIDTH)
     for base in range(0, len(p), WIDTH):
         plants = p[base : base + WIDTH]
         s[:] = 0.0
@@ -353,7 +354,7 @@ def loops_kernel(
         for i in range(WIDTH):
             place(s, modes, tables, plants, i, start[0], start[1], start[2])
             for j in range(len(x)):
-                s[(STATE + j) * WIDTH + i] = x[j]
+                s[(RST_STATE + j) * WIDTH + i] = x[j]
         block = (plants, tables, s, modes, h, reference, weights, feed, R, S)
         n_y = noise_y[min(base // WIDTH, len(noise_y) - 1)]
         n_f = noise_f[min(base // WIDTH, len(noise_f) - 1)]
@@ -361,5 +362,5 @@ def loops_kernel(
             march_motor(*block, limit, n_y, base, traces)
         else:
             march_loop(*block, pi, limit, n_y, n_f, base, traces)
-        costs[0, base : base + WIDTH] = s[ERRORS * WIDTH : (ERRORS + 1) * WIDTH]
-        costs[1, base : base + WIDTH] = s[COMMANDS * WIDTH : (COMMANDS + 1) * WIDTH]
+        costs[0, base : base + WIDTH] = s[SQUARED_ERROR * WIDTH : (SQUARED_ERROR + 1) * WIDTH]
+        costs[1, base : base + WIDTH] = s[SQUARED_COMMAND * WIDTH : (SQUARED_COMMAND + 1) * WIDTH]

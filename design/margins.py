@@ -14,7 +14,7 @@ from identification.errors import BadSpecification
 
 Curve = Callable[[Array], Array]
 ROUNDING = 64 * float(np.finfo(np.float64).eps)
-PASSES, POINTS = 10, 33  # each pass narrows a bracket 16 times
+BRACKET_PASSES, BRACKET_POINTS = 10, 33  # each pass narrows a bracket 16 times
 
 
 @dataclass(frozen=True, eq=False)
@@ -190,12 +190,15 @@ def _maximum(curve: Curve, grid: Array) -> tuple[float, float]:
     index = index[np.argsort(-value[index])][:32]
     low, high = grid[np.maximum(index - 1, 0)], grid[np.minimum(index + 1, grid.size - 1)]
     best, place = float(value.max()), float(grid[value.argmax()])
-    for _ in range(PASSES):
-        theta = np.linspace(low, high, POINTS, axis=1)
+    for _ in range(BRACKET_PASSES):
+        theta = np.linspace(low, high, BRACKET_POINTS, axis=1)
         values = curve(theta.ravel()).reshape(theta.shape)
         k = values.argmax(axis=1)
         rows = np.arange(k.size)
-        low, high = theta[rows, np.maximum(k - 1, 0)], theta[rows, np.minimum(k + 1, POINTS - 1)]
+        low, high = (
+            theta[rows, np.maximum(k - 1, 0)],
+            theta[rows, np.minimum(k + 1, BRACKET_POINTS - 1)],
+        )
         top = int(values.max(axis=1).argmax())
         if values[top, k[top]] > best:
             best, place = float(values[top, k[top]]), float(theta[top, k[top]])
@@ -232,8 +235,8 @@ def _zeros(curve: Curve, grid: Array, noise: float) -> Array:
 def _narrow(curve: Curve, low: Array, high: Array, sign: Array) -> Array:
     """The zeros of the curve in the brackets low to high, `sign` being the sign at low."""
     rows = np.arange(low.size)
-    for _ in range(PASSES if low.size else 0):
-        theta = np.linspace(low, high, POINTS, axis=1)
+    for _ in range(BRACKET_PASSES if low.size else 0):
+        theta = np.linspace(low, high, BRACKET_POINTS, axis=1)
         values = curve(theta.ravel()).reshape(theta.shape)
         other = np.sign(values) != sign[:, None]
         other[:, -1] = True

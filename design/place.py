@@ -16,6 +16,7 @@ from design.polynomial import (
     from_roots,
     root_error,
 )
+from design.specification import ONE
 from identification.arrays import Array
 from identification.errors import BadSpecification
 
@@ -24,7 +25,6 @@ SUSPECT_PIVOT = 1e-12  # below this the equation may be singular: look for a com
 CERTAIN_DISTANCE = 1e-6
 LOST_DIGITS = 1e-6  # relative error of P that float64 rounding of R and S alone may cause
 NEARLY_SAME_ROOT = 1e-6
-ONE = (1.0,)
 
 
 def solve_diophantine(

@@ -1,12 +1,11 @@
 """The RST controller u = (T r - R y)/S, by pole placement."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from design.place import ONE, solve_diophantine
+from design.place import solve_diophantine
 from design.polynomial import (
     ComplexArray,
     add,
@@ -19,7 +18,7 @@ from design.polynomial import (
     roots,
 )
 from design.specification import (
-    Tracking,
+    RSTSpecification,
     auxiliary_polynomial,
     check_cancelled,
     dominant_polynomial,
@@ -77,26 +76,11 @@ def closed_loop_poles(A: ArrayLike, B: ArrayLike, controller: RST) -> ComplexArr
     return z[np.argsort(-np.abs(z), kind="stable")]
 
 
-def design_rst(
-    A: ArrayLike,
-    B: ArrayLike,
-    h: float,
-    *,
-    dominant: Sequence[float],
-    auxiliary: ArrayLike = (),
-    H_R: ArrayLike = ONE,
-    H_S: ArrayLike = ONE,
-    T: Tracking = "all-poles",
-    cancel: ArrayLike = ONE,
-    model: Sequence[float] | None = None,
-) -> RST:
+def design_rst(A: ArrayLike, B: ArrayLike, h: float, asked: RSTSpecification) -> RST:
     """The RST controller of least degree that places the closed-loop poles.
 
-    A, B: plant, ascending powers of z^-1, delay as leading zeros of B; h [s]. dominant:
-    (w_n [rad/s], zeta). auxiliary: further poles as values of z, the rest are at 0. H_R, H_S:
-    fixed parts of R and S (integrator: H_S = [1, -1]). T: see `tracking_polynomial`. cancel:
-    factor of B that S cancels (a pole of the loop then). model: (w_n, zeta) of the tracking model.
-    Where B[0] is not 0 the controller gets one sample of delay, H_R z^-1, to be realisable.
+    A, B: plant, ascending powers of z^-1, delay as leading zeros of B; h [s]. Where B[0] is not 0
+    the controller gets one sample of delay, H_R z^-1, to be realisable.
 
     Raises BadSpecification with the reason where no controller meets this: see
     `solve_diophantine`; also for unstable poles, cancelled zeros that are unstable or badly
@@ -104,9 +88,9 @@ def design_rst(
     """
     h = check_period(h)
     A, B = normalised_plant(A, B)
-    P_d, P_a = dominant_polynomial(dominant, h), auxiliary_polynomial(auxiliary, h)
-    B_plus, B_minus = split_zeros(B, cancel, h)
-    H_R, H_S = as_polynomial(H_R, "H_R"), as_polynomial(H_S, "H_S")
+    P_d, P_a = dominant_polynomial(asked.dominant, h), auxiliary_polynomial(asked.auxiliary, h)
+    B_plus, B_minus = split_zeros(B, asked.cancel, h)
+    H_R, H_S = as_polynomial(asked.H_R, "H_R"), as_polynomial(asked.H_S, "H_S")
     if B[0] != 0.0:
         H_R = np.concatenate([[0.0], H_R])
     R, S = solve_diophantine(A, B_minus, np.convolve(P_d, P_a), H_R=H_R, H_S=H_S, h=h)
@@ -116,8 +100,8 @@ def design_rst(
     # A zero of B in S is cancelled only if it is a closed-loop pole; else S is just large.
     shared = [z for z in common_roots(S, B, distance=1e-6) if root_error(P, complex(z)) < 1e-9]
     check_cancelled(np.array(shared, dtype=np.complex128), h)
-    B_m, A_m = reference_model(model, h)
-    forward = tracking_polynomial(T, R, B_minus, P_d, P_a)
+    B_m, A_m = reference_model(asked.model, h)
+    forward = tracking_polynomial(asked.T, R, B_minus, P_d, P_a)
     controller = RST(R, S, forward, h, P, B_m, A_m)
     for z in closed_loop_poles(A, B, controller)[:1]:
         if abs(z) >= 1:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
 from design.filters import PASS, CompensatorFilters, sampled
-from design.loop import ForcePI, LoopNoise, LoopRun, prepared_loop
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
 from design.pid import INTEGRATOR
 from design.polynomial import divide, trim
@@ -21,7 +21,7 @@ from design.servo_kernels import (
     COMPENSATOR,
     DISTURBANCE,
     KALMAN,
-    NOTHING,
+    NO_COUNTERMEASURE,
     PID_LAW,
     RST_LAW,
     Law,
@@ -33,7 +33,7 @@ from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.plant import Motor, Plant
 from identification.signals.clean import slope_filter
-from identification.simulation.effect_table import ACTUATOR, effect_table, pieces
+from identification.simulation.effect_table import ON_ACTUATOR, effect_table, pieces
 
 
 @dataclass(frozen=True)
@@ -130,11 +130,10 @@ def simulate_servo(
     cannot be followed.
     """
     ratio = max(1, round(servo.linear.h / h))
-    loop, p = prepared_loop(
-        [plant], servo.linear, servo.force, reference, h, noise, servo.control_limit, start, ratio
-    )
+    cascade = Cascade(servo.linear, servo.force, servo.control_limit)
+    loop, p = prepared_loop([plant], cascade, reference, h, noise, start, ratio)
     n, table = len(loop.reference), effect_table(plant.effects)
-    codes = np.where(table.codes == ACTUATOR, -1, table.codes) if loop.motor else table.codes
+    codes = np.where(table.codes == ON_ACTUATOR, -1, table.codes) if loop.motor else table.codes
     base, gain = effect_signals(plant.effects, signals or {}, n)
     late = command_delay(plant.effects) / h
     t = h * np.arange(n, dtype=np.float64)
@@ -163,7 +162,7 @@ def simulate_servo(
 def friction_law(what: Countermeasure | None, h: float) -> Law:
     """The countermeasure as the kernels take it, with no position controller; h [s]."""
     none, pass_ = np.zeros(1), sampled(PASS)
-    kind, law, kalman = NOTHING, none, none
+    kind, law, kalman = NO_COUNTERMEASURE, none, none
     first = second = third = pass_
     match what:
         case Compensation(compensator, filters):

@@ -15,8 +15,8 @@ from identification.arrays import Array
 from identification.compiled import compiled
 
 RST_LAW, PID_LAW = range(2)
-NOTHING, COMPENSATOR, DISTURBANCE, KALMAN = range(4)
-PLAIN, DEAD_ZONE, RESET = range(3)
+NO_COUNTERMEASURE, COMPENSATOR, DISTURBANCE, KALMAN = range(4)
+PLAIN_INTEGRAL, DEAD_ZONE, RESET = range(3)
 # A PID's constants, and its memory.
 K_R, PER_SUM, PER_DIFFERENCE, POLE, ZONE, RULE = range(6)
 SUM, SLOPE, ERROR = range(3)
@@ -31,8 +31,8 @@ class Law(NamedTuple):
 
     position: RST_LAW with R, S and W, or PID_LAW with pid (6,). W, of the length of S: how what a
     clipped command did not carry out is forgotten, W u = T r - R y + (W - S) taken. friction:
-    NOTHING, COMPENSATOR with law (13,), DISTURBANCE or KALMAN with kalman (6,), period h [s];
-    b_v ... a_c: the filters of velocity (of the force, DISTURBANCE), error (of the position,
+    NO_COUNTERMEASURE, COMPENSATOR with law (14,), DISTURBANCE or KALMAN with kalman (6,), period
+    h [s]; b_v ... a_c: the filters of velocity (of the force, DISTURBANCE), error (of the position,
     DISTURBANCE) and C.
     """
 

@@ -13,7 +13,7 @@ from identification.simulation.effect_step import (
     shown_position,
     start_states,
 )
-from identification.simulation.effect_table import BRISTLE
+from identification.simulation.effect_table import ON_BRISTLE
 from identification.simulation.karnopp_step import K1, STUCK, parameters, settled_mode
 
 SERVO_ROWS = 9
@@ -58,7 +58,7 @@ def servo_kernel(
     y, v, F = start
     z, spare = np.zeros(len(codes)), np.zeros(len(codes))
     past = len(history) - len(modes)
-    bristle = place_of(codes, BRISTLE)
+    bristle = place_of(codes, ON_BRISTLE)
     motor = k_a != 0.0
     mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
     a, u, integral, wanted = 0.0, 0.0, 0.0, 0.0

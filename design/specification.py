@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
@@ -28,7 +29,26 @@ from identification.errors import BadSpecification
 Tracking = Literal["all-poles", "keep-dominant", "unit-static", "R"]
 LEAST_DAMPING = 0.1  # of a plant zero that the controller may cancel
 NEAREST_TO_ONE = 1e-12
-LEAST = 1e-150
+LEAST_RATIO = 1e-150
+ONE = (1.0,)
+
+
+@dataclass(frozen=True, eq=False)
+class RSTSpecification:
+    """What an RST loop is asked for.
+
+    dominant: (w_n [rad/s], zeta). auxiliary: further poles as values of z, the rest are at 0. H_R,
+    H_S: fixed parts of R and S (integrator: H_S = [1, -1]). T: see `tracking_polynomial`. cancel:
+    factor of B that S cancels (a pole of the loop then). model: (w_n, zeta) of the tracking model.
+    """
+
+    dominant: Sequence[float]
+    auxiliary: ArrayLike = ()
+    H_R: ArrayLike = ONE
+    H_S: ArrayLike = ONE
+    T: Tracking = "all-poles"
+    cancel: ArrayLike = ONE
+    model: Sequence[float] | None = None
 
 
 def normalised_plant(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
@@ -38,7 +58,7 @@ def normalised_plant(A: ArrayLike, B: ArrayLike) -> tuple[Array, Array]:
         raise BadSpecification("A[0] = 0: not a causal plant; write it as 1 + a1 z^-1 + ...")
     if leading_zeros(b) == b.size:
         raise BadSpecification("B is all zero: the command does not move the output")
-    if np.abs(b).max() < LEAST * np.abs(a).max() or abs(a[0]) < LEAST * np.abs(a).max():
+    if np.abs(b).max() < LEAST_RATIO * np.abs(a).max() or abs(a[0]) < LEAST_RATIO * np.abs(a).max():
         raise BadSpecification(
             f"A[0] = {a[0]:.3g}, largest of B {np.abs(b).max():.3g}: too small beside A's largest "
             f"{np.abs(a).max():.3g}; scale the command or the output"

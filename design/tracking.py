@@ -26,7 +26,7 @@ LEADS = 11  # parts of the lag tried that T takes off by a lead, 0 to 1
 WEIGHTS = 21  # set-point weights b tried, 0 to 1
 DERIVATIVE_WEIGHTS = (0.0, 0.5, 1.0)  # c
 LAG_WEIGHT = 2.0  # the lag is paid on every motion, a limited speed on the largest step only
-SETTLED = 12.0  # time constants of the slowest pole after which a response has ended
+SETTLED_AFTER = 12.0  # time constants of the slowest pole; then a response has ended
 MOST_SAMPLES = 20_000
 NEGLIGIBLE = 1e-3  # |z| of a pole that is over within a sample
 
@@ -178,7 +178,7 @@ def _loop(A: Array, B: Array, controller: RST) -> _Loop | None:
     radius = float(np.abs(closed_loop_poles(A, B, controller)[:1]).max(initial=NEGLIGIBLE))
     if radius >= 1.0:
         return None
-    settled = max(-SETTLED / math.log(radius), 4.0 * P.size)
+    settled = max(-SETTLED_AFTER / math.log(radius), 4.0 * P.size)
     return _Loop(A, B, P, int(min(settled, MOST_SAMPLES)))
 
 

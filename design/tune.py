@@ -16,7 +16,7 @@ from design.margins import Margins, margins
 from design.pid import PID, design_pid, pid_gains
 from design.polynomial import ComplexArray, frequency_and_damping, roots, trim
 from design.rst import RST, design_rst
-from design.specification import normalised_plant, pole_pair
+from design.specification import RSTSpecification, normalised_plant, pole_pair
 from design.tracking import (
     Demand,
     Followed,
@@ -29,16 +29,16 @@ from design.tracking import (
 from identification.arrays import Array
 from identification.errors import BadSpecification
 
-FREQUENCIES = 20  # dominant w_n tried, evenly spaced in log
+FREQUENCIES_TRIED = 20  # dominant w_n tried, evenly spaced in log
 SLOWEST, FASTEST = 0.005, 0.6  # w_n h [rad]
 DAMPINGS = (1.0, 0.8)
 RATIOS = (3.0, 6.0, 1.5)  # auxiliary poles, in units of w_n
-KEPT = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
+KEPT_POLE = 0.9  # |z| of a plant pole up to which it may stay a closed-loop pole
 DAMPED, LEAST_DAMPED = 0.5, 0.3  # damping from which it may; the second beside slow zeros
 LAGGARD = 0.5  # decay of the slowest pole, in units of the dominant ones', below which they are not
 SLOWEST_ZERO = 0.9995  # a plant zero nearer to 1 would never decay
-NEAR = 1e-4  # between a pole and the zero it was placed on
-PLAIN = Demand()
+SAME_AS_ZERO = 1e-4  # between a pole and the zero it was placed on
+USUAL_DEMAND = Demand()
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def tune_rst(
     asked: Asked,
     goals: Goals,
     corners: Plants = (),
-    demand: Demand = PLAIN,
+    demand: Demand = USUAL_DEMAND,
 ) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
@@ -110,11 +110,8 @@ def tune_rst(
     def design(
         dominant: tuple[float, float], auxiliary: tuple[complex, ...]
     ) -> tuple[RST, PID | None]:
-        controller = design_rst(
-            A, B, h, dominant=dominant, auxiliary=auxiliary, H_R=[1.0, 1.0], H_S=H_S,
-            T="unit-static",
-        )  # fmt: skip
-        return controller, None
+        wanted = RSTSpecification(dominant, auxiliary, H_R=[1.0, 1.0], H_S=H_S, T="unit-static")
+        return design_rst(A, B, h, wanted), None
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))
@@ -138,7 +135,7 @@ def tune_pid(
     asked: Asked,
     goals: Goals,
     corners: Plants = (),
-    demand: Demand = PLAIN,
+    demand: Demand = USUAL_DEMAND,
 ) -> Tuned:
     """The fastest digital PID within the goals, or the one asked for; see `tune_rst`.
 
@@ -189,13 +186,13 @@ def _following(plants: Plants, found: Placed, candidates: Iterable[Array], deman
 
 
 def _slow_zeros(B: Array) -> tuple[complex, ...]:
-    """Real plant zeros between KEPT and 1, the slowest first: a slow loop inside the plant.
+    """Real plant zeros between KEPT_POLE and 1, the slowest first: a slow loop inside the plant.
 
     Beside such a zero lies a plant pole as slow, which a fast closed loop would have to move by
     brute force. Kept as closed-loop poles, they leave y/r alone and decay after a disturbance.
     """
     real = [z.real for z in roots(trim(B[np.flatnonzero(B)[0] :])) if abs(z.imag) < 1e-9]
-    return tuple(complex(z) for z in sorted(real, reverse=True) if KEPT < z < SLOWEST_ZERO)
+    return tuple(complex(z) for z in sorted(real, reverse=True) if KEPT_POLE < z < SLOWEST_ZERO)
 
 
 def _auxiliary(
@@ -218,7 +215,7 @@ def _kept(poles: ComplexArray, h: float, damped: float) -> ComplexArray:
     fit = [
         complex(z)
         for z in poles
-        if 1e-6 < abs(z) <= KEPT
+        if 1e-6 < abs(z) <= KEPT_POLE
         and (z.real > 0 and frequency_and_damping(complex(z), h)[1] > damped)
     ]
     return np.array(sorted(fit, key=lambda z: (abs(z), z.real, -z.imag)), dtype=np.complex128)
@@ -283,7 +280,9 @@ def _laggards(
     found: Margins, dominant: tuple[float, float], slow: tuple[complex, ...]
 ) -> tuple[str, ...]:
     """Whether a pole is so slow that the dominant ones do not dominate, in words."""
-    moving = [abs(z) for z in found.poles.tolist() if all(abs(z - one) > NEAR for one in slow)]
+    moving = [
+        abs(z) for z in found.poles.tolist() if all(abs(z - one) > SAME_AS_ZERO for one in slow)
+    ]
     slowest = -math.log(max(*moving, 1e-12)) / found.h
     asked = -math.log(float(np.abs(pole_pair(*dominant, found.h)).max())) / found.h
     if slowest >= LAGGARD * asked:
@@ -295,7 +294,7 @@ def _grid(
     h: float, asked: Asked, auxiliary: Callable[[float], tuple[complex, ...]]
 ) -> Iterator[tuple[tuple[float, float], list[tuple[complex, ...]]]]:
     """Dominant poles, the fastest first, each with the auxiliary poles to try."""
-    frequencies: list[float] = np.geomspace(FASTEST / h, SLOWEST / h, FREQUENCIES).tolist()
+    frequencies: list[float] = np.geomspace(FASTEST / h, SLOWEST / h, FREQUENCIES_TRIED).tolist()
     pairs = [(w, zeta) for w in frequencies for zeta in DAMPINGS]
     for dominant in [asked.dominant] if asked.dominant else pairs:
         if asked.auxiliary is not None:

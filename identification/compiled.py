@@ -14,32 +14,32 @@ from numba.extending import intrinsic
 
 from identification.errors import BadModel
 
-P = ParamSpec("P")
-R = TypeVar("R")
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 # Fused multiply-add is allowed (it rounds less); reordering and NaN-blind forms are not.
 CONTRACT = {"contract"}
 
 
-def compiled(function: Callable[P, R]) -> Callable[P, R]:
+def compiled(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """`function` compiled on first call, cached on disk, run without the interpreter's lock."""
     return _jit(function, fastmath=CONTRACT)
 
 
-def compiled_fast(function: Callable[P, R]) -> Callable[P, R]:
+def compiled_fast(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """As `compiled`, with reordered sums: for reductions whose rounding is of no account."""
     return _jit(function, fastmath=True)
 
 
-def compiled_inline(function: Callable[P, R]) -> Callable[P, R]:
+def compiled_inline(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """As `compiled`, always inlined into its caller (for the innermost vector loops)."""
     return _jit(function, fastmath=CONTRACT, forceinline=True)
 
 
-def _jit(function: Callable[P, R], **options: Any) -> Callable[P, R]:
+def _jit(function: Callable[Arguments, Result], **options: Any) -> Callable[Arguments, Result]:
     wrapped: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     _follow_sources(wrapped._cache, function)
-    return cast(Callable[P, R], wrapped)
+    return cast(Callable[Arguments, Result], wrapped)
 
 
 DOUBLES = 9  # arguments of an effect's kernel before its signals and parameters

@@ -5,6 +5,9 @@ from pathlib import Path
 
 from identification.errors import UserError
 
+CARD_FILE = "card.toml"
+"""Name of a card in a machine's folder."""
+
 CARD_BYTES = 1_000_000
 """Size above which a file is no card; the largest that ships has 8 kB."""
 

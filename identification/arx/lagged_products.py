@@ -16,7 +16,7 @@ from identification.compiled import compiled, compiled_fast, compiled_inline
 
 BLOCK = 8192
 LANES = 512
-Y, U, ONES = 0, 1, 2
+OUTPUT, INPUT, ONES = 0, 1, 2
 
 
 def _fused(_context: Any, a: Any, b: Any, c: Any) -> Any:
@@ -131,7 +131,7 @@ def _factor(y: Array, u: Array, s: int, e: int, factors: IntArray, i: int) -> Ar
     """The i-th factor over the block; past the last one, the first."""
     i = i if i < factors.shape[0] else 0
     k = factors[i, 1]
-    return y[s - k : e - k] if factors[i, 0] == Y else u[s - k : e - k]
+    return y[s - k : e - k] if factors[i, 0] == OUTPUT else u[s - k : e - k]
 
 
 @compiled
@@ -171,9 +171,10 @@ def add_lagged_products(
     """Add sum_s a(s) b(s-k), s from `first` to the end, to the pairs `high + low`.
 
     y, u: shape (n,). a is y in the first row of `high` and `low`, u in the second; shape (2, m).
-    factors: shape (m, 2), what b is and its lag k, at most `first`: (Y, 0), (U, 0), (ONES, 0),
-    then any of Y and U. exact: products by `exact_dot`, and only those where `wanted`, shape
-    (2, m), is not 0; else by `plain_dots`, all of them. The sum over blocks is compensated in both.
+    factors: shape (m, 2), what b is and its lag k, at most `first`: (OUTPUT, 0), (INPUT, 0),
+    (ONES, 0), then any of OUTPUT and INPUT. exact: products by `exact_dot`, and only those where
+    `wanted`, shape (2, m), is not 0; else by `plain_dots`, all of them. The sum over blocks is
+    compensated in both.
     """
     ones = np.ones(BLOCK)
     work_high = np.zeros(LANES)
@@ -185,11 +186,11 @@ def add_lagged_products(
         if not exact:
             _add_plain(y, u, s, e, factors, high, low)
             continue
-        norms[Y] = np.sqrt(plain_dot(y[s - first : e], y[s - first : e]))
-        norms[U] = np.sqrt(plain_dot(u[s - first : e], u[s - first : e]))
+        norms[OUTPUT] = np.sqrt(plain_dot(y[s - first : e], y[s - first : e]))
+        norms[INPUT] = np.sqrt(plain_dot(u[s - first : e], u[s - first : e]))
         norms[ONES] = np.sqrt(float(e - s))
         for row in range(2):
-            x = y[s:e] if row == Y else u[s:e]
+            x = y[s:e] if row == OUTPUT else u[s:e]
             for i in range(factors.shape[0]):
                 if wanted[row, i] != 0:
                     z = ones[: e - s] if i == 2 else _factor(y, u, s, e, factors, i)

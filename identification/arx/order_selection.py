@@ -72,15 +72,49 @@ class ArxChoice:
     independent: float
 
 
+@dataclass(frozen=True)
+class OrderRange:
+    """Orders to choose from: up to max_na, max_nb coefficients, min_nk to max_nk samples of delay.
+
+    Raises BadModel where there are none.
+    """
+
+    max_na: int = 6
+    max_nb: int = 6
+    max_nk: int = 10
+    min_nk: int = 0
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.min_nk <= self.max_nk or self.max_na < 0 or self.max_nb < 0:
+            raise BadModel(
+                f"orders up to na={self.max_na}, nb={self.max_nb} and delays {self.min_nk} to"
+                f" {self.max_nk}; none may be negative, and the delays must rise"
+            )
+
+    @property
+    def largest(self) -> Order:
+        """The order that holds all of them; raises BadModel where it has no coefficient."""
+        nb = self.max_nk - self.min_nk + self.max_nb if self.max_nb else 0
+        return Order(self.max_na, nb, self.min_nk)
+
+    def __iter__(self) -> Iterator[Order]:
+        for na in range(self.max_na + 1):
+            if na:
+                yield Order(na, 0, self.min_nk)
+            for nb in range(1, self.max_nb + 1):
+                for nk in range(self.min_nk, self.max_nk + 1):
+                    yield Order(na, nb, nk)
+
+
+USUAL_ORDERS = OrderRange()
+
+
 def select_arx(
     logs: Runs,
     validation: Runs | None,
     h: float,
     *,
-    max_na: int = 6,
-    max_nb: int = 6,
-    max_nk: int = 10,
-    min_nk: int = 0,
+    orders: OrderRange = USUAL_ORDERS,
     split: float = 0.6,
     offset: bool = False,
     criterion: Criterion = "one-step",
@@ -92,14 +126,14 @@ def select_arx(
     order at all can be estimated.
     """
     fitted, held = _runs(logs, validation, split)
-    largest = _largest(max_na, max_nb, max_nk, min_nk)
+    largest = orders.largest
     fit, test = factor_of(fitted, largest), factor_of(held, largest)
     if test.rows <= largest.size:
         raise BadLog(
             f"{test.rows} validation samples after the first {largest.lag} of each run; more than "
             f"{largest.size} needed for these orders: use longer runs or lower orders"
         )
-    found = list(_candidates(fit, test, largest, max_nb, h, offset))
+    found = list(_candidates(fit, test, orders, h, offset))
     best = min(found, key=lambda candidate: candidate.one_step_rms)
     errors = [one_step_errors(best.model, u, y) for u, y in held]
     independent = effective_samples(errors)
@@ -129,16 +163,6 @@ def select_arx(
     )
 
 
-def _largest(max_na: int, max_nb: int, max_nk: int, min_nk: int) -> Order:
-    """The order that holds all those tried; raises BadModel where there are none."""
-    if not 0 <= min_nk <= max_nk or max_na < 0 or max_nb < 0:
-        raise BadModel(
-            f"orders up to na={max_na}, nb={max_nb} and delays {min_nk} to {max_nk}; "
-            "none may be negative, and the delays must rise"
-        )
-    return Order(max_na, max_nk - min_nk + max_nb if max_nb else 0, min_nk)
-
-
 def _runs(logs: Runs, validation: Runs | None, split: float) -> tuple[list[Run], list[Run]]:
     runs = as_runs(logs)
     if validation is not None:
@@ -150,22 +174,12 @@ def _runs(logs: Runs, validation: Runs | None, split: float) -> tuple[list[Run],
     return [(u[:n], y[:n]) for (u, y), n in pairs], [(u[n:], y[n:]) for (u, y), n in pairs]
 
 
-def _orders(largest: Order, max_nb: int) -> Iterator[Order]:
-    last = largest.nk + largest.nb - max_nb
-    for na in range(largest.na + 1):
-        if na:
-            yield Order(na, 0, largest.nk)
-        for nb in range(1, max_nb + 1):
-            for nk in range(largest.nk, last + 1):
-                yield Order(na, nb, nk)
-
-
 def _candidates(
-    fit: Factor, test: Factor, largest: Order, max_nb: int, h: float, offset: bool
+    fit: Factor, test: Factor, orders: OrderRange, h: float, offset: bool
 ) -> Iterator[ArxCandidate]:
     refusal: NotIdentifiable | None = None
     count = 0
-    for order in _orders(largest, max_nb):
+    for order in orders:
         try:
             model = arx_of_factor(fit, order, h, offset=offset)
         except NotIdentifiable as error:

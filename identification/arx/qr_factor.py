@@ -18,10 +18,10 @@ from decimal import Decimal, localcontext
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.arx.lagged_products import ONES, U, Y, add_lagged_products, add_to_pair
+from identification.arx.lagged_products import INPUT, ONES, OUTPUT, add_lagged_products, add_to_pair
 from identification.errors import BadLog, BadModel
 
-DIGITS = 40
+EXACT_DIGITS = 40
 PIECE_OF_RUN = 1 << 18
 CONVERTED = 1 << 19
 WORKERS = 4
@@ -100,12 +100,12 @@ class _Run:
         self.lag, self.exact, self.number = order.lag, exact, number
         apart = range(max(nk - na, 0), nk + nb) if nb else range(0)
         lags_u = sorted({*range(1, nb), *apart} - {0})
-        factors = [(Y, 0), (U, 0), (ONES, 0), *((Y, k) for k in range(1, na + 1))]
-        factors += [(U, k) for k in lags_u]
+        factors = [(OUTPUT, 0), (INPUT, 0), (ONES, 0), *((OUTPUT, k) for k in range(1, na + 1))]
+        factors += [(INPUT, k) for k in lags_u]
         self.factors = np.array(factors, dtype=np.int64)
         back = range(1, na - nk + 1) if nb else range(0)
-        own = {ONES: range(1), U: range(nb), Y: back}
-        wanted = [[b != U or k in apart for b, k in factors], [k in own[b] for b, k in factors]]
+        own = {ONES: range(1), INPUT: range(nb), OUTPUT: back}
+        wanted = [[b != INPUT or k in apart for b, k in factors], [k in own[b] for b, k in factors]]
         self.wanted = np.array(wanted, dtype=np.int64)
         self.high = np.zeros(self.wanted.shape)
         self.low = np.zeros_like(self.high)
@@ -155,12 +155,16 @@ class _Run:
 
     def energy(self) -> Array:
         """Sums of y^2 and u^2 that no column of this run exceeds, shape (2,)."""
-        squares = np.array([self._product(Y, Y, 0), self._product(U, U, 0)], dtype=np.float64)
+        squares = np.array(
+            [self._product(OUTPUT, OUTPUT, 0), self._product(INPUT, INPUT, 0)], dtype=np.float64
+        )
         return np.asarray(squares + np.sum(self.head**2, axis=1), dtype=np.float64)
 
     def gram(self, order: Order) -> list[list[Decimal]]:
         """Gram matrix of the columns of Factor, in the current decimal context."""
-        ends = [([*map(Decimal, self.head[a])], [*map(Decimal, self.tail[a])]) for a in (Y, U)]
+        ends = [
+            ([*map(Decimal, self.head[a])], [*map(Decimal, self.tail[a])]) for a in (OUTPUT, INPUT)
+        ]
         table: dict[tuple[int, int, int, int], Decimal] = {}
         sums: dict[tuple[int, int], Decimal] = {}
         for a, at in zip(*np.nonzero(self.wanted), strict=True):
@@ -175,8 +179,8 @@ class _Run:
                 if i + k < self.lag:
                     total += head[-1 - i] * (other[0][-1 - i - k] if other else 1)
                     total -= tail[-1 - i] * (other[1][-1 - i - k] if other else 1)
-        own = [(Y, i) for i in range(1, order.na + 1)]
-        own += [(U, order.nk + j) for j in range(order.nb)] + [(Y, 0)]
+        own = [(OUTPUT, i) for i in range(1, order.na + 1)]
+        own += [(INPUT, order.nk + j) for j in range(order.nb)] + [(OUTPUT, 0)]
         one = [Decimal(self.samples - self.lag), *(sums[c] for c in own)]
         return [one, *([sums[c], *(table[c + d] for d in own)] for c in own)]
 
@@ -239,7 +243,7 @@ class ArxAccumulator:
 
     def new_run(self) -> None:
         """End the present run; the next samples belong to another one."""
-        with localcontext(prec=DIGITS):
+        with localcontext(prec=EXACT_DIGITS):
             self._sum, self._rows, self._energy = self._total()
         self._run = _Run(self.order, self.exact, self._run.number + 1)
 
@@ -253,7 +257,7 @@ class ArxAccumulator:
 
     def factor(self) -> Factor:
         """The factor of all samples so far; more may follow."""
-        with localcontext(prec=DIGITS):
+        with localcontext(prec=EXACT_DIGITS):
             gram, rows, energy = self._total()
             R = _cholesky(gram)
             squares = np.array([float(gram[i][i]) for i in range(1, len(gram))])

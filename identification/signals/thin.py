@@ -11,31 +11,31 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import Log
 
-LARGEST = 200_000
+LONGEST_UNTHINNED = 200_000
 """Samples up to which a log is taken as it is."""
 
-KEPT = 100_000
+LONGEST_THINNED = 100_000
 """Samples that are kept of a longer one, at most: a search over them takes about a minute."""
 
-SLOWEST = 1e-3
+SLOWEST_CLOCK = 1e-3
 """Sampling period [s] up to which a longer log is averaged; switches of mode need that much."""
 
 
 class Thinned(NamedTuple):
-    """A log of at most `LARGEST` samples, and what was left out of it."""
+    """A log of at most `LONGEST_UNTHINNED` samples, and what was left out of it."""
 
     log: Log
     remarks: tuple[str, ...]
 
 
 def thinned(log: Log) -> Thinned:
-    """The log; one of more than `LARGEST` samples at a slower clock, cut to its liveliest part.
+    """The log; a longer one than `LONGEST_UNTHINNED` at a slower clock, cut to its liveliest part.
 
     A sample is then the mean over the middle third of its new period: over the whole of it the mean
     is not the place of a body that is thrown, which a fit to the noise would take for an effect.
     The command is held between samples, so it is the mean until the next instant.
     """
-    if len(log) <= LARGEST:
+    if len(log) <= LONGEST_UNTHINNED:
         return Thinned(log, ())
     remarks, step = [], _step(log)
     if step > 1:
@@ -43,10 +43,12 @@ def thinned(log: Log) -> Thinned:
             f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every {step * log.h:.4g} s"
         )
         log = _averaged(log, step)
-    if len(log) > KEPT:
+    if len(log) > LONGEST_THINNED:
         start = _liveliest(log["y"])
         # Copies: a view would hold the whole log in memory.
-        part = Log(log.name, {k: v[start : start + KEPT].copy() for k, v in log.signals.items()})
+        part = Log(
+            log.name, {k: v[start : start + LONGEST_THINNED].copy() for k, v in log.signals.items()}
+        )
         t = part["t"]
         remarks.append(
             f"{log.name}: of its {log.duration:.5g} s the {part.duration:.4g} s from"
@@ -58,8 +60,8 @@ def thinned(log: Log) -> Thinned:
 
 
 def _step(log: Log) -> int:
-    """Samples in a mean: enough for `KEPT` of them, but none slower than `SLOWEST`."""
-    return min(int(1.01 * SLOWEST / log.h), -(-len(log) // KEPT))
+    """Samples in a mean: enough for `LONGEST_THINNED` means, none slower than `SLOWEST_CLOCK`."""
+    return min(int(1.01 * SLOWEST_CLOCK / log.h), -(-len(log) // LONGEST_THINNED))
 
 
 def _averaged(log: Log, step: int) -> Log:
@@ -83,7 +85,7 @@ def _averaged(log: Log, step: int) -> Log:
 
 
 def _liveliest(y: Array) -> int:
-    """First sample of the part of `KEPT` samples in which the position goes the longest way.
+    """First of the `LONGEST_THINNED` samples in which the position goes the longest way.
 
     The way is taken over means, so that noise hardly counts.
     """
@@ -91,5 +93,5 @@ def _liveliest(y: Array) -> int:
     count = len(y) // block
     means = y[: count * block].reshape(count, block).mean(axis=1)
     way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(means)))])
-    span = KEPT // block
+    span = LONGEST_THINNED // block
     return int(np.argmax(way[span - 1 :] - way[: count - span + 1])) * block

@@ -11,7 +11,14 @@ from identification.simulation.effect_step import (
     shown_position,
     start_states,
 )
-from identification.simulation.effect_table import ACTUATOR, BRISTLE, COMMAND, DELAY, INITIAL, VALUE
+from identification.simulation.effect_table import (
+    INITIAL,
+    ON_ACTUATOR,
+    ON_BRISTLE,
+    ON_COMMAND,
+    ON_DELAY,
+    VALUE,
+)
 from identification.simulation.karnopp_step import K1, K2, SLIP_N, SLIP_P, STUCK, parameters
 
 CALM = (STUCK, SLIP_P, SLIP_N)  # modes in which a sample may pass without a switch
@@ -36,13 +43,13 @@ def effective_commands(
     z (k,): states of what acts on the command, where they are to begin; they go on.
     """
     late, out = 0.0, np.empty(len(u))
-    i = place_of(codes, DELAY)
+    i = place_of(codes, ON_DELAY)
     if i >= 0:
         x = (0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
         late = call_value(addresses[i, VALUE], x, s[i, 0].ctypes.data, q[i].ctypes.data) / h
     acting = np.empty(len(u))
     for i in range(len(codes)):
-        if codes[i] == COMMAND and addresses[i, INITIAL] != 0 and len(u) > 0:
+        if codes[i] == ON_COMMAND and addresses[i, INITIAL] != 0 and len(u) > 0:
             d = 1.0 if u[0] >= 0.0 else -1.0
             x = (0.0, 0.0, 0.0, 0.0, u[0], d, 0.0, 0.0, 0.0)
             z[i] = call_value(addresses[i, INITIAL], x, s[i, 0].ctypes.data, q[i].ctypes.data)
@@ -114,8 +121,8 @@ def effect_run_kernel(
     k1, k2 = plant[K1], plant[K2]
     z, z_0, spare = np.zeros(len(codes)), np.zeros(len(codes)), np.zeros(len(codes))
     if held:  # a measured force has its losses in it
-        codes = np.where(codes == ACTUATOR, -1, codes)
-    bristle = place_of(codes, BRISTLE)
+        codes = np.where(codes == ON_ACTUATOR, -1, codes)
+    bristle = place_of(codes, ON_BRISTLE)
     acting = effective_commands(codes, addresses, q, s, z, t, u, h)
     y, v, F, mode, a = at_y[0], at_v[0], at_f[0], STUCK, 0.0
     window = 0

@@ -15,15 +15,15 @@ from identification.arrays import Array, IntArray
 from identification.compiled import call_evolve, call_value, compiled, compiled_inline
 from identification.simulation.bristle_step import bristle_step
 from identification.simulation.effect_table import (
-    ACTUATOR,
-    COMMAND,
     EVOLVE,
-    FORCE,
-    FRICTION,
     INITIAL,
-    SENSOR,
-    SLIP,
-    STICTION,
+    ON_ACTUATOR,
+    ON_COMMAND,
+    ON_FORCE,
+    ON_FRICTION,
+    ON_SENSOR,
+    ON_SLIP,
+    ON_STICTION,
     VALUE,
 )
 from identification.simulation.karnopp_step import (
@@ -96,7 +96,7 @@ def total(
     """Sum of what the effects of this code give; s (k, MAX_SIGNALS), z (k,)."""
     out = 0.0
     for i in range(len(codes)):
-        both = codes[i] == FRICTION and code in (SLIP, STICTION)
+        both = codes[i] == ON_FRICTION and code in (ON_SLIP, ON_STICTION)
         if codes[i] == code or both:
             c, f = level(p, d, v, rest)
             x = (t, y, v, F, u, d, z[i], c, f)
@@ -110,8 +110,8 @@ def at_hand(codes: IntArray, addresses: IntArray) -> int:
     out = 0
     for i in range(len(codes)):
         if codes[i] >= 0:
-            out |= (1 << SLIP) | (1 << STICTION) if codes[i] == FRICTION else 1 << codes[i]
-            outside = codes[i] == SENSOR or codes[i] == COMMAND
+            out |= (1 << ON_SLIP) | (1 << ON_STICTION) if codes[i] == ON_FRICTION else 1 << codes[i]
+            outside = codes[i] == ON_SENSOR or codes[i] == ON_COMMAND
             out |= STATES if addresses[i, EVOLVE] != 0 and not outside else 0
     return out
 
@@ -149,9 +149,9 @@ def evolve_states(
 ) -> None:
     """States z after dt, those of the sensors or all others; d is 0 at rest."""
     for i in range(len(codes)):
-        if codes[i] == COMMAND:
+        if codes[i] == ON_COMMAND:
             continue  # its state goes on with the command (`acting_command`)
-        if addresses[i, EVOLVE] != 0 and (codes[i] == SENSOR) == sensor:
+        if addresses[i, EVOLVE] != 0 and (codes[i] == ON_SENSOR) == sensor:
             way = direction(v, F)
             d = 0.0 if rest else way
             c, f = level(p, way, v, rest)
@@ -205,7 +205,7 @@ def shown_position(
     """Position that the transducer shows; its states advance by one sample."""
     shown = y
     for i in range(len(codes)):
-        if codes[i] == SENSOR:
+        if codes[i] == ON_SENSOR:
             d = 0.0 if v == 0.0 else (1.0 if v > 0.0 else -1.0)
             c, f = level(p, d, v, v == 0.0)
             if addresses[i, EVOLVE] != 0:
@@ -234,13 +234,13 @@ def forces_along(
 
     Along the way they are a straight line in position, which is stepped exactly too.
     """
-    if not acts & (1 << FORCE):
+    if not acts & (1 << ON_FORCE):
         return 0.0, 0.0
     t, y, v, F, u = at
-    here = total(FORCE, codes, addresses, q, s, z, p, t, y, v, F, u, way, rest)
+    here = total(ON_FORCE, codes, addresses, q, s, z, p, t, y, v, F, u, way, rest)
     if abs(way_on) <= SHORTEST_WAY:
         return here, 0.0
-    ahead = total(FORCE, codes, addresses, q, s, z, p, t, y + way_on, v, F, u, way, rest)
+    ahead = total(ON_FORCE, codes, addresses, q, s, z, p, t, y + way_on, v, F, u, way, rest)
     k_e = max((here - ahead) / way_on, -p[K2])
     return 0.5 * (here + ahead + k_e * way_on), k_e
 
@@ -264,10 +264,10 @@ def level_on_bristle(
     edge = p[DV_P] if d > 0.0 else p[DV_N]
     low, _ = level(p, d, v, False)
     high, _ = level(p, d, v, True)
-    if acts & (1 << STICTION):
-        high += total(STICTION, codes, addresses, q, s, z, p, t, y, 0.0, F, u, d, True)
-    if acts & (1 << SLIP):
-        low += total(SLIP, codes, addresses, q, s, z, p, t, y, v, F, u, d, False)
+    if acts & (1 << ON_STICTION):
+        high += total(ON_STICTION, codes, addresses, q, s, z, p, t, y, 0.0, F, u, d, True)
+    if acts & (1 << ON_SLIP):
+        low += total(ON_SLIP, codes, addresses, q, s, z, p, t, y, v, F, u, d, False)
     low, viscous = carried(low, p[F_VP] if d > 0.0 else p[F_VN], abs(v))
     return max(low + (max(high, 0.0) - low) * math.exp(-((v / edge) ** 2)), 1e-9), viscous
 
@@ -293,14 +293,14 @@ def with_friction(
     slow_p, slow_n = slow
     up = down = high_p = high_n = 0.0
     wp, wn = max(v, 0.0), min(v, 0.0)
-    if slow_n and acts & (1 << SLIP):
-        up = total(SLIP, codes, addresses, q, s, z, p, t, y, wp, F, u, 1.0, False)
-    if slow_p and acts & (1 << SLIP):
-        down = total(SLIP, codes, addresses, q, s, z, p, t, y, wn, F, u, -1.0, False)
-    if slow_p and slow_n and acts & (1 << STICTION):
+    if slow_n and acts & (1 << ON_SLIP):
+        up = total(ON_SLIP, codes, addresses, q, s, z, p, t, y, wp, F, u, 1.0, False)
+    if slow_p and acts & (1 << ON_SLIP):
+        down = total(ON_SLIP, codes, addresses, q, s, z, p, t, y, wn, F, u, -1.0, False)
+    if slow_p and slow_n and acts & (1 << ON_STICTION):
         x = (t, y, 0.0, F, u)
-        high_p = total(STICTION, codes, addresses, q, s, z, p, *x, 1.0, True)
-        high_n = total(STICTION, codes, addresses, q, s, z, p, *x, -1.0, True)
+        high_p = total(ON_STICTION, codes, addresses, q, s, z, p, *x, 1.0, True)
+        high_n = total(ON_STICTION, codes, addresses, q, s, z, p, *x, -1.0, True)
     coulomb_p, viscous_p = carried(p[F_CP] + up, p[F_VP], wp)
     coulomb_n, viscous_n = carried(p[F_CN] + down, p[F_VN], -wn)
     return (
@@ -354,8 +354,8 @@ def effect_step(
         ym = y + 0.5 * dt * v
         way = direction(v, F)
         early = 0.0
-        if acts & (1 << ACTUATOR):
-            early = total(ACTUATOR, codes, addresses, q, s, z, p, now, y, v, F, u, way, rest)
+        if acts & (1 << ON_ACTUATOR):
+            early = total(ON_ACTUATOR, codes, addresses, q, s, z, p, now, y, v, F, u, way, rest)
         Fm = F + 0.5 * dt * (g + early - p[K2] * v)
         way = direction(v, Fm)
         if acts & STATES:
@@ -365,8 +365,8 @@ def effect_step(
         at_start = (now, y, vm, Fm, u)
         extra, k_e = forces_along(acts, codes, addresses, q, s, z, p, at_start, way_on, way, rest)
         g_now = g
-        if acts & (1 << ACTUATOR):
-            g_now += total(ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
+        if acts & (1 << ON_ACTUATOR):
+            g_now += total(ON_ACTUATOR, codes, addresses, q, s, z, p, now, ym, vm, Fm, u, way, rest)
         y_0, before, F_0, unused = y, v, F, 0.0
         if bristle >= 0:
             d = direction(vm, z[bristle])
@@ -422,7 +422,7 @@ def acting_command(
 ) -> float:
     """Command that reaches the actuator in place of `u` [V], held for h [s]; z (k,) goes on."""
     for i in range(len(codes)):
-        if codes[i] == COMMAND:
+        if codes[i] == ON_COMMAND:
             d, given = 1.0 if u >= 0.0 else -1.0, u
             x = (t, 0.0, 0.0, 0.0, given, d, z[i], 0.0, 0.0)
             u = float(call_value(addresses[i, VALUE], x, row_at(s, i), row_at(q, i)))

@@ -10,7 +10,10 @@ from identification.effects._base import MAX_PARAMS, MAX_SIGNALS, Acting
 from identification.errors import BadLog, BadModel
 from identification.log import Log
 
-SLIP, STICTION, FRICTION, BRISTLE, FORCE, ACTUATOR, COMMAND, DELAY, SENSOR = range(9)
+(
+    ON_SLIP, ON_STICTION, ON_FRICTION, ON_BRISTLE, ON_FORCE, ON_ACTUATOR, ON_COMMAND, ON_DELAY,
+    ON_SENSOR,
+) = range(9)  # fmt: skip
 CODES = dict(
     zip(
         ("slip", "stiction", "friction", "bristle", "force", "actuator", "command", "delay",
@@ -18,7 +21,7 @@ CODES = dict(
         range(9), strict=True,
     )
 )  # fmt: skip
-OUTSIDE_CODES = (COMMAND, DELAY, SENSOR)
+OUTSIDE_CODES = (ON_COMMAND, ON_DELAY, ON_SENSOR)
 LONGEST_STEP = 1e-3  # s, sub-step of effects without memory
 LONGEST_STATE = 2.5e-4  # s, of those with a state, in which a switch counts with its sub-step
 LONGEST_BRISTLE = 2e-4  # s
@@ -35,7 +38,7 @@ class EffectTable:
 
     def longest(self, bristle: float) -> float:
         """Longest sub-step [s]; bristle: of a plant with one."""
-        if np.any(self.codes == BRISTLE):
+        if np.any(self.codes == ON_BRISTLE):
             return bristle
         states = (self.addresses[:, EVOLVE] != 0) & ~np.isin(self.codes, OUTSIDE_CODES)
         return LONGEST_STATE if np.any(states) else LONGEST_STEP
@@ -44,7 +47,7 @@ class EffectTable:
 def effect_table(acting: tuple[Acting, ...]) -> EffectTable:
     """The table of these effects; raises BadModel where two of them replace sticking."""
     codes = np.array([CODES[a.effect.acts] for a in acting], dtype=np.int64)
-    for code, what in ((BRISTLE, "replaces sticking"), (DELAY, "delays the command")):
+    for code, what in ((ON_BRISTLE, "replaces sticking"), (ON_DELAY, "delays the command")):
         if np.count_nonzero(codes == code) > 1:
             raise BadModel(f"more than one effect {what}: a plant takes one")
     addresses = np.array([a.effect.addresses for a in acting], dtype=np.int64).reshape(-1, 3)
@@ -82,9 +85,11 @@ def pieces(table: EffectTable, h: float, bristle: float = LONGEST_BRISTLE) -> in
 
 def fewer(table: EffectTable, count: int, bristle: float = LONGEST_BRISTLE) -> int:
     """Of `count` sub-steps, those that a sample without a switch needs; a bristle never rests."""
-    if np.all(np.isin(table.codes, (STICTION, *OUTSIDE_CODES))):
+    if np.all(np.isin(table.codes, (ON_STICTION, *OUTSIDE_CODES))):
         return 1  # it slides as the plain plant does
-    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(table.codes, (STICTION, *OUTSIDE_CODES))
+    states = (table.addresses[:, EVOLVE] != 0) & ~np.isin(
+        table.codes, (ON_STICTION, *OUTSIDE_CODES)
+    )
     longest = LONGEST_STATE if np.any(states) else LONGEST_STEP
     short = min(table.longest(bristle) / longest, 1.0)
-    return count if np.any(table.codes == BRISTLE) else max(1, math.ceil(count * short - 1e-9))
+    return count if np.any(table.codes == ON_BRISTLE) else max(1, math.ceil(count * short - 1e-9))

@@ -39,7 +39,7 @@ from identification.simulation.karnopp_step import (
 WIDTH = 16
 # Rows of the work array: the mode's columns first, then state, input, k1, k2 and the last velocity.
 Y, V, F, G, GAIN, COUPLING, V_OLD = range(COLUMNS, COLUMNS + 7)
-ROWS = COLUMNS + 7
+WORK_ROWS = COLUMNS + 7
 
 
 @compiled_inline
@@ -201,7 +201,7 @@ def march_held(
 def work_space() -> tuple[Array, IntArray, Array]:
     """Fresh work arrays of a block: state, modes, step tables."""
     return (
-        np.zeros(ROWS * WIDTH),
+        np.zeros(WORK_ROWS * WIDTH),
         np.zeros(WIDTH, dtype=np.int64),
         np.zeros((WIDTH, MODES, COLUMNS)),
     )

@@ -7,7 +7,7 @@ import pytest
 
 from identification.signals.differentiate import differentiate
 from workbench.cards.card import Card, load_card
-from workbench.logs.fetch import VARIABLE, card_path, find_data, shipped_cards
+from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data, shipped_cards
 from workbench.logs.runs import read_runs
 from workbench.steps.simulate import record
 
@@ -59,7 +59,7 @@ def test_file_reads_to_plausible_values(
 ) -> None:
     if not (workbench_data / name / file).exists():
         pytest.skip(f"{workbench_data} has no {name}/{file}")
-    monkeypatch.setenv(VARIABLE, str(workbench_data))
+    monkeypatch.setenv(DATA_VARIABLE, str(workbench_data))
     card: Card = CARDS[name]
     prepared = read_runs(find_data(file, card), card)
     y_max, F_max = PLAUSIBLE[name]

@@ -14,7 +14,7 @@ from workbench.cards.effect_contract import Broken
 from workbench.cards.effect_runs import (
     CHECKS,
     HYDRAULIC,
-    REST,
+    START_AT_REST,
     check_never_drives,
     check_sampling,
     check_shows,
@@ -54,8 +54,8 @@ def test_a_measured_force_has_its_leakage_in_it() -> None:
     log = trial_log(5.0)
     seen = run_with(HYDRAULIC, log)
     log = log.with_signals(F=seen.F, y=seen.y)
-    plain = free_run(HYDRAULIC, log, REST, "force")
-    found = free_run(replace(HYDRAULIC, effects=(leak,)), log, REST, "force")
+    plain = free_run(HYDRAULIC, log, START_AT_REST, "force")
+    found = free_run(replace(HYDRAULIC, effects=(leak,)), log, START_AT_REST, "force")
     assert np.max(np.abs(found.y - plain.y)) < 1e-12
 
 

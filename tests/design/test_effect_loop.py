@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
@@ -26,6 +26,7 @@ PLANT, MOTOR = Plant(table(1), ACTUATOR), Plant(table(1), Motor(35.15))
 PI = ForcePI(0.02, 0.05)
 PID = pid_to_rst(1754.0, 0.072, 0.018, 0.2, H)
 PD_MOTOR = pd_to_rst(40.0, 0.05, 0.2, H)
+CASCADE = Cascade(PID, PI)
 
 
 def steps() -> Array:
@@ -47,7 +48,7 @@ def acting(key: str, values: Mapping[str, float] | None = None) -> Acting:
 def loop(*effects: Acting, controller: RST = PID) -> LoopRun:
     """The loop of figure 5 with these effects."""
     plant = replace(PLANT, effects=effects)
-    return simulate_effect_loop(plant, controller, PI, steps(), H, noise=noise(), control_limit=1.0)
+    return simulate_effect_loop(plant, Cascade(controller, PI, 1.0), steps(), H, noise=noise())
 
 
 @pytest.mark.parametrize("limit", [None, 1.0])
@@ -56,7 +57,7 @@ def test_without_effects_it_is_the_plain_loop(motor: bool, limit: float | None) 
     plant, controller, pi = (MOTOR, PD_MOTOR, None) if motor else (PLANT, PID, PI)
     start = (0.002, 0.0, 0.0)
     runs = [
-        simulate(plant, controller, pi, steps(), H, noise=noise(), control_limit=limit, start=start)
+        simulate(plant, Cascade(controller, pi, limit), steps(), H, noise=noise(), start=start)
         for simulate in (simulate_loop, simulate_effect_loop)
     ]
     for name, size in (("y", 1e-11), ("F", 1e-7), ("u", 1e-9), ("y_measured", 1e-11)):
@@ -100,7 +101,7 @@ def test_backlash_is_shown_with_its_play() -> None:
 
 def test_no_command_before_the_start() -> None:
     plant = replace(MOTOR, effects=(acting("input_delay", {"tau": 0.02}),))
-    found = simulate_effect_loop(plant, PD_MOTOR, None, np.full(100, 0.1), H)
+    found = simulate_effect_loop(plant, Cascade(PD_MOTOR, None), np.full(100, 0.1), H)
     assert found.u[0] != 0.0
     assert np.all(found.F[:20] == 0.0)
     assert np.allclose(found.F[20:], 35.15 * found.u[:-20], rtol=1e-12)
@@ -108,7 +109,7 @@ def test_no_command_before_the_start() -> None:
 
 def test_motor_gets_what_the_dead_zone_leaves() -> None:
     plant = replace(MOTOR, effects=(acting("valve_dead_zone", {"u_d": 0.2}),))
-    found = simulate_effect_loop(plant, PD_MOTOR, None, steps(), H, noise=noise())
+    found = simulate_effect_loop(plant, Cascade(PD_MOTOR, None), steps(), H, noise=noise())
     left = np.sign(found.u) * np.maximum(np.abs(found.u) - 0.2, 0.0)
     assert np.allclose(found.F, 35.15 * left, rtol=1e-12)
 
@@ -130,24 +131,24 @@ def test_pressures_make_the_force(area_p: float, area_n: float) -> None:
 def test_friction_sees_the_pressures_of_the_force() -> None:
     seal = acting("pressure_dependent_friction", {"mu_p": 2e-5, "mu_n": 1e-5})
     plant, chambers = replace(PLANT, effects=(seal,)), pressures(1e-3, 1e-3, 3e5)
-    found = simulate_effect_loop(plant, PID, PI, steps(), H, signals=chambers)
+    found = simulate_effect_loop(plant, CASCADE, steps(), H, signals=chambers)
     signals = {name: signal(found.F) for name, signal in chambers.items()}
     log = Log("made", {"t": found.t, "y": found.y, "u": found.u, **signals})
     free = free_run(plant, log, (0.0, 0.0, 0.0), "command")
     # A body at rest takes a sample in one step there, in several here.
     assert np.max(np.abs(found.y - free.y)) < 1e-6
     held = {name: signal(0.0 * steps()) for name, signal in chambers.items()}
-    other = simulate_effect_loop(plant, PID, PI, steps(), H, signals=held)
+    other = simulate_effect_loop(plant, CASCADE, steps(), H, signals=held)
     assert np.max(np.abs(found.y - other.y)) > 1e-5
     with pytest.raises(BadModel, match="needs a signal p_p or p_n"):
-        simulate_effect_loop(plant, PID, PI, steps(), H)
+        simulate_effect_loop(plant, CASCADE, steps(), H)
     with pytest.raises(BadModel, match=r"signal p_p: shape \(3,\)"):
-        simulate_effect_loop(plant, PID, PI, steps(), H, signals={"p_p": np.zeros(3)})
+        simulate_effect_loop(plant, CASCADE, steps(), H, signals={"p_p": np.zeros(3)})
 
 
 def test_time_counts_from_the_start() -> None:
     found = loop(acting("warmup", {"a": 1.0, "tau": 0.5}))
-    plain = simulate_loop(PLANT, PID, PI, steps(), H, noise=noise(), control_limit=1.0)
+    plain = simulate_loop(PLANT, Cascade(PID, PI, 1.0), steps(), H, noise=noise())
     early, late = slice(0, 200), slice(2000, None)
     assert np.max(np.abs(found.y[early] - plain.y[early])) < 1e-6
     assert np.max(np.abs(found.y[late] - plain.y[late])) > 1e-4

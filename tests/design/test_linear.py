@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 
 from design.linear import ForceGains, force_gains, linear_plant
-from design.loop import ForcePI
+from design.loop import Cascade, ForcePI
 from design.rst import RST
 from design.two_rate import simulate_two_rate
 from identification.errors import BadSpecification
@@ -38,9 +38,8 @@ def test_it_moves_as_the_simulated_loop_without_coulomb_friction(
     feed_through = RST(np.zeros(1), np.ones(1), np.ones(1), h)
     body = Karnopp(m, 0.0, 0.0, f, f, 1e-9, -1e-9, 0.0, 0.0)
     r = np.repeat(np.linspace(5.0, 20.0, n), ratio)
-    run = simulate_two_rate(
-        Plant(body, actuator), feed_through, ForcePI(gains.k_i, gains.T_i), r, h / ratio
-    )
+    cascade = Cascade(feed_through, ForcePI(gains.k_i, gains.T_i))
+    run = simulate_two_rate(Plant(body, actuator), cascade, r, h / ratio)
     linear = lfilter(B, A, r[::ratio])
     assert run.y[::ratio] == pytest.approx(linear, rel=1e-6, abs=1e-9)
 

@@ -6,7 +6,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from design.loop import ForcePI, LoopNoise, LoopRun, loop_costs, simulate_loop, simulate_loops
+from design.loop import (
+    Cascade,
+    ForcePI,
+    LoopNoise,
+    LoopRun,
+    loop_costs,
+    simulate_loop,
+    simulate_loops,
+)
 from design.loop_kernels import force_command
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
@@ -27,6 +35,7 @@ MOTOR = Plant(table(1), Motor(35.15))
 PI = ForcePI(0.02, 0.05)
 PID = pid_to_rst(1754.0, 0.072, 0.018, 0.2, H)
 PD = pd_to_rst(200.0, 0.1, 0.2, H)
+CASCADE = Cascade(PID, PI)
 # Degree 4, T unlike R, a tracking model: everything that an RST may have.
 GENERAL = RST(
     R=1500.0 * np.convolve([1.2, -1.0], [0.5, 0.3, 0.1, 0.1]),
@@ -79,7 +88,7 @@ def written_out(
 def test_controllers_are_the_written_equations(controller: RST, limit: float) -> None:
     r = steps(2000)
     bound = None if limit == np.inf else limit
-    run = simulate_loop(PLANT, controller, PI, r, H, noise=noise(2000), control_limit=bound)
+    run = simulate_loop(PLANT, Cascade(controller, PI, bound), r, H, noise=noise(2000))
     assert np.max(np.abs(run.u - written_out(controller, r, run, limit, PI))) < 1e-9
     assert np.max(np.abs(run.u)) == limit if bound else np.max(np.abs(run.u)) > 0.1
 
@@ -89,7 +98,7 @@ def test_motor_takes_the_command_at_once(controller: RST) -> None:
     r = steps(2000)
     scaled = replace(controller, R=controller.R / 35.15, T=controller.T / 35.15)
     limit = 3.0 if controller is PID else 0.6
-    run = simulate_loop(MOTOR, scaled, None, r, H, noise=noise(2000), control_limit=limit)
+    run = simulate_loop(MOTOR, Cascade(scaled, None, limit), r, H, noise=noise(2000))
     assert np.max(np.abs(run.u)) == limit
     assert np.max(np.abs(run.u - written_out(scaled, r, run, limit, None))) < 1e-6
     assert np.array_equal(run.F, 35.15 * run.u)
@@ -98,7 +107,7 @@ def test_motor_takes_the_command_at_once(controller: RST) -> None:
 
 
 def test_plant_is_the_written_equation() -> None:
-    run = simulate_loop(PLANT, PID, PI, steps(2500), H, noise=noise(2500))
+    run = simulate_loop(PLANT, CASCADE, steps(2500), H, noise=noise(2500))
     fine = euler(table(1), ACTUATOR.k1, ACTUATOR.k2, run.u, H, 2000)
     assert np.max(np.abs(run.y - fine[0])) < 2e-6
     assert np.max(np.abs(run.F - fine[2])) < 2e-6 * ACTUATOR.k2
@@ -106,7 +115,7 @@ def test_plant_is_the_written_equation() -> None:
 
 def test_shorter_plant_steps_change_nothing_over_40_s() -> None:
     n = 40_001
-    run = simulate_loop(PLANT, PID, PI, steps(n, dwell=5000), H, noise=noise(n))
+    run = simulate_loop(PLANT, CASCADE, steps(n, dwell=5000), H, noise=noise(n))
     for parts in (1, 2, 3):
         u = np.repeat(run.u, parts)
         t = H / parts * np.arange(len(u), dtype=np.float64)
@@ -133,24 +142,13 @@ def test_many_plants_are_each_alone(controller: RST, motor: bool) -> None:
         controller = replace(controller, R=controller.R / 35.15, T=controller.T / 35.15)
     rng = np.random.default_rng(2)
     own = LoopNoise(1e-5 * rng.standard_normal((n, count)), 1e-2 * rng.standard_normal((n, count)))
-    start = (0.01, 0.0, 3.0)
+    cascade, start = Cascade(controller, pi, 2.0), (0.01, 0.0, 3.0)
     for given in (None, noise(n), own):
-        runs = simulate_loops(
-            plants, controller, pi, steps(n), H, noise=given, control_limit=2.0, start=start
-        )
+        runs = simulate_loops(plants, cascade, steps(n), H, noise=given, start=start)
         assert runs.y.shape == (n, count)
         for i in (0, 7, 15, 16, 17):
             one_noise = LoopNoise(own.y[:, i], own.F[:, i]) if given is own else given
-            one = simulate_loop(
-                plants[i],
-                controller,
-                pi,
-                steps(n),
-                H,
-                noise=one_noise,
-                control_limit=2.0,
-                start=start,
-            )
+            one = simulate_loop(plants[i], cascade, steps(n), H, noise=one_noise, start=start)
             for name in ("y", "v", "y_measured"):
                 apart = np.abs(getattr(runs, name)[:, i] - getattr(one, name))
                 assert np.max(apart) < 1e-11 * loose
@@ -162,10 +160,10 @@ def test_many_plants_are_each_alone(controller: RST, motor: bool) -> None:
 
 def test_costs_are_the_sums_over_the_window() -> None:
     n, plants = 1200, many(20, ACTUATOR)
-    runs = simulate_loops(plants, PID, PI, steps(n), H, noise=noise(n))
+    runs = simulate_loops(plants, CASCADE, steps(n), H, noise=noise(n))
     for window in (None, (300, 900)):
         part = slice(*window) if window else slice(None)
-        costs = loop_costs(plants, PID, PI, steps(n), H, noise=noise(n), window=window)
+        costs = loop_costs(plants, CASCADE, steps(n), H, noise=noise(n), window=window)
         error = (runs.r[:, None] - runs.y)[part]
         assert costs.squared_error == pytest.approx(np.sum(error**2, axis=0), rel=1e-12)
         assert costs.squared_command == pytest.approx(np.sum(runs.u[part] ** 2, axis=0), rel=1e-12)
@@ -174,10 +172,10 @@ def test_costs_are_the_sums_over_the_window() -> None:
 def test_noise_enters_through_the_controller_only() -> None:
     n = 500
     disturbed = noise(n)
-    run = simulate_loop(PLANT, PID, PI, steps(n, dwell=100), H, noise=disturbed)
+    run = simulate_loop(PLANT, CASCADE, steps(n, dwell=100), H, noise=disturbed)
     assert run.y_measured - run.y == pytest.approx(disturbed.y, abs=1e-16)
     assert run.F_measured - run.F == pytest.approx(disturbed.F, abs=1e-12)
-    quiet = simulate_loop(PLANT, PID, PI, steps(n, dwell=100), H)
+    quiet = simulate_loop(PLANT, CASCADE, steps(n, dwell=100), H)
     assert np.array_equal(quiet.y, quiet.y_measured)
     assert 0.0 < np.max(np.abs(quiet.y - run.y)) < 1e-3
 
@@ -185,7 +183,7 @@ def test_noise_enters_through_the_controller_only() -> None:
 @pytest.mark.parametrize("y_0", [0.0, 0.07, -0.2])
 @pytest.mark.parametrize("controller", [PD, PID])
 def test_at_rest_on_its_target_it_stays(controller: RST, y_0: float) -> None:
-    run = simulate_loop(PLANT, controller, PI, np.full(300, y_0), H, start=(y_0, 0.0, 0.0))
+    run = simulate_loop(PLANT, Cascade(controller, PI), np.full(300, y_0), H, start=(y_0, 0.0, 0.0))
     assert np.all(run.y == y_0)
     assert np.max(np.abs(run.u)) < 1e-9
     assert set(run.mode.tolist()) == {STUCK}
@@ -205,10 +203,10 @@ def test_without_compensation_pd_rests_off_target_and_pid_pushes_on() -> None:
     # Paper, figure 6: the error stays without the compensator; an integral builds up force.
     n = 20_000
     rest, half = np.full(n, 0.1), slice(n // 2, None)
-    pd = simulate_loop(PLANT, PD, PI, rest, H, noise=noise(n))
+    pd = simulate_loop(PLANT, Cascade(PD, PI), rest, H, noise=noise(n))
     assert np.ptp(pd.y[half]) < 1e-4
     assert abs(pd.y[-1] - 0.1) > 5e-3
-    pid = simulate_loop(PLANT, PID, PI, rest, H, noise=noise(n))
+    pid = simulate_loop(PLANT, CASCADE, rest, H, noise=noise(n))
     assert np.max(np.abs(pid.y[half] - 0.1)) < 1e-3
     assert abs(pid.F[-1] - pid.F[n // 2]) > 1.0
 
@@ -216,8 +214,8 @@ def test_without_compensation_pd_rests_off_target_and_pid_pushes_on() -> None:
 def test_arrays_given_are_not_changed() -> None:
     r, given = steps(300), noise(300)
     before = r.copy(), given.y.copy()
-    run = simulate_loop(PLANT, PID, PI, r, H, noise=given)
-    simulate_loops([PLANT, PLANT], PID, PI, r, H, noise=given)
+    run = simulate_loop(PLANT, CASCADE, r, H, noise=given)
+    simulate_loops([PLANT, PLANT], CASCADE, r, H, noise=given)
     assert np.array_equal(r, before[0])
     assert np.array_equal(given.y, before[1])
     with pytest.raises(ValueError, match="read-only"):
@@ -252,20 +250,18 @@ def test_refusals(change: dict[str, object], reason: str) -> None:
     with pytest.raises(BadModel, match=reason):
         simulate_loop(
             plant,  # type: ignore[arg-type]
-            PID,
-            pi,  # type: ignore[arg-type]
+            Cascade(PID, pi, limit),  # type: ignore[arg-type]
             reference,  # type: ignore[arg-type]
             h,  # type: ignore[arg-type]
             noise=given,  # type: ignore[arg-type]
-            control_limit=limit,  # type: ignore[arg-type]
         )
 
 
 def test_plants_of_one_kind_only() -> None:
     with pytest.raises(BadModel, match="of 2 kinds"):
-        simulate_loops([PLANT, MOTOR], PID, PI, steps(50), H)
+        simulate_loops([PLANT, MOTOR], CASCADE, steps(50), H)
     with pytest.raises(BadModel, match="0 plants"):
-        simulate_loops([], PID, PI, steps(50), H)
+        simulate_loops([], CASCADE, steps(50), H)
     for T_i in (0.0, -1.0, np.nan):
         with pytest.raises(BadModel, match="T_i"):
             ForcePI(0.02, T_i)
@@ -275,6 +271,6 @@ def test_effects_are_refused_by_the_plain_loops() -> None:
     sprung = replace(PLANT, effects=(built_in()["spring"].acting({"k": 40.0}),))
     for simulate in (simulate_loops, loop_costs):
         with pytest.raises(BadModel, match="spring: simulate it by simulate_servo"):
-            simulate([PLANT, sprung], PID, PI, steps(10), H)
+            simulate([PLANT, sprung], CASCADE, steps(10), H)
     with pytest.raises(BadModel, match="simulate_servo"):
-        simulate_loop(sprung, PID, PI, steps(10), H)
+        simulate_loop(sprung, CASCADE, steps(10), H)

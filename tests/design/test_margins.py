@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from design.margins import Margins, margins, sensitivities
 from design.polynomial import common_roots, evaluate
 from design.rst import RST, closed_loop_poles, design_rst
+from design.specification import RSTSpecification
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from tests.design.strategies import plant
@@ -45,7 +46,7 @@ def test_margins_agree_with_a_dense_grid_and_with_the_poles(
     A, B = AB
     assume(common_roots(np.convolve(A, [1, -1]), B, 1e-2, 0.05).size == 0)
     H_S = [1.0, -1.0] if integrator else [1.0]
-    c = design_rst(A, B, H, dominant=(w_n, zeta), H_S=H_S, T="R")
+    c = design_rst(A, B, H, RSTSpecification((w_n, zeta), H_S=H_S, T="R"))
     found = margins(A, B, c)
     assume(found.modulus > 1e-3)  # a loop that rounding alone upsets has no figures to compare
     theta = np.linspace(1e-6, np.pi, 200_001)

@@ -10,7 +10,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from design.polynomial import add, common_roots, evaluate, from_roots, multiply, second_order
 from design.rst import RST, closed_loop, closed_loop_poles, design_rst
-from design.specification import pole_pair, reference_model
+from design.specification import RSTSpecification, pole_pair, reference_model
 from identification.arrays import Array
 from identification.errors import BadSpecification
 from tests.design.strategies import plant
@@ -27,10 +27,12 @@ def printed() -> RST:
         model["A"],
         model["B"],
         h,
-        dominant=wanted["dominant"],
-        H_S=wanted["H_S"],
-        H_R=multiply(*(second_order(w, zeta, h) for w, zeta in wanted["H_R_pairs"])),
-        T=wanted["tracking"],
+        RSTSpecification(
+            wanted["dominant"],
+            H_S=wanted["H_S"],
+            H_R=multiply(*(second_order(w, zeta, h) for w, zeta in wanted["H_R_pairs"])),
+            T=wanted["tracking"],
+        ),
     )
 
 
@@ -60,7 +62,7 @@ def test_poles_are_placed(
     A, B = AB
     assume(common_roots(A, B, 1e-2, 0.05).size == 0 and abs(B.sum()) > 1e-3 * np.abs(B).sum())
     before = A.copy(), B.copy()
-    c = design_rst(A, B, H, dominant=(w_n, zeta), auxiliary=others)
+    c = design_rst(A, B, H, RSTSpecification((w_n, zeta), others))
     P = multiply(second_order(w_n, zeta, H), from_roots(others))
     error = add(closed_loop(A, B, c), -P)
     assert np.abs(error).max() < 1e-8 * np.abs(P).max()
@@ -89,7 +91,7 @@ def respond(A: list[float], B: list[float], c: RST, steps: int) -> Array:
 @pytest.mark.parametrize("model", [None, (15.0, 0.7)])
 def test_step_response_settles_at_one(T: Any, model: tuple[float, float] | None) -> None:
     c = design_rst(
-        A_2, B_2, H, dominant=(10, 0.8), auxiliary=[0.3, 0.2], H_S=[1, -1], T=T, model=model
+        A_2, B_2, H, RSTSpecification((10, 0.8), [0.3, 0.2], H_S=[1, -1], T=T, model=model)
     )
     assert respond(A_2, B_2, c, 250)[-1] == pytest.approx(1.0, abs=1e-6)
 
@@ -104,7 +106,7 @@ def test_tracking_choices_leave_the_stated_dynamics() -> None:
     }
     for choice, wanted in left.items():
         T: Any = choice
-        c = design_rst(A_2, B_2, H, dominant=w, auxiliary=[0.4], H_S=[1, -1], T=T)
+        c = design_rst(A_2, B_2, H, RSTSpecification(w, [0.4], H_S=[1, -1], T=T))
         y_r = evaluate(B, z) * evaluate(c.T, z) / evaluate(closed_loop(A_2, B_2, c), z)
         np.testing.assert_allclose(y_r, wanted, rtol=1e-9)
 
@@ -120,7 +122,7 @@ def test_reference_model_is_the_sampled_second_order(zeta: float) -> None:
 
 def test_chosen_zero_is_cancelled() -> None:
     B = multiply(np.array([0.0, 0.1, 0.05]), np.array([1.0, -0.6]))
-    c = design_rst(A_2, B, H, dominant=(10, 0.8), cancel=[1.0, -0.6], H_S=[1, -1])
+    c = design_rst(A_2, B, H, RSTSpecification((10, 0.8), cancel=[1.0, -0.6], H_S=[1, -1]))
     assert evaluate(c.S, 0.6) == pytest.approx(0, abs=1e-12)
     poles = closed_loop_poles(A_2, B, c)
     assert np.abs(poles - 0.6).min() < 1e-6
@@ -128,7 +130,7 @@ def test_chosen_zero_is_cancelled() -> None:
 
 
 def test_plant_without_delay_gets_a_realisable_controller() -> None:
-    c = design_rst([1.0, -0.9], [0.1, 0.05], H, dominant=(10, 0.8))
+    c = design_rst([1.0, -0.9], [0.1, 0.05], H, RSTSpecification((10, 0.8)))
     assert c.R[0] == 0.0
     assert np.abs(
         add(closed_loop([1.0, -0.9], [0.1, 0.05], c), -second_order(10, 0.8, H))
@@ -184,5 +186,6 @@ PAIR = from_roots([0.7 + 0.7j, 0.7 - 0.7j])
 def test_impossible_specifications_are_refused(changed: dict[str, Any], text: str) -> None:
     wanted: dict[str, Any] = {"A": A_2, "B": B_2, "h": H, "dominant": (10.0, 0.8)} | changed
     with pytest.raises(BadSpecification, match=text) as caught:
-        design_rst(wanted.pop("A"), wanted.pop("B"), wanted.pop("h"), **wanted)
+        A, B, h = (wanted.pop(name) for name in "ABh")
+        design_rst(A, B, h, RSTSpecification(**wanted))
     assert "\n" not in str(caught.value)

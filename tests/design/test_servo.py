@@ -7,7 +7,7 @@ import pytest
 
 from design.compensator import Compensator
 from design.filters import CompensatorFilters, rig_filters, simulation_filters
-from design.loop import ForcePI, LoopNoise, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
 from design.rivals import DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.servo import (
@@ -87,9 +87,8 @@ def test_the_force_loop_is_asked_for_both_forces() -> None:
 
 
 def test_without_a_countermeasure_it_is_the_plain_loop() -> None:
-    plain = simulate_loop(
-        PLANT, PID, PI, step(), H, noise=LoopNoise.draw(N, 1e-5, 1e-2, np.random.default_rng(1))
-    )
+    noise = LoopNoise.draw(N, 1e-5, 1e-2, np.random.default_rng(1))
+    plain = simulate_loop(PLANT, Cascade(PID, PI), step(), H, noise=noise)
     assert np.max(np.abs(run(Servo(PID, PI)).y - plain.y)) < 1e-10
 
 

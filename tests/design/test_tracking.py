@@ -8,7 +8,7 @@ from design.linear import force_gains, linear_plant
 from design.pid import pid_gains, pid_to_rst
 from design.polynomial import ComplexArray
 from design.rst import RST, closed_loop, design_rst
-from design.specification import pole_pair
+from design.specification import RSTSpecification, pole_pair
 from design.tracking import (
     Demand,
     followed,
@@ -31,7 +31,8 @@ POLES: ComplexArray = np.append(pole_pair(20.0, 0.9, H), AUXILIARY)
 
 def controller(integrator: bool = True) -> RST:
     H_S = [1.0, -1.0] if integrator else [1.0]
-    return design_rst(A, B, H, dominant=(20.0, 0.9), auxiliary=AUXILIARY, H_S=H_S, T="unit-static")
+    asked = RSTSpecification((20.0, 0.9), AUXILIARY, H_S=H_S, T="unit-static")
+    return design_rst(A, B, H, asked)
 
 
 def response(T: Array, r: Array, top: Array = B) -> Array:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from design.loop import ForcePI, LoopNoise, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, simulate_loop
 from design.pid import pid_to_rst
 from design.rst import RST
 from design.two_rate import simulate_two_rate
@@ -22,12 +22,9 @@ R = np.repeat([0.02, 0.1, -0.05, 0.0], 500)
 def test_at_one_rate_it_is_the_other_loop(limit: float | None) -> None:
     controller = pid_to_rst(1754.0, 0.072, 0.018, 0.2, 1e-3)
     noise = LoopNoise.draw(len(R), 1e-5, 1e-2, np.random.default_rng(0))
-    one = simulate_loop(
-        PLANT, controller, PI, R, 1e-3, noise=noise, control_limit=limit, start=(0.02, 0.0, 0.0)
-    )
-    two = simulate_two_rate(
-        PLANT, controller, PI, R, 1e-3, noise=noise, control_limit=limit, y_0=0.02
-    )
+    cascade = Cascade(controller, PI, limit)
+    one = simulate_loop(PLANT, cascade, R, 1e-3, noise=noise, start=(0.02, 0.0, 0.0))
+    two = simulate_two_rate(PLANT, cascade, R, 1e-3, noise=noise, y_0=0.02)
     for name in ("t", "r", "y", "v", "F", "u", "y_measured", "F_measured", "mode"):
         assert getattr(two, name) == pytest.approx(getattr(one, name), rel=1e-9, abs=1e-9)
 
@@ -36,30 +33,30 @@ def test_the_position_controller_looks_only_at_its_samples() -> None:
     controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 5e-3)
     between = R.copy()
     between[np.arange(len(R)) % 5 != 0] += 0.01
-    plain = simulate_two_rate(PLANT, controller, PI, R, 1e-3)
-    disturbed = simulate_two_rate(PLANT, controller, PI, between, 1e-3)
+    plain = simulate_two_rate(PLANT, Cascade(controller, PI), R, 1e-3)
+    disturbed = simulate_two_rate(PLANT, Cascade(controller, PI), between, 1e-3)
     assert np.array_equal(plain.y, disturbed.y)
 
 
 def test_periods_that_do_not_fit_are_refused() -> None:
     controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 5e-3)
     with pytest.raises(BadModel, match="multiple"):
-        simulate_two_rate(PLANT, controller, PI, R, 2e-3)
+        simulate_two_rate(PLANT, Cascade(controller, PI), R, 2e-3)
     with pytest.raises(BadModel, match="multiple"):
-        simulate_two_rate(PLANT, controller, PI, R, 2e-2)
+        simulate_two_rate(PLANT, Cascade(controller, PI), R, 2e-2)
 
 
 def test_a_motor_has_no_force_loop() -> None:
     controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 1e-3)
     with pytest.raises(BadModel, match="motor"):
-        simulate_two_rate(Plant(PLANT.friction, Motor(35.0)), controller, PI, R, 1e-3)
+        simulate_two_rate(Plant(PLANT.friction, Motor(35.0)), Cascade(controller, PI), R, 1e-3)
 
 
 def test_noise_of_another_length_is_refused() -> None:
     controller = pid_to_rst(800.0, 0.2, 0.018, 0.2, 1e-3)
     noise = LoopNoise(np.zeros(len(R) - 1), np.zeros(len(R) - 1))
     with pytest.raises(BadModel, match="noise of y"):
-        simulate_two_rate(PLANT, controller, PI, R, 1e-3, noise=noise)
+        simulate_two_rate(PLANT, Cascade(controller, PI), R, 1e-3, noise=noise)
 
 
 @pytest.mark.parametrize("ratio", [3, 7])
@@ -68,7 +65,7 @@ def test_between_its_samples_the_force_reference_is_held(ratio: int) -> None:
     h, gain = 1e-3, 900.0
     controller = RST(np.array([gain]), np.ones(1), np.array([gain]), ratio * h)
     noise = LoopNoise.draw(len(R), 1e-5, 1e-2, np.random.default_rng(4))
-    run = simulate_two_rate(PLANT, controller, PI, R, h, noise=noise, y_0=0.02)
+    run = simulate_two_rate(PLANT, Cascade(controller, PI), R, h, noise=noise, y_0=0.02)
     integral = 0.0
     for k in range(300):
         last = k - k % ratio

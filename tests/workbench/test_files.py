@@ -63,7 +63,7 @@ def test_files_larger_than_any_of_their_kind_are_refused(
         with pytest.raises(UserError, match=r"has 1e\+06 MB, a (card|result) at most"):
             read(path)
     sound = card(tmp_path)
-    monkeypatch.setattr(text, "LARGEST", 1000)
+    monkeypatch.setattr(text, "TEXT_BYTES", 1000)
     monkeypatch.setattr(tables, "JSON_BYTES", 1000)
     monkeypatch.setattr(tables, "BINARY_BYTES", 1000)
     for name in ("a.csv", "a.json", "a.mat"):

@@ -46,7 +46,7 @@ _NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
 }
 
 
-_CANONICAL = ("t", "y", "F", "p_p", "p_n", "u")
+_OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
 
 
 class About(CardTable):
@@ -240,7 +240,7 @@ def _read_toml(path: Path) -> dict[str, Any]:
 _TOO_DEEP = "tables or lists lie deeper in each other than in any card; correct it"
 # The TOML reader's time and memory grow with the square of a dotted key's length.
 _DEEP = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')\s*+\.\s*+){32}""")
-_KINDS = {  # what pydantic finds missing, in the words of a card
+_FAULTS = {  # what pydantic finds missing, in the words of a card
     "string_type": "a text in quotes needed",
     "float_type": "a number needed",
     "float_parsing": "a number needed",
@@ -279,7 +279,7 @@ def explain(error: ValidationError) -> str:
     if kind == "model_type":
         keys = ", ".join(f"{key} = ..." for key in _keys_at(loc)[:2])
         return f"{table}{_shown(found)}: a table {{ {keys} }} needed"
-    said = _UNIONS.get(str(union)) or _KINDS.get(kind) or str(first["msg"])
+    said = _UNIONS.get(str(union)) or _FAULTS.get(kind) or str(first["msg"])
     message = " ".join(said.removeprefix("Value error, ").split())
     shown = "" if isinstance(found, Mapping) else f"{_shown(found)}: "
     return f"{table}{shown}{message[:1].lower()}{message[1:]}"
@@ -340,7 +340,7 @@ def _need_signals(
 def _refuse_twice(path: Path, signals: Mapping[str, SignalSpec]) -> None:
     """Raises BadCard where time or position is read from the column of another signal."""
     for name in ("t", "y"):
-        for other in _CANONICAL:
+        for other in _OWN_COLUMN_SIGNALS:
             if other != name and other in signals and name in signals:
                 column = signals[name].column
                 if signals[other].column == column:

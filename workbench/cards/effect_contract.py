@@ -18,11 +18,11 @@ from identification.effects._base import AT_REST, MAX_PARAMS, MAX_SIGNALS, Effec
 from identification.errors import UserError
 from workbench.cards.units import si_unit
 
-STATE = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
-UNITS = dict(t="s", y="m", v="m/s", F="N", u="V", d="1", c="N", f="N")
+STATE_NAMES = ("t", "y", "v", "F", "u", "d", "z", "c", "f")
+STATE_UNITS = dict(t="s", y="m", v="m/s", F="N", u="V", d="1", c="N", f="N")
 USUAL_STATES = ("N", "m", "s", "m/s")  # units of a state that does not say its own
 HISTORY = frozenset({"rest", "reversal"})  # names of what a state may keep of the motion before
-DRAWS = 120
+POINTS_DRAWN = 120
 PARTS = ("value", "evolve", "initial")
 SAME = 1e-12  # relative difference of two ways to work out one number
 
@@ -96,7 +96,7 @@ def check_declaration(effect: Effect) -> None:
 def check_equation(effect: Effect) -> None:
     """Compiled kernel, plain Python and written equation give the same at random arguments."""
     rng, equation = np.random.default_rng(7), _written(effect)
-    for _ in range(DRAWS):
+    for _ in range(POINTS_DRAWN):
         one = drawn_arguments(effect, rng)
         expected = equation(one)
         size = SAME * max(1.0, abs(expected), abs(one.x["y"]))
@@ -126,7 +126,7 @@ def check_linear(effect: Effect) -> None:
     """`value` is affine in the parameters that are declared linear, together."""
     rng = np.random.default_rng(8)
     where = [i for i, p in enumerate(effect.params) if p.linear]
-    for _ in range(DRAWS if where else 0):
+    for _ in range(POINTS_DRAWN if where else 0):
         one, other = drawn_arguments(effect, rng), drawn_arguments(effect, rng)
         first, second, middle, nought = one.p, one.p.copy(), one.p.copy(), one.p.copy()
         share = float(rng.uniform(-2.0, 3.0))
@@ -180,13 +180,13 @@ def check_units(effect: Effect) -> None:
 
     registry: pint.UnitRegistry[float] = pint.UnitRegistry()
     equation, errors = _parsed(effect), []
-    units = {**UNITS, **{name: si_unit(name, "linear") or "1" for name in effect.signals}}
+    units = {**STATE_UNITS, **{name: si_unit(name, "linear") or "1" for name in effect.signals}}
     for p in effect.params:
         units[p.name] = p.unit.replace("**n", "**2")  # a unit with the exponent's own value
     remembers = equation.has(sympy.Symbol("z", real=True))
     own = USUAL_STATES if effect.state_unit is None else (effect.state_unit,)
     for unit in own if remembers else ("1",):
-        names = (*STATE, *effect.signals, *effect.names)
+        names = (*STATE_NAMES, *effect.signals, *effect.names)
         try:
             values = [registry.Quantity(2.0, {**units, "z": unit}[n]) for n in names]
             numbers = [2 if n == "n" else a for n, a in zip(names, values, strict=True)]
@@ -214,7 +214,7 @@ def _moves(effect: Effect, part: str, change: Callable[[Draw, Draw], Draw]) -> b
     place = effect.place
     own = "y" if place.shows else "u" if place.on_command and not place.delays else None
     base = own if part == "value" else None
-    for _ in range(DRAWS):
+    for _ in range(POINTS_DRAWN):
         one = drawn_arguments(effect, rng)
         two = change(one, drawn_arguments(effect, rng))
         a, b = (python_answer(effect, part, k) - (k.x[base] if base else 0.0) for k in (one, two))
@@ -236,7 +236,7 @@ def _parsed(effect: Effect) -> Any:
     """The written equation; its names are those of the state, the signals and the parameters."""
     import sympy
 
-    names = (*STATE, *effect.signals, *effect.names)
+    names = (*STATE_NAMES, *effect.signals, *effect.names)
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise Broken(f"{twice[0]} has two meanings: a kernel's argument, signal or parameter")
@@ -256,7 +256,7 @@ def _written(effect: Effect) -> Callable[[Draw], float]:
     """The written equation as a function."""
     import sympy
 
-    names = (*STATE, *effect.signals, *effect.names)
+    names = (*STATE_NAMES, *effect.signals, *effect.names)
     function = sympy.lambdify([sympy.Symbol(n, real=True) for n in names], _parsed(effect), "math")
 
     def of(one: Draw) -> float:

@@ -25,15 +25,15 @@ from workbench.cards.effect_contract import (
     check_units,
 )
 
-FRICTION = Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0)  # table 1
-HYDRAULIC = Plant(FRICTION, Actuator(19530.0, 10405.0))  # section 3.2
-ELECTRIC = Plant(FRICTION, Motor(900.0))
-LARGE_COMMANDS = Plant(FRICTION, Motor(10.0))  # moved by volts, not by tenths of them
-REST = (0.0, 0.0, 0.0)
+TABLE_1 = Karnopp(1.0, 12.0, 15.0, 300.0, 200.0, 0.04, -0.04, 20.6, -23.0)  # the paper's
+HYDRAULIC = Plant(TABLE_1, Actuator(19530.0, 10405.0))  # section 3.2
+ELECTRIC = Plant(TABLE_1, Motor(900.0))
+LARGE_COMMANDS = Plant(TABLE_1, Motor(10.0))  # moved by volts, not by tenths of them
+START_AT_REST = (0.0, 0.0, 0.0)
 SMALL = 0.12  # V, of the valve
-SHOWS = 1e-5  # m that an effect of typical size moves what is shown, at least
+LEAST_SHOWN = 1e-5  # m that an effect of typical size moves what is shown, at least
 DRIVES = -1e-10  # J that friction may give back in a sample, by rounding
-STIFF = (1e3, 1e5, 1e7)  # N/m, of a bristle
+BRISTLE_STIFFNESSES = (1e3, 1e5, 1e7)  # N/m, of a bristle
 
 
 def trial_log(seconds: float, seed: int = 1, h: float = 1e-3, most: float = SMALL) -> Log:
@@ -53,7 +53,7 @@ def typical(effect: Effect) -> Acting:
 
 def run_with(plant: Plant, log: Log, *effects: Acting) -> FreeRun:
     """The plant's free run by command, from rest, with these effects."""
-    return free_run(replace(plant, effects=effects), log, REST, "command")
+    return free_run(replace(plant, effects=effects), log, START_AT_REST, "command")
 
 
 def energy_taken(run: FreeRun, m: float) -> Array:
@@ -85,7 +85,7 @@ def check_never_drives(effect: Effect, values: Mapping[str, float] = MappingProx
         if taken.size and np.min(taken) < DRIVES:
             raise Broken(f"as friction it gives the body {-np.min(taken):.3g} J in one sample")
     if effect.place.elastic:
-        for stiffness in STIFF:
+        for stiffness in BRISTLE_STIFFNESSES:
             one = acting.values | {effect.params[0].name: stiffness}
             moved = run_with(ELECTRIC, trial_log(10.0), effect.acting(one))
             taken = np.cumsum(energy_taken(moved, ELECTRIC.friction.m))
@@ -118,7 +118,7 @@ def check_shows(effect: Effect) -> None:
     for plant, most in ((HYDRAULIC, SMALL), (LARGE_COMMANDS, 10.0)):
         log = trial_log(40.0, most=most)
         plain, found = run_with(plant, log), run_with(plant, log, typical(effect))
-        if np.max(np.abs(found.shown - plain.y)) > SHOWS:
+        if np.max(np.abs(found.shown - plain.y)) > LEAST_SHOWN:
             return
     raise Broken("at its typical size it changes nothing of a run; raise the typical values")
 

@@ -12,8 +12,10 @@ from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit
 from workbench.cards.units import Motion, conversion
 
-_NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL)
-_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
+_NUMBER_AND_UNIT = re.compile(
+    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL
+)
+_SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
 
 
 def effect_units(effect: Effect, motion: Motion) -> dict[str, str]:
@@ -57,7 +59,9 @@ def written_effect(
     for name in sorted(written, key=lambda name: "**" in units[name]):
         text = written[name]
         if isinstance(text, str):
-            unit = _EXPONENT.sub(lambda found: f"**{values.get(found[1], 1.0):g}", units[name])
+            unit = _SYMBOLIC_EXPONENT.sub(
+                lambda found: f"**{values.get(found[1], 1.0):g}", units[name]
+            )
             values[name] = _with_unit(f"{key}.{name}", text, unit, _example(effect, name))
     return effect.acting(values)
 
@@ -80,8 +84,8 @@ def estimates_in_si(
         if found.unit == unit:
             out[name] = found
             continue
-        plain = _EXPONENT.sub(lambda part: f"**{value(part[1]):g}", found.unit)
-        target = _EXPONENT.sub(lambda part: f"**{value(part[1]):g}", unit)
+        plain = _SYMBOLIC_EXPONENT.sub(lambda part: f"**{value(part[1]):g}", found.unit)
+        target = _SYMBOLIC_EXPONENT.sub(lambda part: f"**{value(part[1]):g}", unit)
         same = in_unit(replace(found, unit=plain), target, f"[effects.{key}.{name}]")
         out[name] = replace(same, unit=unit)
     return out
@@ -112,7 +116,7 @@ def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
 
 def _with_unit(where: str, text: str, unit: str, example: str) -> float:
     """The number in `text` in SI; raises BadModel where it is of another kind than `unit`."""
-    found = _NUMBER.fullmatch(text)
+    found = _NUMBER_AND_UNIT.fullmatch(text)
     if found is None:
         raise BadModel(f'{where} = {text!r}: no number with a unit; write it as "{example}"')
     try:

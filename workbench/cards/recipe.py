@@ -50,7 +50,7 @@ from workbench.cards.effect_values import written_effect
 from workbench.cards.units import Motion
 from workbench.files import ABSURD
 
-LONGEST = 1e8  # samples of a recipe: a gigabyte a signal
+LONGEST_RECIPE = 1e8  # samples of a recipe: a gigabyte a signal
 
 
 @dataclass(frozen=True)
@@ -363,10 +363,10 @@ class RecipeSection(CardTable):
         if self.loop and (self.loop.force is None) != (self.actuator is None):
             raise ValueError("needs loop.force with an actuator, and none with a motor")
         samples = self.duration_s / self.h_s
-        if not SHORTEST_LOG <= samples <= LONGEST:
+        if not SHORTEST_LOG <= samples <= LONGEST_RECIPE:
             raise ValueError(
                 f"duration_s = {self.duration_s:g} at h_s = {self.h_s:g} makes {samples:.4g}"
-                f" samples, {SHORTEST_LOG} to {LONGEST:.0e} needed"
+                f" samples, {SHORTEST_LOG} to {LONGEST_RECIPE:.0e} needed"
             )
         for part in _multisines(self.reference):
             if part.high_hz >= 0.5 / self.h_s:

@@ -11,7 +11,15 @@ import re
 from typing import NamedTuple
 
 from identification.errors import BadCard
-from workbench.cards.units import LONGEST, Motion, Scale, conversion, kind, scale_or_none, si_unit
+from workbench.cards.units import (
+    LONGEST_UNIT,
+    Motion,
+    Scale,
+    conversion,
+    kind,
+    scale_or_none,
+    si_unit,
+)
 
 _GAIN = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)?\s*(.*?)\s*", re.DOTALL)
 _OUTPUTS = ("V", "A", "1")  # what sensors give; a number as gain is taken for these only
@@ -27,7 +35,7 @@ class Gain(NamedTuple):
 def parse_gain(gain: float | str) -> Gain:
     """The gain as a card writes it; raises ValueError, in words, where it is none or 0."""
     if isinstance(gain, str):
-        if len(gain) > LONGEST:
+        if len(gain) > LONGEST_UNIT:
             raise ValueError('gain is too long; write it as in gain = "80 V/m"')
         found = _GAIN.fullmatch(gain)
         number, unit = found.groups() if found else (None, "")

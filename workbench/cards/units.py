@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 Motion = Literal["linear", "rotary"]
 
 _POSITION = {"linear": "m", "rotary": "rad"}
-_FORCE = {"linear": "N", "rotary": "N m"}
+_FORCE_UNIT = {"linear": "N", "rotary": "N m"}
 _NAMES = {
     "s": "a time such as s, ms or min",
     "m": "a length such as m, mm or inch",
@@ -27,7 +27,7 @@ _NAMES = {
 # Logs of forces are often in pounds: as a force they are read as pounds-force.
 _POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
 _POUND = re.compile(r"\b(lbs?|klb)\b")
-LONGEST = 100  # characters of a unit
+LONGEST_UNIT = 100  # characters of a unit
 MOST_POWERS = 6  # in a unit, as in kg^2 m^4 s^-6 A^-2
 _DIGIT = r"[+-]?\d(?:\.\d{1,3})?"
 # What follows "**": one digit, perhaps with a sign or a fraction; then the rest, if any.
@@ -44,7 +44,7 @@ class Scale(NamedTuple):
 def si_unit(signal: str, motion: Motion) -> str | None:
     """The SI unit a canonical signal has, `None` for an extra, which may have any."""
     table = {"t": "s", "y": _POSITION[motion], "r": _POSITION[motion], "p_p": "Pa", "p_n": "Pa"}
-    return {**table, "F": _FORCE[motion], "u": "V"}.get(signal)
+    return {**table, "F": _FORCE_UNIT[motion], "u": "V"}.get(signal)
 
 
 def kind(signal: str, motion: Motion) -> str:
@@ -107,7 +107,7 @@ def conversion(unit: str, target: str | None, per: str | None = None) -> Scale |
 
 
 def _parsed(unit: str) -> "pint.Unit":
-    if len(unit) > LONGEST or not _powers_are_small(unit):
+    if len(unit) > LONGEST_UNIT or not _powers_are_small(unit):
         raise _unknown(unit)
     try:
         return _registry().Unit("dimensionless" if unit.strip() in ("", "1") else unit)
@@ -125,7 +125,7 @@ def _powers_are_small(unit: str) -> bool:
 
 
 def _unknown(unit: str) -> BadCard:
-    shown = unit if len(unit) <= LONGEST else f"{unit[:LONGEST]}..."
+    shown = unit if len(unit) <= LONGEST_UNIT else f"{unit[:LONGEST_UNIT]}..."
     return BadCard(f"unit {shown!r} is unknown; write it as in 'mm', 'bar', 'N m'")
 
 

@@ -9,7 +9,7 @@ from workbench.commands.trace import staged
 from workbench.output import OutputFolder, emit, output_options, progress
 
 RECIPE = "demo"
-STAGES = {
+DEMO_STAGES = {
     "tracing": (0.0, 0.6),
     "refitting": (0.6, 0.85),
     "judging": (0.85, 0.9),
@@ -46,7 +46,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     card = load_card(card_path(RECIPE))
     with OutputFolder("demo", out, now=datetime.now()) as folder:
         with progress("demo", 1.0, as_json=as_json) as advance:
-            found = demonstrate(card, folder.path, seed, staged(advance, STAGES))
+            found = demonstrate(card, folder.path, seed, staged(advance, DEMO_STAGES))
         traced, validation = found.traced, found.validation
         folder.write_json("trace.json", trace_document(traced))
         folder.write_json("model.json", model_document(traced.model))

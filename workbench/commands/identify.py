@@ -10,13 +10,13 @@ import click
 from workbench.options import POSITIVE, card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
-STAGES = {
+IDENTIFY_STAGES = {
     "searching": (0.0, 0.5),
     "searching near": (0.5, 0.6),
     "refining": (0.6, 0.65),
     "posterior": (0.9, 1.0),
 }
-REST = (0.65, 0.9)
+OTHER_STAGES = (0.65, 0.9)
 
 
 @click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")
@@ -88,7 +88,7 @@ def staged(advance: Callable[[float], None]) -> Callable[[str, float], None]:
 
     def report(stage: str, share: float) -> None:
         nonlocal reached
-        low, high = STAGES.get(stage, REST)
+        low, high = IDENTIFY_STAGES.get(stage, OTHER_STAGES)
         place = low + (high - low) * min(max(share, 0.0), 1.0)
         if place > reached:
             advance(place - reached)

@@ -9,7 +9,7 @@ import click
 from workbench.options import card_option, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
-STAGES = {"tracing": (0.0, 0.6), "refitting": (0.6, 0.9), "judging": (0.9, 1.0)}
+TRACE_STAGES = {"tracing": (0.0, 0.6), "refitting": (0.6, 0.9), "judging": (0.9, 1.0)}
 
 
 @click.command(
@@ -56,7 +56,7 @@ def command(
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
             test = read_sources(held_out, card) if held_out else None
-            found = trace_sources(train, test, known, seed, staged(advance, STAGES))
+            found = trace_sources(train, test, known, seed, staged(advance, TRACE_STAGES))
         document = trace_document(found)
         folder.write_json("trace.json", document)
         folder.write_json("model.json", model_document(found.model))

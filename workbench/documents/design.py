@@ -23,7 +23,7 @@ from workbench.documents.contradictions import refuse_apart, refuse_unequal
 from workbench.documents.model import as_number, used
 from workbench.documents.reading import read_result
 
-SCHEMA = "design/2"
+DESIGN_SCHEMA = "design/2"
 From = Literal["physical", "arx"]
 
 
@@ -268,7 +268,7 @@ def design_document(found: Design) -> dict[str, Any]:
 
 def read_design(path: Path) -> Design:
     """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
-    written = read_result(path, _DesignFile, SCHEMA)
+    written = read_result(path, _DesignFile, DESIGN_SCHEMA)
     units = _Units.of(written.motion)
     try:
         found = _from_file(written, units)

@@ -19,7 +19,7 @@ from workbench.cards.parameter_units import actuator_units, all_converted, frict
 from workbench.documents.contradictions import refuse_changed_units
 from workbench.documents.reading import read_result
 
-SCHEMA = "model/1"
+MODEL_SCHEMA = "model/1"
 SLACK = 1e-9  # of a correlation that rounding takes beyond 1
 PACKAGES = ("servo-workbench", "numpy", "scipy", "numba")
 
@@ -295,7 +295,7 @@ def read_model(path: Path, library: Library | None = None) -> Model:
 
     library: the effects that it may name, by default all but a user's own files.
     """
-    found = read_result(path, ModelFile, SCHEMA)
+    found = read_result(path, ModelFile, MODEL_SCHEMA)
     if library is None:
         library = _installed() if found.effects else built_in()
     try:

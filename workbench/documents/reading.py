@@ -14,7 +14,7 @@ from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 from workbench.links import broken_link
 
 Value = TypeVar("Value")
-DIGITS = 30  # of a whole number in a result
+MOST_DIGITS = 30  # of a whole number in a result
 
 
 def read_result(path: Path, kind: type[Value], schema: str) -> Value:
@@ -98,8 +98,8 @@ def _finite(text: str) -> float:
 
 
 def _whole(text: str) -> int:
-    if len(text) > DIGITS:
-        raise ValueError(f"holds {text[:DIGITS]}..., which no machine reaches; correct it")
+    if len(text) > MOST_DIGITS:
+        raise ValueError(f"holds {text[:MOST_DIGITS]}..., which no machine reaches; correct it")
     return int(text)
 
 

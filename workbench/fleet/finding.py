@@ -8,10 +8,10 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from workbench.addresses import shown, without_secrets
+from workbench.files import CARD_FILE
 from workbench.fleet.values import NEEDED, BadLogs, LogFile
 
 SUFFIX = ".parquet"
-CARD = "card.toml"
 TIMES = ("mtime", "LastModified", "last_modified", "modified", "updated", "created", "date_time")
 
 
@@ -67,7 +67,7 @@ def card_text(url: str, log: LogFile) -> str | None:
     system, _ = file_system(url)
     folder, depth = PurePosixPath(log.path).parent, len(PurePosixPath(log.name).parts)
     for _ in range(depth):
-        path = str(folder / CARD) if folder.parts else CARD
+        path = str(folder / CARD_FILE) if folder.parts else CARD_FILE
         try:
             if system.isfile(path):
                 return str(system.cat_file(path).decode("utf-8-sig"))

@@ -22,12 +22,12 @@ from identification.model.karnopp import NAMES
 from workbench.fleet.values import Result
 from workbench.output import BadOutput, strict
 
-RESULTS, JOURNAL, LOCK = "results", ".journal.jsonl", ".lock"
-ROWS = 500  # of a part
-AGE = timedelta(seconds=10)  # a result that waits for its part for longer makes one
-PARAMETERS = (*NAMES, "k1", "k2", "k_a")
+RESULTS_FOLDER, JOURNAL_FILE, LOCK_FILE = "results", ".journal.jsonl", ".lock"
+PART_ROWS = 500  # of a part
+PART_AGE = timedelta(seconds=10)  # a result that waits for its part for longer makes one
+STORED_PARAMETERS = (*NAMES, "k1", "k2", "k_a")
 FIT = ("chi_square", "adequate", "force_rms")
-SCHEMA = pa.schema(
+PART_SCHEMA = pa.schema(
     [
         ("machine", pa.string()),
         ("log", pa.string()),
@@ -37,7 +37,7 @@ SCHEMA = pa.schema(
         ("verdict", pa.string()),
         ("reason", pa.string()),
         ("against_version", pa.int64()),
-        *((name + end, pa.float64()) for name in PARAMETERS for end in ("", "_sd")),
+        *((name + end, pa.float64()) for name in STORED_PARAMETERS for end in ("", "_sd")),
         ("chi_square", pa.float64()),
         ("adequate", pa.bool_()),
         ("force_rms", pa.float64()),
@@ -59,7 +59,7 @@ class ResultStore:
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._parts = folder / RESULTS
+        self._parts = folder / RESULTS_FOLDER
         self._rows: list[dict[str, Any]] = []
         self._oldest: datetime | None = None
         self._noted: dict[tuple[str, int, int], str] = {}  # lines of results that are no rows yet
@@ -69,7 +69,7 @@ class ResultStore:
         if self.folder.exists() and not self.folder.is_dir():
             raise BadOutput(f"--out {self.folder} is a file; name a folder, new or existing")
         self._parts.mkdir(parents=True, exist_ok=True)
-        self._lock: IO[str] = (self.folder / LOCK).open("w")
+        self._lock: IO[str] = (self.folder / LOCK_FILE).open("w")
         try:
             fcntl.flock(self._lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
@@ -83,7 +83,7 @@ class ResultStore:
             self.done = {
                 key for path in sorted(self._parts.glob("*.parquet")) for key in _keys(path)
             }
-            self._journal: IO[str] = (self.folder / JOURNAL).open("a+", encoding="utf-8")
+            self._journal: IO[str] = (self.folder / JOURNAL_FILE).open("a+", encoding="utf-8")
         except BaseException:
             self._lock.close()
             raise
@@ -130,7 +130,7 @@ class ResultStore:
 
     def tick(self, *, now: datetime) -> None:
         """Write a part where enough rows wait, or one of them for long."""
-        if self._oldest and (len(self._rows) >= ROWS or now - self._oldest >= AGE):
+        if self._oldest and (len(self._rows) >= PART_ROWS or now - self._oldest >= PART_AGE):
             self.flush()
 
     def flush(self) -> None:
@@ -140,14 +140,14 @@ class ResultStore:
             _write_whole(self._parts / f"part-{last + 1:06d}.parquet", self._rows)
             self._rows, self._oldest = [], None
         self._journal.close()
-        fresh = self.folder / f"{JOURNAL}.tmp"
+        fresh = self.folder / f"{JOURNAL_FILE}.tmp"
         _write(fresh, "".join(self._noted.values()).encode())
-        fresh.replace(self.folder / JOURNAL)
-        self._journal = (self.folder / JOURNAL).open("a+", encoding="utf-8")
+        fresh.replace(self.folder / JOURNAL_FILE)
+        self._journal = (self.folder / JOURNAL_FILE).open("a+", encoding="utf-8")
 
 
 def row_of(result: Result, now: datetime) -> dict[str, Any]:
-    """The row of a result, by the columns of `SCHEMA`."""
+    """The row of a result, by the columns of `PART_SCHEMA`."""
     log, model = result.log, result.model or {}
     runs = model.get("log") or ()
     numbers = {**model.get("friction", {}), **(model.get("actuator") or {})}
@@ -168,7 +168,7 @@ def row_of(result: Result, now: datetime) -> dict[str, Any]:
         "at": now,
     }
     row |= {key: (model.get("fit") or {}).get(key) for key in FIT}
-    for name in PARAMETERS:
+    for name in STORED_PARAMETERS:
         found: Mapping[str, Any] = numbers.get(name) or {}
         row[name], row[f"{name}_sd"] = found.get("value"), found.get("sd")
     return row
@@ -189,7 +189,7 @@ def _write_whole(path: Path, rows: list[dict[str, Any]]) -> None:
     """The part under its name once all of it is on the disk."""
     part = path.with_name(f".{path.name}.tmp")
     buffer = pa.BufferOutputStream()
-    pq.write_table(pa.Table.from_pylist(rows, SCHEMA), buffer)
+    pq.write_table(pa.Table.from_pylist(rows, PART_SCHEMA), buffer)
     _write(part, buffer.getvalue())
     part.replace(path)
     folder = os.open(path.parent, os.O_RDONLY)

@@ -11,6 +11,7 @@ from tempfile import TemporaryDirectory
 
 from identification.errors import BadCard, BadModel, NotIdentifiable, UserError
 from workbench.documents.model import model_document, versions
+from workbench.files import CARD_FILE
 from workbench.fleet.finding import local_copy, said
 from workbench.fleet.values import BadLogs, Item, Result
 from workbench.jobs.judge import Chain
@@ -30,7 +31,7 @@ def work(item: Item) -> Result:
     begin = time.process_time()
     try:
         with local_copy(item.url, item.log) as path, TemporaryDirectory(prefix="card-") as folder:
-            card = Path(folder) / "card.toml"
+            card = Path(folder) / CARD_FILE
             card.write_text(item.card, encoding="utf-8")
             found = _result(item, path, card)
     except BadLogs as error:
@@ -103,5 +104,5 @@ def _judged(item: Item, path: Path, card: Path, blank: Result) -> Result:
 
 def _named(error: BaseException, path: Path, card: Path, item: Item) -> str:
     """The error's line with the log's own name, whatever file it was read from."""
-    text = said(error).replace(str(path), item.log.name).replace(str(card), "card.toml")
+    text = said(error).replace(str(path), item.log.name).replace(str(card), CARD_FILE)
     return text if item.log.name in text else f"{item.log.name}: {text}"

@@ -24,11 +24,11 @@ from workbench.registry.outbox import Outbox
 from workbench.registry.values import Alarm, LogVerdict
 
 ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
-KEPT = timedelta(days=1)  # an alarm older than this is given up
+KEPT_FOR = timedelta(days=1)  # an alarm older than this is given up
 IN_HAND = timedelta(minutes=2)  # for so long no other worker sends an alarm that one has taken
 IN_A_ROW = 3  # alarms that do not get through, after which the others are left
-BUSY = (408, 425, 429)  # refusals that are worth another try at once, as those from 500 on
-PLAIN = "".join(map(chr, range(0x21, 0x7F)))
+BUSY_STATUSES = (408, 425, 429)  # refusals that are worth another try at once, as those from 500 on
+PRINTABLE = "".join(map(chr, range(0x21, 0x7F)))
 
 
 class BadWebhook(UserError):
@@ -101,7 +101,7 @@ class Webhook:
         except (httpx.NetworkError, httpx.RemoteProtocolError, httpx.ProxyError) as error:
             raise Unreachable(_cause(error)) from None
         if not 200 <= status < 300:
-            kind = Busy if status >= 500 or status in BUSY else Refused
+            kind = Busy if status >= 500 or status in BUSY_STATUSES else Refused
             raise kind(_phrase(status))
 
 
@@ -135,7 +135,7 @@ def key(alarm: Alarm) -> str:
     """What tells the alarm from every other; in ASCII, as a header has to be."""
     name = alarm.machine
     if not (name.isascii() and name.isprintable() and name == name.strip()):
-        name = quote(name.encode("utf-8", "surrogatepass"), safe=PLAIN.replace("%", ""))
+        name = quote(name.encode("utf-8", "surrogatepass"), safe=PRINTABLE.replace("%", ""))
     again = f":{alarm.turn}" if alarm.turn else ""
     return f"{name}:{alarm.sha256}{again}"
 
@@ -154,11 +154,11 @@ def send_alarms(
     cannot be reached, or takes too long for all of them, the rest is left for the next pass.
     """
     now = clock()
-    outbox.fill(ALARMING, since=now - KEPT, now=now)
-    lost = outbox.give_up(before=now - KEPT, now=now)
+    outbox.fill(ALARMING, since=now - KEPT_FOR, now=now)
+    lost = outbox.give_up(before=now - KEPT_FOR, now=now)
     for alarm in lost:
         report("alarm_given_up", machine=alarm.machine, file=alarm.log, verdict=alarm.verdict,
-               reason=f"not taken by {webhook.shown} within {KEPT.days} day(s)")  # fmt: skip
+               reason=f"not taken by {webhook.shown} within {KEPT_FOR.days} day(s)")  # fmt: skip
     logging.getLogger("httpx").setLevel(logging.WARNING)  # else it logs whole addresses
     round_ = _Round(outbox, webhook, clock, report, stop)
     round_.send(outbox.due(now))

@@ -7,6 +7,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from scipy.stats import norm
 
+from identification.drift.reference_model import FORCES
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from workbench.documents.model import Model
@@ -14,9 +15,8 @@ from workbench.logs.sources import Sources
 from workbench.steps.identify import identify
 
 JudgedDrift = Literal["none", "drift", "structure", "not_judged"]
-FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
-MARGIN = 0.05  # relative change that does not matter
-LEVEL = 1e-3  # of a false alarm, over all parameters of one log
+PRACTICAL_MARGIN = 0.05  # relative change that does not matter
+FALSE_ALARM_LEVEL = 1e-3  # over all parameters of one log
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,11 @@ def drift_by_refit(
     if not changes:
         return Drift("not_judged", "the log and the model in force tell no parameter together")
     least = min(1.0, min(one.p_value for one in changes) * len(changes))
-    moved = tuple(one for one in changes if one.p_value * len(changes) < LEVEL)
+    moved = tuple(one for one in changes if one.p_value * len(changes) < FALSE_ALARM_LEVEL)
     if not moved:
-        return Drift("none", f"no parameter has moved by more than {100 * MARGIN:g} %", (), least)
+        return Drift(
+            "none", f"no parameter has moved by more than {100 * PRACTICAL_MARGIN:g} %", (), least
+        )
     said = ", ".join(f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in moved)
     return Drift("drift", f"moved: {said}", moved, least)
 
@@ -95,7 +97,7 @@ def _change(name: str, model: Model, now: Estimate) -> Moved | None:
     if name in FORCES:
         largest = max(abs(getattr(model.karnopp, force)) for force in FORCES)
         scale = max(scale, 0.1 * largest)
-    beyond = abs(now.value - before.value) - MARGIN * scale
+    beyond = abs(now.value - before.value) - PRACTICAL_MARGIN * scale
     sd = float(np.hypot(now.sd, before.sd or 0.0))
     p_value = 1.0 if beyond <= 0 else float(2.0 * norm.sf(beyond / sd)) if sd > 0 else 0.0
     return Moved(name, before.unit, before.value, now.value, p_value)

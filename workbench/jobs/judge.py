@@ -27,7 +27,7 @@ from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate, validation_document
 
-HELD_OUT = 0.35  # of a log's time that a challenger is not fitted on
+HELD_OUT_SHARE = 0.35  # of a log's time that a challenger is not fitted on
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def divided(sources: Sources) -> tuple[Sources, list[Log]]:
     train: list[Source] = []
     rest: list[Log] = []
     for source in sources.runs:
-        cut = round((1.0 - HELD_OUT) * len(source.log))
+        cut = round((1.0 - HELD_OUT_SHARE) * len(source.log))
         train.append(replace(source, log=source.log.part(0, cut), rows=cut))
         rest.append(source.log.part(cut, len(source.log)))
     if not any(log.duration > 0 for log in rest):

@@ -22,7 +22,7 @@ from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Claim, Judgement, LogOutcome, SeenLog, Version
 
-FULL = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
+OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.EMFILE, errno.ENFILE)
 
 
 @dataclass(frozen=True)
@@ -243,7 +243,7 @@ class Pass:
         except UserError as error:
             return Judgement("not_judged", str(error))
         except OSError as error:
-            if error.errno in FULL:
+            if error.errno in OUT_OF_RESOURCES:
                 raise
             return Judgement("set_aside", f"{file}: {error.strerror or error}")
         except Exception as error:  # a fault of ours on one log must not stop the others

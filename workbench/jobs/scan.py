@@ -13,10 +13,11 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
+from workbench.files import CARD_FILE
 from workbench.logs.runs import shown_name
 from workbench.registry.values import SeenLog
 
-CARD, LOGS = "card.toml", "logs"
+LOGS = "logs"
 SUFFIXES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".h5", ".hdf5", ".json")
 Known = Mapping[tuple[str, int, int], str]
 
@@ -57,10 +58,12 @@ def machine_folders(root: Path) -> tuple[MachineFolder, ...]:
     """
     if not root.is_dir():
         raise BadRoot(
-            f"{root}: no such folder; one with {'<machine>/' + CARD} and <machine>/{LOGS} needed"
+            f"{root}: no such folder; one with <machine>/{CARD_FILE} and <machine>/{LOGS} needed"
         )
-    found = sorted(path.parent for path in root.glob(f"*/{CARD}"))
-    return tuple(MachineFolder(shown_name(p), p / CARD, p / LOGS) for p in found if _plain(p.name))
+    found = sorted(path.parent for path in root.glob(f"*/{CARD_FILE}"))
+    return tuple(
+        MachineFolder(shown_name(p), p / CARD_FILE, p / LOGS) for p in found if _plain(p.name)
+    )
 
 
 def refuse_name(folder: MachineFolder) -> None:

@@ -18,7 +18,7 @@ from workbench.jobs.scan import LOGS, SUFFIXES
 
 SOON = "soon"
 PATIENCE = timedelta(hours=1)  # a pass that is late by less is made up for
-AGAIN, LONGEST = 0.5, 60.0  # s until a watcher of files that died is begun anew
+AGAIN, LONGEST_WAIT = 0.5, 60.0  # s until a watcher of files that died is begun anew
 
 
 class BadSchedule(UserError):
@@ -85,7 +85,7 @@ def _follow_files(
     of_machine: Callable[[Change, str], bool],
 ) -> None:
     """Calls `soon` with each change of a log or card until `stop` is set."""
-    for wait in _longer(AGAIN, LONGEST):
+    for wait in _longer(AGAIN, LONGEST_WAIT):
         try:
             for _ in watch(root, watch_filter=of_machine, stop_event=stop, raise_interrupt=False):
                 soon()

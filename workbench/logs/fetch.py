@@ -7,10 +7,10 @@ from pathlib import Path
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, FileEntry
 from workbench.cards.nearest import nearest
-from workbench.files import refuse_special
+from workbench.files import CARD_FILE, refuse_special
 from workbench.links import broken_link
 
-VARIABLE = "WORKBENCH_DATA"
+DATA_VARIABLE = "WORKBENCH_DATA"
 """Environment variable naming the folder that holds `<card name>/<file>`."""
 
 
@@ -18,7 +18,7 @@ def shipped_cards() -> dict[str, Path]:
     """Paths of the shipped cards by name, from the wheel or else from the checkout."""
     here = Path(__file__).resolve().parents[1]
     for root in (here / "_datasets", here.parent / "datasets"):
-        found = {path.parent.name: path for path in sorted(root.glob("*/card.toml"))}
+        found = {path.parent.name: path for path in sorted(root.glob(f"*/{CARD_FILE}"))}
         if found:
             return found
     return {}
@@ -30,8 +30,8 @@ def card_path(name: str | Path) -> Path:
     Raises BadCard with the nearest shipped name where there is neither.
     """
     path = Path(name)
-    if path.is_dir() and (path / "card.toml").is_file():
-        return path / "card.toml"
+    if path.is_dir() and (path / CARD_FILE).is_file():
+        return path / CARD_FILE
     if path.is_file():
         return path
     broken = broken_link(path)
@@ -60,15 +60,15 @@ def find_data(name: str | Path, card: Card) -> Path:
         return path
     entry = next((entry for entry in card.files if entry.name == str(name)), None)
     folders = [card.path.parent]
-    if os.environ.get(VARIABLE):
-        folders.insert(0, Path(os.environ[VARIABLE]) / card.name)
+    if os.environ.get(DATA_VARIABLE):
+        folders.insert(0, Path(os.environ[DATA_VARIABLE]) / card.name)
     for folder in folders:
         if (folder / path).is_file():
             return _verified(folder / path, entry)
     if entry is None:
         raise BadLog(f"{name}: no such file{_nearest(path, card)}")
     if entry.url is None:
-        raise BadLog(f"{name}: not found and without a url in the card; set {VARIABLE}")
+        raise BadLog(f"{name}: not found and without a url in the card; set {DATA_VARIABLE}")
     return _download(entry, card)
 
 
@@ -113,6 +113,6 @@ def _download(entry: FileEntry, card: Card) -> Path:
     except OSError as error:  # requests' errors are OSErrors too
         raise BadLog(
             f"{entry.name}: cannot be fetched from {entry.url} ({type(error).__name__}); go "
-            f"online, or put it into <folder>/{card.name}/ and set {VARIABLE}=<folder>"
+            f"online, or put it into <folder>/{card.name}/ and set {DATA_VARIABLE}=<folder>"
         ) from error
     return Path(str(found))

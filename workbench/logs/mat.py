@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 _HEADER = 128
 _FLAGS, _MATRIX, _COMPRESSED = 6, 14, 15
-_TYPES = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 14, 15, 16, 17, 18})
+_MAT_TYPES = frozenset({1, 2, 3, 4, 5, 6, 7, 9, 12, 13, 14, 15, 16, 17, 18})
 _NUMERIC = range(6, 16)  # classes double to uint64: flags, size, name, real part, imaginary part
 _CLASSES = range(1, 19)
 _COMPLEX = 0x0800
@@ -39,7 +39,7 @@ def _elements(content: bytes, at: int, end: int, order: str) -> Iterator[tuple[i
         start = at + (4 if small else 8)
         if small:
             kind, size = kind & 0xFFFF, small
-        if kind not in _TYPES or start + size > end or (small and size > 4):
+        if kind not in _MAT_TYPES or start + size > end or (small and size > 4):
             raise ValueError("a tag does not fit")
         yield kind, start, start + size
         padding = 0 if kind == _COMPRESSED else -size % (4 if small else 8)

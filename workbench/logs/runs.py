@@ -15,7 +15,7 @@ from identification.arrays import Array, frozen
 from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
-from identification.signals.thin import LARGEST, thinned
+from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card, SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.tables import damaged, read_table
@@ -56,7 +56,7 @@ def read_runs(path: Path, card: Card) -> Prepared:
     repaired = _repaired(raw, first_row, path, card)
     del raw  # of a long log a gigabyte
     rig = card.rig(path.name)
-    if len(repaired.log) > LARGEST:  # here, where rows still count as in the file
+    if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
     prepared = prepare(_with_force(thin.log, path, card), rig, first_row)

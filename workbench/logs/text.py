@@ -18,7 +18,7 @@ _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _DELIMITERS = (";", "\t", ",", " ", "|")
 MANY = 10  # rows of a wrong length that make the header suspect instead
-LARGEST = 400_000_000  # bytes of a text file; three times that is needed to read it
+TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
 _LOOK = 65536  # characters looked at to find the layout
 
 
@@ -43,7 +43,7 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
 
     Raises BadLog where the file is not text, has no rows, or a row has the wrong number of fields.
     """
-    refuse_larger(path, LARGEST, "a text log", BadLog)
+    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
     text = _decode(path, spec.encoding)
     lines = text[:_LOOK].splitlines()
     start = spec.skip_rows

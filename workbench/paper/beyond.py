@@ -26,11 +26,11 @@ from identification.signals.clean import RIG_A, RIG_C
 from workbench.paper.figures_rig import IdentifiedRig
 from workbench.paper.measures import Case, measure
 from workbench.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst
+from workbench.steps.design import NOISE_SHARE
 
-SPREAD = 0.05  # of every parameter, on the machines near the identified one
+PARAMETER_SPREAD = 0.05  # of every parameter, on the machines near the identified one
 MACHINES = 4
-NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
-N_CS, E_TS = (1.5, 2.0, 4.0), (1e-3, 2e-3, 5e-3, 10e-3)
+N_CS_TRIED, E_TS_TRIED = (1.5, 2.0, 4.0), (1e-3, 2e-3, 5e-3, 10e-3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +114,14 @@ def _compensations(friction: Karnopp, h: float) -> Iterator[tuple[str, Compensat
         "A for velocity and error, C": CompensatorFilters(RIG_A, RIG_A, RIG_C, 2),
         "A for velocity, no B, no C": CompensatorFilters(RIG_A, PASS, PASS, 2),
     }
-    for (name, one), N_c, e_T, stick in product(filters.items(), N_CS, E_TS, (True, False)):
+    for (name, one), N_c, e_T, stick in product(
+        filters.items(), N_CS_TRIED, E_TS_TRIED, (True, False)
+    ):
         words = f"N_c = {N_c:g}, e_T = {1e3 * e_T:g} mm, F_stick {'on' if stick else 'off'}, {name}"
         yield words, Compensation(Compensator(friction, N_c, e_T, stick=stick), one)
 
 
 def _near(p: Karnopp, rng: np.random.Generator) -> Karnopp:
     """A machine whose parameters are off by a few percent each."""
-    scale = 1.0 + SPREAD * rng.standard_normal(len(NAMES))
+    scale = 1.0 + PARAMETER_SPREAD * rng.standard_normal(len(NAMES))
     return Karnopp(*(float(f * getattr(p, n)) for n, f in zip(NAMES, scale, strict=True)))

@@ -11,7 +11,7 @@ from workbench.paper.settings import PRINTED_R, PRINTED_S, PRINTED_SUMS, PRINTED
 from workbench.paper.study import Study
 
 ClaimVerdict = Literal["reproduced", "partly", "not reproduced", "beaten", "kept", "short"]
-NEAR = 0.1  # of a printed ratio
+REPRODUCED_WITHIN = 0.1  # of a printed ratio
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def _rig(found: Study) -> Iterator[PaperClaim]:
     for which, printed in PRINTED_SUMS.items():
         if which != "none":
             paper, ours = printed / PRINTED_SUMS["none"], rig.ratio("RST", which)
-            close = abs(ours / paper - 1.0) < NEAR and (ours < 1.0) == (paper < 1.0)
+            close = abs(ours / paper - 1.0) < REPRODUCED_WITHIN and (ours < 1.0) == (paper < 1.0)
             yield PaperClaim(
                 f"printed sums, RST, {which} parameters",
                 f"{paper:.3f} of that without compensation",
@@ -149,7 +149,9 @@ def _rig(found: Study) -> Iterator[PaperClaim]:
         "figure 22",
         "without F_stick not much different",
         f"{bare:.3f} against {rig.ratio('RST', 'new'):.3f}",
-        "reproduced" if abs(bare / rig.ratio("RST", "new") - 1.0) < NEAR else "not reproduced",
+        "reproduced"
+        if abs(bare / rig.ratio("RST", "new") - 1.0) < REPRODUCED_WITHIN
+        else "not reproduced",
     )
     rst, pid = (_sum(rig.drifted[name]["new"]) for name in ("RST", "PID"))
     yield PaperClaim(

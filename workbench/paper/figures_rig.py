@@ -30,8 +30,8 @@ from workbench.paper.settings import (
 )
 
 EXPERIMENT = 60.0  # s
-LEVEL, DWELL = 0.05, 2.0  # of its random steps [m], [s]
-STIFF = 4.0  # the rig's PD times this moves the machine enough to tell its parameters
+STEP_LEVEL, STEP_DWELL = 0.05, 2.0  # of its random steps [m], [s]
+STIFFER = 4.0  # the rig's PD times this moves the machine enough to tell its parameters
 
 
 @dataclass(frozen=True)
@@ -82,9 +82,9 @@ def identify_rig(set_up: SetUp, truth: Karnopp, seed: int) -> IdentifiedRig:
     """One experiment of 60 s on the rig with this friction, and the fit of its log."""
     rng = np.random.default_rng(seed)
     t = set_up.h * np.arange(round(EXPERIMENT / set_up.h), dtype=np.float64)
-    reference = reference_signal(RandomSteps(LEVEL, DWELL), t, rng)
+    reference = reference_signal(RandomSteps(STEP_LEVEL, STEP_DWELL), t, rng)
     pd = rig_pd()
-    stiff = replace(pd, R=STIFF * pd.R, T=STIFF * pd.T)
+    stiff = replace(pd, R=STIFFER * pd.R, T=STIFFER * pd.T)
     noise = LoopNoise.draw(len(t), NOISE_Y, NOISE_F, rng)
     run = simulate_servo(set_up.plant(truth), set_up.servo(stiff), reference, set_up.h, noise=noise)
     signals = {"t": run.t, "y": run.y_measured, "F": run.F_measured, "u": run.u}

@@ -11,7 +11,7 @@ from identification.model.karnopp import Karnopp
 from workbench.paper.settings import NOISE_Y, SetUp
 from workbench.steps.limit_cycle import LimitCycle, limit_cycle
 
-LAST = 0.25  # part of a dwell over which the error at standstill is taken
+STANDSTILL_SHARE = 0.25  # part of a dwell over which the error at standstill is taken
 
 
 @dataclass(frozen=True)
@@ -89,6 +89,6 @@ def standing(reference: Array) -> list[slice]:
     if len(edges) > len(reference) // 2:
         return []
     return [
-        slice(high - max(1, round(LAST * int(n))), high)
+        slice(high - max(1, round(STANDSTILL_SHARE * int(n))), high)
         for high, n in zip(edges[2:], lengths[1:].tolist(), strict=True)
     ]

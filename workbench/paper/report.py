@@ -28,8 +28,8 @@ from workbench.report.page import Section, page, render
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLOURS = (MEASURED, MODEL, REFERENCE, OTHER, BAND, "#cc79a7")
-NAMES = {"old": "old parameters", "new": "new parameters", "none": "no compensator"}
+CURVE_COLOURS = (MEASURED, MODEL, REFERENCE, OTHER, BAND, "#cc79a7")
+RUN_LABELS = {"old": "old parameters", "new": "new parameters", "none": "no compensator"}
 
 
 def paper_report(found: Study) -> str:
@@ -95,7 +95,7 @@ def _figure_8(found: Study) -> Section:
             (axes[0], found.simulation.pid, "plant of table 1"),
             (axes[1], found.simulation.pid_table_3, "plant of table 3"),
         ):
-            for name, colour in zip(names, COLOURS, strict=False):
+            for name, colour in zip(names, CURVE_COLOURS, strict=False):
                 run = cases[name].run
                 late = run.t > run.t[-1] - 10.0
                 error = 1e3 * (run.r - run.y)[late]
@@ -117,9 +117,9 @@ def _drift(found: Study) -> Section:
         drawn = figure(9.0, 6.6)
         axes = drawn.subplots(3, 1, sharex=True)
         for place, (name, cases) in zip(axes, rig.drifted.items(), strict=True):
-            for key, colour in zip(("none", "old", "new"), COLOURS, strict=False):
+            for key, colour in zip(("none", "old", "new"), CURVE_COLOURS, strict=False):
                 run = cases[key].run
-                line(place, run.t, 1e3 * (run.r - run.y), color=colour, label=NAMES[key])
+                line(place, run.t, 1e3 * (run.r - run.y), color=colour, label=RUN_LABELS[key])
             label(place, "", "error [mm]", name)
         label(axes[-1], "time [s]", "error [mm]", "RST")
         handles = axes[0].get_legend_handles_labels()
@@ -186,7 +186,7 @@ def _wrong(maps: Sensitivity) -> Section:
     with style():
         drawn = figure(7.0, 3.6)
         axes = drawn.subplots(1, 1)
-        for (name, errors), colour in zip(maps.wrong.items(), COLOURS, strict=False):
+        for (name, errors), colour in zip(maps.wrong.items(), CURVE_COLOURS, strict=False):
             axes.plot(maps.factors, errors, color=colour, marker="o", ms=3, label=name)
         axes.legend(ncols=3)
         label(axes, "parameter over its true value", "squared error over that with all true")
@@ -202,7 +202,7 @@ def _beyond(found: Study) -> Section:
     with style():
         drawn = figure(9.0, 3.6)
         axes = drawn.subplots(1, 1)
-        for (name, run), colour in zip(runs.items(), COLOURS, strict=False):
+        for (name, run), colour in zip(runs.items(), CURVE_COLOURS, strict=False):
             line(axes, run.t, 1e3 * (run.r - run.y), color=colour, label=name)
         drawn.legend(loc="outside upper right", ncols=3)
         label(axes, "time [s]", "error [mm]")
@@ -218,6 +218,6 @@ def _beyond(found: Study) -> Section:
 def _positions(axes: "Axes", cases: Mapping[str, Case]) -> None:
     first = next(iter(cases.values())).run
     line(axes, first.t, 1e3 * first.r, color=MEASURED, ls=":", label="reference")
-    for (name, case), colour in zip(cases.items(), COLOURS[1:], strict=False):
+    for (name, case), colour in zip(cases.items(), CURVE_COLOURS[1:], strict=False):
         line(axes, case.run.t, 1e3 * case.run.y, color=colour, label=name)
     label(axes, "time [s]", "position [mm]")

@@ -26,7 +26,7 @@ from workbench.paper.settings import (
 
 GAINS = (3.0, 10.0, 30.0, 100.0, 300.0)
 ZONES = (3e-4, 1e-3, 3e-3, 1e-2)  # m
-FREQUENCIES = (20.0, 50.0, 100.0)  # Hz
+DITHER_FREQUENCIES = (20.0, 50.0, 100.0)  # Hz
 EXCESS = (1.2, 2.0, 4.0)  # of the dither's force over the largest stick force, actuator alone
 BANDS = (10.0, 20.0, 40.0, 80.0)  # rad/s
 WALKS = (50.0, 200.0, 1000.0)  # N per root s
@@ -94,7 +94,7 @@ def rival_servos(set_up: SetUp, known: Karnopp) -> Iterable[tuple[str, list[tupl
 
 
 def _dithered(set_up: SetUp, known: Karnopp) -> Iterable[tuple[str, Servo]]:
-    for frequency in FREQUENCIES:
+    for frequency in DITHER_FREQUENCIES:
         for excess in EXCESS:
             force = excess * max(known.F_sp, -known.F_sn)
             amplitude = force * 2.0 * np.pi * frequency / set_up.actuator.k1

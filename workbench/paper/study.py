@@ -7,6 +7,7 @@ import numpy as np
 
 from design.polynomial import multiply, second_order
 from design.rst import RST, design_rst
+from design.specification import RSTSpecification
 from identification.estimation.fit import fit_plant
 from identification.model.karnopp import NAMES
 from workbench.cards.card import load_card
@@ -81,12 +82,10 @@ def table_1_errors(seed: int) -> dict[str, tuple[float, float]]:
 
 def placed_rst() -> RST:
     """The RST of the specification from which the printed coefficients follow."""
-    return design_rst(
-        PRINTED_A,
-        PRINTED_B,
-        0.01,
-        dominant=DOMINANT,
+    wanted = RSTSpecification(
+        DOMINANT,
         H_S=[1.0, -1.0],
         H_R=multiply(*(second_order(w, zeta, 0.01) for w, zeta in ZEROS)),
         T="all-poles",
     )
+    return design_rst(PRINTED_A, PRINTED_B, 0.01, wanted)

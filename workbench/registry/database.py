@@ -29,9 +29,9 @@ from workbench.links import broken_link
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import upgrade
 
-VARIABLE = "WORKBENCH_REGISTRY"
+REGISTRY_VARIABLE = "WORKBENCH_REGISTRY"
 DEFAULT = "registry.db"
-BUSY = 30.0  # s that SQLite waits for another process to end its transaction
+BUSY_TIMEOUT = 30.0  # s that SQLite waits for another process to end its transaction
 CONNECT = 10  # s that a PostgreSQL server may take to answer
 READING = "registry_reading"
 EXAMPLE = "postgresql://user:password@host:5432/name"
@@ -121,7 +121,7 @@ def _guarded(where: str) -> Iterator[None]:
 
 def location(given: str | None) -> str:
     """Where the registry is: what was given, else WORKBENCH_REGISTRY, else registry.db here."""
-    return given or os.environ.get(VARIABLE) or DEFAULT
+    return given or os.environ.get(REGISTRY_VARIABLE) or DEFAULT
 
 
 def _url(where: str) -> URL:
@@ -184,7 +184,7 @@ def _refuse_place(path: Path, create: bool) -> None:
     if not path.exists() and not create:
         raise BadRegistry(
             f"registry {path}: no such file; 'workbench registry add' makes one, or name it by"
-            f" --registry or {VARIABLE}"
+            f" --registry or {REGISTRY_VARIABLE}"
         )
     if not path.absolute().parent.is_dir():
         raise BadRegistry(f"registry {path}: no folder {path.parent}; make it first")
@@ -214,7 +214,7 @@ def _make_whole(path: Path) -> None:
 
 def _engine(url: URL, where: str) -> Engine:
     if url.drivername == "sqlite":
-        engine = create_engine(url, connect_args={"timeout": BUSY})
+        engine = create_engine(url, connect_args={"timeout": BUSY_TIMEOUT})
         event.listen(engine, "connect", _prepare_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         return engine

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 HEAD = "0003"  # known without importing Alembic, which most starts do not need
 RESTORE = "somebody has changed the database by hand; restore it from a copy"
-LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
+LAYOUT_LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
 
 
 def upgrade(connection: Connection, where: str) -> None:
@@ -26,7 +26,7 @@ def upgrade(connection: Connection, where: str) -> None:
         _refuse_damaged(connection, where)
         return
     if connection.dialect.name == "postgresql":
-        connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LOCK})
+        connection.execute(text("SELECT pg_advisory_xact_lock(:key)"), {"key": LAYOUT_LOCK})
     found = revision(connection, where)
     if found == HEAD:
         return

@@ -24,8 +24,8 @@ from workbench.registry.rows import lock_machine
 from workbench.registry.tables import LogRow, NoticeRow, OutboxRow, OutcomeRow, VersionRow
 from workbench.registry.values import Alarm, LogVerdict
 
-FIRST = timedelta(minutes=1)  # after an alarm's first refusal; each further one doubles it
-LONGEST = timedelta(hours=4)
+FIRST_DELAY = timedelta(minutes=1)  # after an alarm's first refusal; each further one doubles it
+LONGEST_DELAY = timedelta(hours=4)
 
 
 class Outbox:
@@ -123,8 +123,8 @@ class Outbox:
 
 def wait(refusals: int) -> timedelta:
     """How long an alarm waits that had been refused this often before."""
-    doubled: timedelta = FIRST * 2 ** min(refusals, 16)
-    return min(doubled, LONGEST)
+    doubled: timedelta = FIRST_DELAY * 2 ** min(refusals, 16)
+    return min(doubled, LONGEST_DELAY)
 
 
 def _changed(session: Session, where: ColumnElement[bool], values: dict[str, datetime]) -> int:

@@ -52,7 +52,7 @@ from workbench.registry.values import (
 
 OFTEN = 5
 OLDER = "older_than"  # key of the evidence that names the newer log behind the model in force
-APART = timedelta(minutes=1)  # by which the clocks of workers may differ
+CLOCKS_APART = timedelta(minutes=1)  # by which the clocks of workers may differ
 SHORTEST = 4  # characters of a fingerprint by which a log may be named
 
 
@@ -335,7 +335,7 @@ def _too_late(row: ClaimRow, now: datetime) -> bool:
     """Whether the claim was made by a clock that is ahead of this one by more than they may be."""
     if row.lease_ms is None:
         return False
-    return row.until > now + timedelta(milliseconds=row.lease_ms) + APART
+    return row.until > now + timedelta(milliseconds=row.lease_ms) + CLOCKS_APART
 
 
 def _milliseconds(lease: timedelta) -> int:

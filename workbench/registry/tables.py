@@ -28,7 +28,7 @@ APPEND_ONLY = (
     "notice",
     "reopening",
 )
-NAMES = {
+NAMING = {
     "ix": "ix_%(table_name)s_%(column_0_N_name)s",
     "uq": "uq_%(table_name)s_%(column_0_N_name)s",
     "ck": "ck_%(table_name)s_%(constraint_name)s",
@@ -62,7 +62,7 @@ class UtcTime(TypeDecorator[datetime]):
 class Base(DeclarativeBase):
     """All tables of the registry."""
 
-    metadata = MetaData(naming_convention=NAMES)
+    metadata = MetaData(naming_convention=NAMING)
     type_annotation_map = {str: Text(), datetime: UtcTime()}  # noqa: RUF012 - SQLAlchemy's form
 
 

@@ -8,16 +8,23 @@ from design.rst import closed_loop
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design
-from workbench.report.design_tables import HEAD, design_lines, margin_rows, polynomial_lines
-from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, style
+from workbench.report.design_tables import DESIGN_HEAD, design_lines, margin_rows, polynomial_lines
+from workbench.report.figures import (
+    CONTROLLER_COLOURS,
+    OTHER,
+    figure,
+    inline,
+    label,
+    style,
+)
 from workbench.report.page import Section, render
-
-COLOURS = {"rst": REFERENCE, "pid": MODEL}
 
 
 def controllers(found: Design, rotary: bool = False) -> Section:
     """Margins of both loops and what they rest on."""
-    html = render("table", head=HEAD, rows=margin_rows(found), lines=design_lines(found, rotary))
+    html = render(
+        "table", head=DESIGN_HEAD, rows=margin_rows(found), lines=design_lines(found, rotary)
+    )
     return Section("Controllers", html)
 
 
@@ -36,8 +43,8 @@ def sensitivity_section(found: Design, rotary: bool = False) -> Section:
         left, right = drawn.subplots(1, 2)
         for name, one in found.controllers.items():
             s = sensitivities(A, B, one.rst, w)
-            left.semilogx(w, _db(s.S_yp), color=COLOURS[name], label=name.upper())
-            right.semilogx(w, _db(s.S_up), color=COLOURS[name])
+            left.semilogx(w, _db(s.S_yp), color=CONTROLLER_COLOURS[name], label=name.upper())
+            right.semilogx(w, _db(s.S_up), color=CONTROLLER_COLOURS[name])
         left.axhline(20 * np.log10(2.0), color=OTHER, ls=":", label="modulus margin 0.5")
         top = right.get_ylim()[1]
         right.set_ylim(top - 80.0, top)
@@ -61,7 +68,7 @@ def step_response(found: Design) -> Section:
         axes = drawn.subplots()
         for name, one in found.controllers.items():
             t, y = linear_step(found, one)
-            axes.step(t, y, where="post", color=COLOURS[name], label=name.upper())
+            axes.step(t, y, where="post", color=CONTROLLER_COLOURS[name], label=name.upper())
         axes.axhline(1.0, color=OTHER, ls=":", lw=1.0)
         label(axes, "time [s]", "position / step [-]")
         axes.legend(loc="lower right")

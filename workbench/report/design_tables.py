@@ -10,11 +10,21 @@ from workbench.output import Row, table, written
 if TYPE_CHECKING:
     from rich.console import Group
 
-HEAD = ("loop", "w_n rad/s", "zeta", "modulus margin", "worst", "gain", "phase", "delay", "|S_up|")
+DESIGN_HEAD = (
+    "loop",
+    "w_n rad/s",
+    "zeta",
+    "modulus margin",
+    "worst",
+    "gain",
+    "phase",
+    "delay",
+    "|S_up|",
+)
 
 
 def margin_rows(found: Design) -> list[Row]:
-    """One row a controller, by `HEAD`."""
+    """One row a controller, by `DESIGN_HEAD`."""
     return [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
 
 
@@ -80,5 +90,7 @@ def design_view(found: Design, folder: Path, rotary: bool = False) -> "Group":
 
     lines = (*design_lines(found, rotary), *polynomial_lines(found))
     return Group(
-        table(HEAD, margin_rows(found)), *lines, written(folder, "design.json", "report.html")
+        table(DESIGN_HEAD, margin_rows(found)),
+        *lines,
+        written(folder, "design.json", "report.html"),
     )

@@ -19,7 +19,7 @@ from workbench.steps.drift import Drifted, Tested
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LINEAR = 1.0  # statistic over threshold up to which the axis is linear
+LINEAR_UP_TO = 1.0  # statistic over threshold up to which the axis is linear
 
 
 def drift_report(found: Drifted) -> str:
@@ -86,7 +86,7 @@ def _over_logs(axes: "Axes", found: Drifted) -> None:
     if other:
         axes.plot(other, np.full(len(other), 1.0), "x", ms=7, color=MODEL, label="other structure")
     axes.axhline(1.0, color=MODEL, lw=1.0)
-    axes.set_yscale("symlog", linthresh=LINEAR)
+    axes.set_yscale("symlog", linthresh=LINEAR_UP_TO)
     axes.set_ylim(bottom=-0.05)
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
-POINTS = 1200  # of a line; more than a screen shows
+CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL}
+LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
@@ -68,11 +69,11 @@ def inline(drawn: "Figure", name: str, description: str) -> Any:
 
 
 def line(axes: "Axes", x: Array, y: Array, **look: Any) -> None:
-    """A line of at most `POINTS` points that keeps every peak."""
+    """A line of at most `LINE_POINTS` points that keeps every peak."""
     axes.plot(*thinned(x, y), **look)
 
 
-def thinned(x: Array, y: Array, points: int = POINTS) -> tuple[Array, Array]:
+def thinned(x: Array, y: Array, points: int = LINE_POINTS) -> tuple[Array, Array]:
     """Lowest and highest sample of equal blocks, in the order of time."""
     n = len(x)
     if n <= points:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 CURVES = 200
-SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
-MARGIN = 1.6  # of the curve's range shown; the force of a fast start lies far outside
+SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
+SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
 
 
 @dataclass(frozen=True)
@@ -92,7 +92,7 @@ def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     for column, name in enumerate(fit.free):
         if name in NAMES:
             nine[: len(drawn), NAMES.index(name)] = drawn[:, column]
-    F_cp, F_cn, F_vp, F_vn = (nine[:, NAMES.index(name), None] for name in SLIDING)
+    F_cp, F_cn, F_vp, F_vn = (nine[:, NAMES.index(name), None] for name in SLIDING_PARAMETERS)
     curves = np.where(v > 0, F_cp + F_vp * v, -F_cn + F_vn * v)
     low, high = np.quantile(curves, [0.025, 0.975], axis=0)
     return low, high
@@ -101,7 +101,7 @@ def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
 def _limits(axes: "Axes", p: Karnopp, v_low: float, v_high: float) -> None:
     top = max(p.F_sp, p.F_cp + p.F_vp * v_high)
     bottom = min(p.F_sn, -p.F_cn + p.F_vn * v_low)
-    axes.set_ylim(MARGIN * bottom, MARGIN * top)
+    axes.set_ylim(SHOWN_RANGE * bottom, SHOWN_RANGE * top)
     axes.set_xlim(1.05 * v_low, 1.05 * v_high)
 
 

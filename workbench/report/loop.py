@@ -5,22 +5,29 @@ from typing import TYPE_CHECKING
 
 from design.loop import LoopRun
 from workbench.cards.parameter_units import shown
-from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, inline, label, line, style
+from workbench.report.figures import (
+    CONTROLLER_COLOURS,
+    OTHER,
+    figure,
+    inline,
+    label,
+    line,
+    style,
+)
 from workbench.report.page import Section, render
-from workbench.report.validation_tables import HEAD, validation_lines, validation_rows
+from workbench.report.validation_tables import VALIDATION_HEAD, validation_lines, validation_rows
 from workbench.steps.validate import COMPENSATED, Traces, Validation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-COLOURS = {"rst": REFERENCE, "pid": MODEL}
 DASHED = "--"  # with the compensator
 
 
 def judged(found: Validation, rotary: bool) -> Section:
     """Every controller on every plant, and what it misses."""
     lines = validation_lines(found, rotary)
-    html = render("table", head=HEAD, rows=validation_rows(found, rotary), lines=lines)
+    html = render("table", head=VALIDATION_HEAD, rows=validation_rows(found, rotary), lines=lines)
     return Section("Verdict", html)
 
 
@@ -57,7 +64,7 @@ def _lines(axes: "list[Axes]", trace: LoopRun, name: str, first: bool) -> None:
     if first:
         line(position, trace.t, trace.r, color=OTHER, ls=":", label="reference")
     alone = name.removesuffix(COMPENSATED)
-    colour, look = COLOURS[alone], "-" if alone == name else DASHED
+    colour, look = CONTROLLER_COLOURS[alone], "-" if alone == name else DASHED
     shown = name.replace(alone, alone.upper())
     line(position, trace.t, trace.y, color=colour, ls=look, label=shown)
     line(error, trace.t, trace.r - trace.y, color=colour, ls=look)

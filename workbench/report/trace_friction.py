@@ -22,7 +22,7 @@ from workbench.report.figures import (
     label,
     style,
 )
-from workbench.report.friction import MARGIN, friction_data
+from workbench.report.friction import SHOWN_RANGE, friction_data
 from workbench.report.page import Section, render
 from workbench.report.trace_tables import words
 from workbench.steps.trace import Traced
@@ -100,7 +100,7 @@ def _friction_lines(axes: "Axes", curves: list[Curve], reach: float, less: Karno
             top = max(top, float(np.max(np.abs(F))))
         axes.plot([0, 0], [p.F_sn, p.F_sp], color=colour, marker="_", ms=9, lw=1.2)
         top = max(top, p.F_sp, -p.F_sn)
-    axes.set_ylim(-MARGIN * top, MARGIN * top)
+    axes.set_ylim(-SHOWN_RANGE * top, SHOWN_RANGE * top)
 
 
 def viscous(v: Array, p: Karnopp) -> Array:

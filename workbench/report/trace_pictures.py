@@ -33,7 +33,7 @@ BEFORE = "#8a8a8a"
 LEVELS = 30  # of a signal, over which the running median is taken
 FINE = 90  # of a signal, for the curve of what the effect takes away, which has no noise
 DOTS = 3000
-FULL = 0.995  # share of the points that the axes hold
+SHOWN_SHARE = 0.995  # share of the points that the axes hold
 SIGNALS = {
     "v": "velocity [{velocity}]",
     "y": "position [{position}]",
@@ -49,12 +49,12 @@ SIGNALS = {
 }
 # Sign with which an effect enters the residual; 0: that of the motion.
 GAP = 0.2  # of a signal's range, over which a running median is not drawn
-EQUATIONS = {
+EQUATION_TITLES = {
     "mechanical": "equation of motion",
     "actuator": "actuator equation",
     "position": "position of the free run",
 }
-ROWS = {"position": "sample by sample, run in windows of 2 s from measured states"}
+ROWS_TAKEN = {"position": "sample by sample, run in windows of 2 s from measured states"}
 WINDOWS = "averaged over short windows"  # rows of the equations
 
 
@@ -211,11 +211,12 @@ def over_time(residual: Residual, rotary: bool) -> Section:
         f"{share_inside(values, residual.noise):.0f} % ({name})"
         for values, _, name in _both(residual)
     ]
+    equation = EQUATION_TITLES[residual.equation]
     caption = (
-        f"{EQUATIONS[residual.equation].capitalize()}, {ROWS.get(residual.equation, WINDOWS)}; a"
-        f" complete model has 95 % of its points in the band, here {', '.join(shares)}."
+        f"{equation.capitalize()}, {ROWS_TAKEN.get(residual.equation, WINDOWS)}; a complete model"
+        f" has 95 % of its points in the band, here {', '.join(shares)}."
     )
-    title = f"What the model leaves over time: {EQUATIONS[residual.equation]}"
+    title = f"What the model leaves over time: {equation}"
     return Section(title, render("figure", svg=svg, caption=caption))
 
 
@@ -277,8 +278,8 @@ def _cloud(axes: "Axes", residual: Residual, x: Array, values: Array, colour: st
 
 def _caption(picture: Picture) -> str:
     text = (
-        f"Residual of the {EQUATIONS[picture.residual.equation]}; lines are running medians, by"
-        " direction of motion. Flat at 0 is a complete model."
+        f"Residual of the {EQUATION_TITLES[picture.residual.equation]}; lines are running medians,"
+        " by direction of motion. Flat at 0 is a complete model."
     )
     if picture.how != "before":
         text += " Left: the other effects are in the model, this one is not."
@@ -322,6 +323,6 @@ def _unit(residual: Residual, rotary: bool) -> str:
 
 def _limits(axes: "Axes", residual: Residual, values: Array | None = None) -> None:
     """Range that holds all but the rarest points (by default of the residual before), and noise."""
-    top = float(np.quantile(np.abs(residual.before if values is None else values), FULL))
+    top = float(np.quantile(np.abs(residual.before if values is None else values), SHOWN_SHARE))
     top = 1.25 * max(top, 2 * float(np.median(residual.noise)), 1e-300)
     axes.set_ylim(-top, top)

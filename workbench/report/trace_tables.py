@@ -23,10 +23,10 @@ RIVAL_HEAD = ("rival", "force left", "why not")
 SAME_HEAD = ("parameter", "value", "unit", "95 % interval")
 CHANGE_HEAD = ("parameter", "before", "after", "unit", "95 % interval after", "change")
 DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
-SHOWS = 0.8  # of the force error; an effect that leaves more shows in another error
+LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
 FLOOR = 1.0 / (DRAWS + 1)  # least chance that draws can show
-LEAST = 1.1e-9  # value that a plant keeps of a parameter that comes out 0
+COUNTS_AS_ZERO = 1.1e-9  # value that a plant keeps of a parameter that comes out 0
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -151,7 +151,7 @@ def told_by(traced: Traced) -> Told | None:
     known = [told for told in every if math.isfinite(told.before) and told.before > 0]
     if not known:
         return None
-    if known[0] is every[0] and known[0].after <= SHOWS * known[0].before:
+    if known[0] is every[0] and known[0].after <= LEFT_IN_FORCE * known[0].before:
         return known[0]
     return min(known, key=lambda told: told.after / told.before)
 
@@ -217,7 +217,7 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
     """Value and interval, with the digits that mean something."""
     if estimate.value is None:
         return "-", estimate.reason or "not identified"
-    if 0.0 < abs(estimate.value) <= LEAST:
+    if 0.0 < abs(estimate.value) <= COUNTS_AS_ZERO:
         return "0", "at its bound"
     if estimate.low is None or estimate.high is None or not estimate.sd:
         return f"{estimate.value:.4g}", estimate.reason or "held"

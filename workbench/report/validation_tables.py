@@ -10,7 +10,7 @@ from workbench.steps.validate import COMPENSATED, LoopFigures, Validation
 if TYPE_CHECKING:
     from rich.console import Group
 
-HEAD = (
+VALIDATION_HEAD = (
     "loop",
     "on",
     "passes",
@@ -26,7 +26,7 @@ HEAD = (
 
 
 def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
-    """One row a controller and plant, by `HEAD`."""
+    """One row a controller and plant, by `VALIDATION_HEAD`."""
     return [
         (_shown(name), place, *_row(one, shown(rotary)))
         for name, places in found.figures.items()
@@ -100,7 +100,7 @@ def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "G
 
     return Group(
         validation_verdict(found),
-        table(HEAD, validation_rows(found, rotary)),
+        table(VALIDATION_HEAD, validation_rows(found, rotary)),
         *validation_lines(found, rotary),
         written(folder, "validation.json", "report.html"),
     )

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     pass
 
 
-HELD_OUT = 100  # added to a recipe's seed for the run that no fit sees
+HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def simulated_log(card: Card, folder: Path, *, held_out: bool = False) -> Path:
     import pandas as pd
 
     recipe = recipe_of(card)
-    seed = recipe.seed + HELD_OUT if held_out else recipe.seed
+    seed = recipe.seed + HELD_OUT_SEED if held_out else recipe.seed
     log = record(card.name, recipe, seed, card.rig())
     path = folder / f"{card.name}{'_held_out' if held_out else ''}.parquet"
     pd.DataFrame(as_columns(log, card)).to_parquet(path, index=False)

@@ -28,7 +28,7 @@ from workbench.documents.reading import read_result
 from workbench.logs.sources import Source, Sources
 from workbench.output import BadOutput, dumps
 
-SCHEMA, STREAM = "drift/1", "drift_stream/1"
+DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 
 
 @dataclass(frozen=True)
@@ -183,7 +183,7 @@ def _ratio(found: Statistic | None) -> float | None:
 
 def read_stream(path: Path) -> Stream | None:
     """What `--state` stored at `path`, None where there is no file yet; raises BadModel."""
-    return read_result(path, Stream, STREAM) if path.exists() else None
+    return read_result(path, Stream, DRIFT_STREAM_SCHEMA) if path.exists() else None
 
 
 def write_stream(path: Path, stream: Stream) -> None:
@@ -204,7 +204,7 @@ def write_stream(path: Path, stream: Stream) -> None:
 def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:
     """The tests as drift.json holds them."""
     return {
-        "schema": SCHEMA,
+        "schema": DRIFT_SCHEMA,
         "card": found.model.card,
         "model": {"file": model_file, "key": found.key},
         "settings": asdict(found.settings),

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulation_errors
-from identification.arx.order_selection import select_arx
+from identification.arx.order_selection import OrderRange, select_arx
 from identification.arx.residual_tests import residual_tests
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
@@ -42,7 +42,7 @@ Orders = tuple[int, int, int]
 DESIGN_PERIOD = 10e-3  # s
 SPLIT = 0.6
 FAST = 0.99
-LARGEST = 4  # na, nb and nk tried where no orders are given
+ORDERS = OrderRange(4, 4, 4, min_nk=1)  # tried where none are given
 FEWEST = 20  # design periods in a log
 MEETS = 1e-2  # relative difference up to which two periods count as one
 RUNAWAY = 1e30  # m; what goes as far has no error to speak of
@@ -224,10 +224,7 @@ def arx_plant(
     ends = [round(SPLIT * len(y)) for _, y in runs]
     held = [(u[n:], y[n:]) for (u, y), n in zip(runs, ends, strict=True)]
     if orders is None:
-        choice = select_arx(
-            runs, None, h, max_na=LARGEST, max_nb=LARGEST, max_nk=LARGEST, min_nk=1,
-            split=SPLIT, offset=True,
-        )  # fmt: skip
+        choice = select_arx(runs, None, h, orders=ORDERS, split=SPLIT, offset=True)
         orders = (choice.model.na, choice.model.nb, choice.model.nk)
     fitted = [(u[:n], y[:n]) for (u, y), n in zip(runs, ends, strict=True)]
     trial = fit_arx(fitted, *orders, h, offset=True)

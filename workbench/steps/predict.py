@@ -19,7 +19,7 @@ from workbench.documents.model import Model
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
-COLUMNS = (
+PREDICTION_COLUMNS = (
     "t",
     "force_applied",
     "force_predicted",
@@ -171,6 +171,8 @@ def prediction_csv(found: Sequence[Prediction]) -> str:
     """prediction.csv of the runs of one log; a cell is empty where there is no value."""
     import pandas as pd
 
-    frames = [pd.DataFrame({name: getattr(one, name) for name in COLUMNS}) for one in found]
+    frames = [
+        pd.DataFrame({name: getattr(one, name) for name in PREDICTION_COLUMNS}) for one in found
+    ]
     text: str = pd.concat(frames).to_csv(index=False, float_format="%.10g")
     return text

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise, LoopRun, simulate_loop
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
@@ -27,8 +27,8 @@ from workbench.cards.units import Motion
 from workbench.documents.model import as_number
 from workbench.files import ABSURD
 
-PASSES = 30  # of an open loop in which friction follows pressures, and they the force
-SETTLED = 1e-9  # relative change of the force from which it has settled
+MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
+SETTLED_CHANGE = 1e-9  # relative change of the force from which it has settled
 Chambers = dict[str, OfForce]
 
 
@@ -76,14 +76,13 @@ def _in_loop(
     assert loop is not None
     force = ForcePI(loop.force.k_i, loop.force.T_i) if loop.force else None
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
-    parts = (recipe.plant, _position(recipe), force, reference, recipe.h)
+    cascade = Cascade(_position(recipe), force, loop.control_limit)
+    parts = (recipe.plant, cascade, reference, recipe.h)
     run: LoopRun
     if recipe.plant.effects:
-        run = simulate_effect_loop(
-            *parts, noise=noise, control_limit=loop.control_limit, signals=chambers
-        )
+        run = simulate_effect_loop(*parts, noise=noise, signals=chambers)
     else:
-        run = simulate_loop(*parts, noise=noise, control_limit=loop.control_limit)
+        run = simulate_loop(*parts, noise=noise)
     return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
 
 
@@ -111,16 +110,16 @@ def _open_run(recipe: Recipe, u: Array, chambers: Chambers) -> FreeRun:
     blank = Log("recipe", {"t": recipe.t, "y": np.zeros(len(u)), "u": u, "F": force})
     start = (0.0, 0.0, float(force[0]))
     circular = any(name in chambers for one in recipe.plant.effects for name in one.effect.signals)
-    for _ in range(PASSES):
+    for _ in range(MOST_PASSES):
         known = blank.with_signals(**{name: of(force) for name, of in chambers.items()})
         run = free_run(recipe.plant, known, start, "command")
         change = float(np.max(np.abs(run.F - force)))
-        if not circular or change <= SETTLED * float(np.max(np.abs(run.F))):
+        if not circular or change <= SETTLED_CHANGE * float(np.max(np.abs(run.F))):
             return run
         force = run.F
     raise BadModel(
-        f"pressures and friction do not agree after {PASSES} passes (the force still changes by"
-        f" {change:.3g} N); close the loop, or weaken the effect of the pressures"
+        f"pressures and friction do not agree after {MOST_PASSES} passes (the force still changes"
+        f" by {change:.3g} N); close the loop, or weaken the effect of the pressures"
     )
 
 

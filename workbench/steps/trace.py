@@ -21,7 +21,7 @@ from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import arx_plant, speed_of
 
-SCHEMA = "trace/1"
+TRACE_SCHEMA = "trace/1"
 Progress = Callable[[str, float], None]
 
 
@@ -183,7 +183,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
     """The trace as trace.json writes it: the keys of the contract, and what it allows beside."""
     found, motion = traced.trace, traced.model.rig.motion
     return {
-        "schema": SCHEMA,
+        "schema": TRACE_SCHEMA,
         "card": traced.model.card,
         "log": _fingerprints(traced.train),
         "test_log": _fingerprints(traced.test),

@@ -26,10 +26,10 @@ SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
 DWELLS = 15.0  # length of a step, in time constants of the slowest loop
 SHORTEST_DWELL = 1.0  # s
 LAST_DWELL = 10.0  # s
-LAST = 0.5  # part of a dwell that is judged
+JUDGED_SHARE = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
-BAND = 0.05  # of a step, in which a settled position stays
-REST = 2.0  # s at rest over which the noise in the command is taken
+SETTLING_BAND = 0.05  # of a step, in which a settled position stays
+STANDSTILL_SECONDS = 2.0  # s at rest over which the noise in the command is taken
 COMPENSATED = " + compensator"  # behind a controller's name
 ESCAPED = 10.0  # times the step
 
@@ -174,14 +174,16 @@ def references(machine: Model, found: Design) -> tuple[Array, Array, Array]:
     low, high = machine.travel
     step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
     h = loop_period(found)
-    n = round((max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / LAST) / h)
+    n = round(
+        (max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / JUDGED_SHARE) / h
+    )
     counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
     w = SMOOTH_SPEED * found.controllers[judged_of(found)].dominant[0]
     t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
     smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
-    return levels, smooth, np.zeros(max(round(REST / h), 2))
+    return levels, smooth, np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
 
 
 def travel(found: Design, step: float) -> float:
@@ -253,7 +255,7 @@ def _judged(trace: LoopRun) -> Any:
     """The last half of every dwell, True at its samples."""
     keep = np.zeros(len(trace.r), dtype=bool)
     for low, high in _dwells(trace):
-        keep[high - round(LAST * (high - low)) : high] = True
+        keep[high - round(JUDGED_SHARE * (high - low)) : high] = True
     return keep
 
 
@@ -277,9 +279,11 @@ def _overshoot(trace: LoopRun) -> float:
 
 
 def _settling(trace: LoopRun) -> float:
-    """Longest time [s] from a step until the position stays within `BAND` of it."""
+    """Longest time [s] from a step until the position stays within `SETTLING_BAND` of it."""
     h = float(trace.t[1] - trace.t[0])
-    outside = [np.flatnonzero(np.abs(e) > BAND * abs(height)) for height, e in _after_steps(trace)]
+    outside = [
+        np.flatnonzero(np.abs(e) > SETTLING_BAND * abs(height)) for height, e in _after_steps(trace)
+    ]
     return h * max(float(late[-1] + 1) if late.size else 0.0 for late in outside)
 
 

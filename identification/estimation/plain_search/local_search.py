@@ -78,7 +78,8 @@ def refine(
     delta = np.full(len(scale), 1e-5)
     form = _quadratic(runs, p, starts, theta, free, scale, delta, cap)
     for _ in range(iterations):
-        trials = _steps(form, theta, center, scale, prior, damping, free, p, own)
+        trials = _steps(form, theta, center, scale, prior, damping, len(free), own)
+        keep_near(trials, free, p)
         sets, begun = unpack(runs, p, starts, free, trials)
         costs = total_cost(runs, sets, cap, begun)
         spent += len(trials) + WIDTH
@@ -308,8 +309,7 @@ def _steps(
     scale: Array,
     prior: Array,
     damping: float,
-    free: IntArray,
-    row: Array,
+    shared: int,
     own: Sequence[int],
 ) -> Array:
     """Trial points (TRIALS, d) for dampings around the last that served."""
@@ -320,11 +320,10 @@ def _steps(
         weight = damping * 10.0 ** (i - 3) if i else 0.0
         matrix = form.hessian + np.diag(weight * diagonal + prior)
         try:
-            step = _solved(matrix, pull, len(free), own)
+            step = _solved(matrix, pull, shared, own)
         except np.linalg.LinAlgError:
             step = np.linalg.pinv(matrix) @ pull
         trials[i] = theta - step * scale
-    keep_near(trials, free, row)
     return trials
 
 

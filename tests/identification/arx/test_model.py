@@ -23,7 +23,7 @@ from identification.arx.model import (
     simulate_arx,
     simulation_errors,
 )
-from identification.arx.order_selection import select_arx
+from identification.arx.order_selection import OrderRange, select_arx
 from identification.arx.qr_factor import ArxAccumulator, Order
 from identification.errors import BadLog, BadModel, NotIdentifiable, UserError
 
@@ -312,7 +312,7 @@ def test_the_callers_arrays_stay_as_they_are() -> None:
     u, y = respond(RST_A, RST_B, 500, 1e-5, 10)
     before = u.copy(), y.copy()
     model = fit_arx((u, y), 3, 2, 3, H, offset=True)
-    select_arx((u, y), None, H, max_na=2, max_nb=2, max_nk=2)
+    select_arx((u, y), None, H, orders=OrderRange(2, 2, 2))
     predict_one_step(model, u, y)
     simulate_arx(model, u, y[:10])
     np.testing.assert_array_equal(u, before[0])
@@ -404,11 +404,11 @@ def test_other_refusals() -> None:
     with pytest.raises(BadModel, match="split"):
         select_arx((u0, y0), None, H, split=1.0)
     with pytest.raises(BadModel, match="delays"):
-        select_arx((u0, y0), None, H, min_nk=3, max_nk=2)
+        OrderRange(min_nk=3, max_nk=2)
     with pytest.raises(BadLog, match="validation samples"):
         select_arx((u0, y0), (u0[:20], y0[:20]), H)
     with pytest.raises(NotIdentifiable, match="zero"):
-        select_arx((u0, 0.0 * y0), (u0, y0), H, max_nb=0)
+        select_arx((u0, 0.0 * y0), (u0, y0), H, orders=OrderRange(max_nb=0))
     second = ArxAccumulator(1, 1, 1)
     second.update(u0, y0)
     second.new_run()

@@ -19,8 +19,8 @@ def oscillation(n: int, h: float) -> Log:
 
 @pytest.fixture
 def small(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(thin, "LARGEST", 20_000)
-    monkeypatch.setattr(thin, "KEPT", 10_000)
+    monkeypatch.setattr(thin, "LONGEST_UNTHINNED", 20_000)
+    monkeypatch.setattr(thin, "LONGEST_THINNED", 10_000)
 
 
 def test_a_log_of_usual_size_is_passed_on_as_it_is(small: None) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 
 from design.effect_loop import simulate_effect_loop
-from design.loop import ForcePI, LoopNoise
+from design.loop import Cascade, ForcePI, LoopNoise
 from design.pid import pid_to_rst
 from identification.arrays import Array
 from identification.effects._library import built_in
@@ -39,9 +39,7 @@ def logged(speeds: tuple[float, ...], seed: int) -> Log:
     r = strokes(speeds, seed)
     noise = LoopNoise.draw(len(r), 1e-5, 1e-2, np.random.default_rng(seed))
     pid = pid_to_rst(1754.0, 0.072, 0.018, 0.2, H)
-    run = simulate_effect_loop(
-        PLANT, pid, ForcePI(0.02, 0.05), r, H, noise=noise, control_limit=5.0
-    )
+    run = simulate_effect_loop(PLANT, Cascade(pid, ForcePI(0.02, 0.05), 5.0), r, H, noise=noise)
     return Log(f"run{seed}", {"t": run.t, "y": run.y_measured, "F": run.F_measured, "u": run.u})
 
 

@@ -25,7 +25,7 @@ from tests.workbench.fleet.values import (
 from workbench.fleet.cluster import Cluster, Work, cluster_at, local_cluster
 from workbench.fleet.recording import LEASE, InRegistry, NoRegistry, Recorder
 from workbench.fleet.run import FleetRun, FleetSettings, Report
-from workbench.fleet.store import RESULTS, ResultStore
+from workbench.fleet.store import RESULTS_FOLDER, ResultStore
 from workbench.fleet.values import BadCluster, BadLogs, LogFile, Result
 from workbench.jobs.lease import Patience
 from workbench.registry.errors import RegistryAway
@@ -64,7 +64,7 @@ def run(
 
 def verdicts(folder: Path) -> dict[str, str]:
     """Verdicts by machine; no machine may have two rows."""
-    rows = pq.read_table(folder / RESULTS).to_pylist()
+    rows = pq.read_table(folder / RESULTS_FOLDER).to_pylist()
     found = {row["log"]: row["verdict"] for row in rows}
     assert len(found) == len(rows)
     return {name.partition("/")[0]: verdict for name, verdict in found.items()}

@@ -18,7 +18,7 @@ from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from workbench.jobs.alarms import (
     ALARMING,
     IN_A_ROW,
-    KEPT,
+    KEPT_FOR,
     BadWebhook,
     Delivery,
     Unreachable,
@@ -28,7 +28,7 @@ from workbench.jobs.alarms import (
 )
 from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.passes import Pass, Report
-from workbench.registry.outbox import FIRST, LONGEST, Outbox
+from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox
 from workbench.registry.store import Registry
 from workbench.registry.values import Alarm
 
@@ -106,7 +106,7 @@ def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: L
     assert [event for event, _ in told] == ["webhook_failed"]
     assert "Connection refused" in told[0][1]["reason"]
     assert send(judged, webhook(listener)).sent == 2
-    assert send(judged, webhook(listener), later=2 * KEPT) == Delivery()
+    assert send(judged, webhook(listener), later=2 * KEPT_FOR) == Delivery()
 
 
 def test_a_refused_alarm_delays_itself_alone(fleet: Registry, listener: Listener) -> None:
@@ -120,7 +120,7 @@ def test_a_refused_alarm_delays_itself_alone(fleet: Registry, listener: Listener
     listener.by_machine = {}
     with Registry(str(fleet.database.where)) as other:
         assert send(other, webhook(listener)) == Delivery(0, 1)
-        assert send(other, webhook(listener), later=1.1 * FIRST) == Delivery(1)
+        assert send(other, webhook(listener), later=1.1 * FIRST_DELAY) == Delivery(1)
 
 
 def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
@@ -129,14 +129,14 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
     listener.by_machine = {"m3": 400}
     told, passed = Told(), timedelta(0)
     tries: list[timedelta] = []
-    while passed < KEPT + 10 * MINUTE:
+    while passed < KEPT_FOR + 10 * MINUTE:
         before = told.events().count("alarm_refused")
         send(fleet, webhook(listener), later=passed, report=told)
         if told.events().count("alarm_refused") > before:
             tries.append(passed)
         passed += 5 * MINUTE
     gaps = [after - earlier for earlier, after in pairwise(tries)]
-    assert gaps == sorted(gaps) and gaps[0] <= 5 * MINUTE and gaps[-1] >= LONGEST
+    assert gaps == sorted(gaps) and gaps[0] <= 5 * MINUTE and gaps[-1] >= LONGEST_DELAY
     assert len(tries) < 20
     given_up = [said for event, said in told if event == "alarm_given_up"]
     assert [said["machine"] for said in given_up] == ["m3"]
@@ -146,7 +146,7 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
 def test_results_from_before_there_was_a_webhook_are_not_given_up(
     fleet: Registry, listener: Listener
 ) -> None:
-    assert send(fleet, webhook(listener), later=2 * KEPT) == Delivery()
+    assert send(fleet, webhook(listener), later=2 * KEPT_FOR) == Delivery()
 
 
 def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
@@ -165,7 +165,7 @@ def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
     assert tried == [f"m{i}" for i in range(3 * IN_A_ROW)]
     assert told.events() == ["webhook_failed"] * 3
     assert [said["waiting"] for _, said in told] == [10] * 3
-    assert send(fleet, dead(), later=KEPT + MINUTE, report=told).given_up == 10
+    assert send(fleet, dead(), later=KEPT_FOR + MINUTE, report=told).given_up == 10
 
 
 def test_a_pass_spends_so_much_time_on_alarms(fleet: Registry, listener: Listener) -> None:
@@ -257,7 +257,7 @@ def test_the_address_is_never_shown(
     told = Told()
     with caplog.at_level(logging.INFO):
         found = send(judged, to, report=told)
-        send(judged, to, later=KEPT + MINUTE, report=told)
+        send(judged, to, later=KEPT_FOR + MINUTE, report=told)
     assert found.sent == (2 if status == 200 else 0)
     shown = repr((told, to, found)) + caplog.text
     assert "geheim" not in shown and "services" not in shown
@@ -281,7 +281,7 @@ def test_an_address_that_is_none(url: str) -> None:
 def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Path) -> None:
     listener.by_machine = {"m0": 500}
     outbox, now = Outbox(fleet.database), datetime.now(UTC)
-    outbox.fill(ALARMING, since=now - KEPT - MINUTE, now=now)
+    outbox.fill(ALARMING, since=now - KEPT_FOR - MINUTE, now=now)
     (given_up, *_) = (a for a in outbox.due(now) if a.machine == "m1")
     assert outbox.give_up(before=given_up.at + timedelta(microseconds=1), now=now)
     send(fleet, webhook(listener))

@@ -8,14 +8,14 @@ import pytest
 
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, load_card
-from workbench.logs.fetch import VARIABLE, card_path, find_data, shipped_cards
+from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data, shipped_cards
 
 BYTES = b"t,y,F\n0,0,0\n"
 
 
 @pytest.fixture
 def card(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Card:
-    monkeypatch.delenv(VARIABLE, raising=False)
+    monkeypatch.delenv(DATA_VARIABLE, raising=False)
     monkeypatch.chdir(tmp_path)
     folder = tmp_path / "cards"
     folder.mkdir()
@@ -56,7 +56,7 @@ def test_the_folder_of_the_variable_comes_before_the_card_s(
     data = tmp_path / "data" / "set" / "run1.csv"
     data.parent.mkdir(parents=True)
     data.write_bytes(BYTES)
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "data"))
+    monkeypatch.setenv(DATA_VARIABLE, str(tmp_path / "data"))
     assert find_data("run1.csv", card) == data
 
 
@@ -90,7 +90,7 @@ def test_offline_says_what_to_do(
     with pytest.raises(BadLog) as caught:
         find_data("run1.csv", card)
     assert "cannot be fetched" in str(caught.value)
-    assert VARIABLE in str(caught.value)
+    assert DATA_VARIABLE in str(caught.value)
     assert "\n" not in str(caught.value)
 
 

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from design.compensator import E_T, F_CN, F_CP, F_SN, F_SP, INNER, INNER_NONE, Compensator
+from design.compensator import E_T, INNER, INNER_NONE, Compensator
 from design.servo import Compensation
 from identification.arrays import Array
 from identification.model.karnopp import Karnopp
+from identification.simulation.karnopp_step import F_CN, F_CP, F_SN, F_SP
 from workbench.output import dumps
 from workbench.paper.claims import claims
 from workbench.paper.document import paper_document

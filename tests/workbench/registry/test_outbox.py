@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from workbench.registry.outbox import FIRST, LONGEST, Outbox, wait
+from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox, wait
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Judgement, SeenLog
@@ -41,7 +41,7 @@ def test_an_alarm_is_kept_until_it_is_taken(outbox: Outbox) -> None:
     for _ in range(2):
         outbox.sent(alarm, now=NOW)
         outbox.fill(["set_aside"], since=NOW, now=NOW)
-        assert outbox.due(NOW + LONGEST) == ()
+        assert outbox.due(NOW + LONGEST_DELAY) == ()
         assert outbox.counts(NOW) == {}
 
 
@@ -67,17 +67,17 @@ def test_one_worker_at_a_time_has_it_in_hand(outbox: Outbox) -> None:
 
 def test_a_refused_alarm_waits_and_is_given_up(outbox: Outbox) -> None:
     (alarm,) = outbox.due(NOW)
-    assert outbox.refused(alarm, now=NOW) == NOW + FIRST
+    assert outbox.refused(alarm, now=NOW) == NOW + FIRST_DELAY
     assert outbox.due(NOW) == ()
-    assert outbox.due(NOW + FIRST) == (alarm,)
-    assert outbox.refused(alarm, now=NOW) == NOW + 2 * FIRST
+    assert outbox.due(NOW + FIRST_DELAY) == (alarm,)
+    assert outbox.refused(alarm, now=NOW) == NOW + 2 * FIRST_DELAY
     assert outbox.counts(NOW) == {"m": (1, 0)}
     assert outbox.give_up(before=NOW, now=NOW) == ()
     assert outbox.give_up(before=NOW + MINUTE, now=NOW) == (alarm,)
     assert outbox.give_up(before=NOW + MINUTE, now=NOW) == ()
-    assert outbox.due(NOW + LONGEST) == ()
+    assert outbox.due(NOW + LONGEST_DELAY) == ()
     assert outbox.counts(NOW) == {"m": (0, 1)}
-    assert not outbox.take(alarm, until=NOW + LONGEST, now=NOW + LONGEST)
+    assert not outbox.take(alarm, until=NOW + LONGEST_DELAY, now=NOW + LONGEST_DELAY)
 
 
 def test_a_refusal_that_comes_too_late_changes_nothing(outbox: Outbox) -> None:
@@ -88,5 +88,5 @@ def test_a_refusal_that_comes_too_late_changes_nothing(outbox: Outbox) -> None:
 
 
 def test_waits_double_up_to_some_hours() -> None:
-    assert [wait(n) / FIRST for n in range(4)] == [1, 2, 4, 8]
-    assert wait(1000) == LONGEST
+    assert [wait(n) / FIRST_DELAY for n in range(4)] == [1, 2, 4, 8]
+    assert wait(1000) == LONGEST_DELAY

@@ -10,7 +10,7 @@ import pytest
 from identification.model.plant import Actuator
 from tests.chain import TABLES, identified, model_of
 from workbench.cards.parameter_units import actuator_units, friction_units
-from workbench.report.figures import POINTS, evenly_spread, thinned
+from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_report, identification_report, validation_report
@@ -126,7 +126,7 @@ def test_thinning_keeps_ends_and_peaks() -> None:
     y[54_321] = 7.0
     y[12_345] = -9.0
     xs, ys = thinned(x, y)
-    assert len(xs) <= POINTS + 4
+    assert len(xs) <= LINE_POINTS + 4
     assert ys.max() == 7.0 and ys.min() == -9.0
     assert (xs[0], xs[-1]) == (0.0, 99_999.0)
     assert np.all(np.diff(xs) > 0)

@@ -31,7 +31,7 @@ from workbench.steps.identify import (
     decimated,
     decimation,
 )
-from workbench.steps.predict import COLUMNS, predict, prediction_csv
+from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_csv
 from workbench.steps.simulate import record, truth
 from workbench.steps.validate import Limits, validate, validation_document
 
@@ -210,8 +210,8 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     assert found.position_rms < 2e-4
     assert found.force_simulated_rms is not None and found.force_simulated_rms < 0.03
     header, first, *_ = prediction_csv([found]).splitlines()
-    assert header == ",".join(COLUMNS)
-    assert len(first.split(",")) == len(COLUMNS)
+    assert header == ",".join(PREDICTION_COLUMNS)
+    assert len(first.split(",")) == len(PREDICTION_COLUMNS)
     assert card.recipe is not None
 
 
