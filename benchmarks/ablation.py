@@ -1,11 +1,12 @@
 """Which rules of the tracer change what it says: each switched off, or its number doubled.
 
-    python benchmarks/ablation.py [--first 700] [--how off] [--rules DOUBTFUL ...] [--jobs 2]
+    python benchmarks/ablation.py [--first 700] [--how off] [--rules HELPS ...] [--quick] [--jobs 2]
 
 A rule is a number that decides; off is the value at which it never does. The cases are those of
 the blind benchmark (benchmarks/blind_cases.py), one of every kind that a verdict can go wrong in,
 on fixed seeds; what a rule changes is the verdict, the effects named, or the signal that a rest
-depends on. `--how double` and `--how halve` change the number instead.
+depends on. `--how double` and `--how halve` change the number instead; `--quick` leaves out the
+cases that take longest.
 """
 
 import argparse
@@ -41,26 +42,26 @@ CASES = (
     "removed:force:stribeck:0.2:{0}",
     "drift:table2:-:0.1:{0}",
 )
+SLOW = (0, 4, 6, 10, 11)  # of them
 ALL, NONE = float("inf"), 0.0
 # The value at which a rule never decides.
 RULES: dict[str, float] = {
-    "CARRIED": ALL, "OF_MISSING": NONE, "SLIDES": NONE, "BELOW": ALL, "SHARE_LEFT": ALL,
-    "ROUGH_LEFT": NONE, "IMPOSED_LEFT": ALL, "STRUCTURED": ALL, "RESTLESS": ALL, "ASTRAY": ALL,
-    "OFF": NONE, "DOUBTFUL": ALL, "MOST_PLACES": 99, "CLEARLY": NONE, "SLIGHT_SHARE": ALL,
-    "LUCK_IN_GAIN": NONE, "RIGID_CONTACT": NONE, "RIVALS_TRIED": 0, "BRAKES": NONE,
-    "DECISIVE": 1.0, "WALKED": 1.5, "BENT": 1.5, "UNCONTESTED": NONE, "NEARLY_FOLLOWED": NONE,
+    "CARRIED": ALL, "SLIDES": NONE, "BELOW": ALL, "SHARE_LEFT": ALL, "ROUGH_LEFT": NONE,
+    "IMPOSED_LEFT": ALL, "STRUCTURED": ALL, "ASTRAY": ALL, "OFF": NONE, "MOST_PLACES": 99,
+    "CLEARLY": NONE, "SLIGHT_SHARE": ALL, "LUCK_IN_GAIN": NONE, "RIGID_CONTACT": NONE,
+    "RIVALS_TRIED": 0, "BRAKES": NONE, "UNCONTESTED": NONE, "NEARLY_FOLLOWED": NONE,
     "LEAST_MASS": NONE, "EARNS": ALL, "NO_SEARCH_WILL_DO": ALL, "VAIN": ALL, "ONCE_MORE": 0,
-    "NEEDLESS": NONE, "DOES_NOTHING": NONE, "HALF_OF_EXCESS": ALL, "ALONE": NONE, "OF_STEPS": 1.0,
-    "MAY_BE_UNEVEN": NONE, "GOES_ON": ALL, "WORTH": 1.0, "FINALISTS": 1, "AHEAD": 99,
-    "FAR_BEHIND": ALL, "BEHIND": ALL, "LARGER": 1, "LOST_MISFIT": ALL, "HUNDREDTH": NONE,
-    "HELPS": ALL, "LEAST_DEPENDENCE": NONE, "SECOND_SIGNAL": ALL, "APART": ALL, "SWINGS": NONE,
-    "CALLED": NONE, "SEARCHED": 1.0, "LEAST_SHARE": NONE, "CHANCE_LEVEL": 1.0, "MATERIAL": NONE,
-    "CARRIES": ALL, "MOSTLY_EXPLAINED": NONE, "SHIFT": NONE, "MATERIAL_RATE": NONE,
-    "ELASTIC": ALL, "REFUSED": 1, "HARDLY": NONE, "PENALTY": NONE, "DRIFT_GAIN": NONE,
-    "DRIFT_SHARE": NONE, "MOTION_SHARE": NONE, "DRIFT_LEAST": NONE, "INERT": NONE,
-    "WIDEST_BAND": ALL, "SLIGHT": NONE, "MUCH": ALL, "MUCH_IS_LEFT": ALL, "TRIM": ALL,
-    "FEWEST_EVENTS": 99999, "ROBUST_SQUARE": 1e9, "SPEEDS_APART": NONE, "NEARLY": 1.1,
-    "COMPLETE": 1.5, "PROMISING_MISFIT": ALL, "POOR": 99, "LUCKY_WINDOWS": NONE,
+    "NEEDLESS": NONE, "DOES_NOTHING": NONE, "HALF_OF_EXCESS": ALL, "ALONE": NONE, "OF_STEPS":
+    1.0, "MAY_BE_UNEVEN": NONE, "GOES_ON": ALL, "WORTH": 1.0, "FINALISTS": 1, "AHEAD": 99,
+    "FAR_BEHIND": ALL, "BEHIND": ALL, "LARGER": 1, "HELPS": ALL, "LEAST_DEPENDENCE": NONE,
+    "SECOND_SIGNAL": ALL, "APART": ALL, "SWINGS": NONE, "CALLED": NONE, "SEARCHED": 1.0,
+    "LEAST_SHARE": NONE, "CHANCE_LEVEL": 1.0, "MATERIAL": NONE, "CARRIES": ALL,
+    "MOSTLY_EXPLAINED": NONE, "SHIFT": NONE, "ELASTIC": ALL, "REFUSED": 1, "HARDLY": NONE,
+    "PENALTY": NONE, "DRIFT_GAIN": NONE, "DRIFT_SHARE": NONE, "MOTION_SHARE": NONE,
+    "DRIFT_LEAST": NONE, "INERT": NONE, "WIDEST_BAND": ALL, "SLIGHT": NONE, "MUCH": ALL,
+    "MUCH_IS_LEFT": ALL, "TRIM": ALL, "FEWEST_EVENTS": 99999, "ROBUST_SQUARE": 1e9,
+    "SPEEDS_APART": NONE, "COMPLETE": 1.5, "ADEQUATE": 1.1, "FOLLOWED": 1.5, "LINEAR_ACTUATOR":
+    ALL, "PROMISING_MISFIT": ALL, "POOR": 99, "LUCKY_WINDOWS": NONE,
 }  # fmt: skip
 
 
@@ -80,10 +81,10 @@ class Said:
         )  # fmt: skip
 
 
-def made(first: int) -> list[Made]:
+def made(first: int, quick: bool) -> list[Made]:
     """The cases as simulated; one that its loop does not bear is left out."""
     out = []
-    for name in CASES:
+    for name in (one for i, one in enumerate(CASES) if not (quick and i in SLOW)):
         with contextlib.suppress(UserError, RuntimeError):
             out.append(make(case_of(name.format(first)), SECONDS))
     return out
@@ -124,9 +125,9 @@ def changed(rule: str, how: str) -> Iterator[None]:
             setattr(module, rule, before)
 
 
-def tried(rule: str, first: int, how: str) -> tuple[str, list[Said]]:
+def tried(rule: str, first: int, quick: bool, how: str) -> tuple[str, list[Said]]:
     """What is said of every case with this rule changed."""
-    cases = made(first)
+    cases = made(first, quick)
     with changed(rule, how) if rule else contextlib.nullcontext():
         return rule, [said_of(one) for one in cases]
 
@@ -150,10 +151,11 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=700)
     parser.add_argument("--how", choices=("off", "double", "halve"), default="off")
     parser.add_argument("--rules", nargs="*", default=list(RULES))
+    parser.add_argument("--quick", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
-    cases = made(asked.first)
-    _, usual = tried("", asked.first, asked.how)
+    cases = made(asked.first, asked.quick)
+    _, usual = tried("", asked.first, asked.quick, asked.how)
     for one, said in zip(cases, usual, strict=True):
         print(
             f"{one.case.name:60s} {said.verdict} {' '.join(said.effects)}"
@@ -161,7 +163,7 @@ def main() -> None:
             flush=True,
         )
     with ProcessPoolExecutor(asked.jobs) as pool:
-        run = partial(tried, first=asked.first, how=asked.how)
+        run = partial(tried, first=asked.first, quick=asked.quick, how=asked.how)
         for rule, found in pool.map(run, asked.rules):
             print(told(rule, cases, usual, found), flush=True)
 

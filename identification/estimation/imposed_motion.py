@@ -33,7 +33,7 @@ from identification.signals.initial_state import measured_start
 from identification.thresholds import SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
-FEWEST_ROWS = 4  # in each direction
+FEWEST_OF_DIRECTION = 4  # in each direction
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
@@ -124,10 +124,10 @@ def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:
     """
     up = sum(int(np.count_nonzero(one.up)) for one in logs)
     down = sum(len(one.up) for one in logs) - up
-    if min(up, down) < FEWEST_ROWS:
+    if min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
             f"{name}: {up} windows of sliding in positive and {down} in negative direction, at"
-            f" least {FEWEST_ROWS} of each needed; log strokes in both directions"
+            f" least {FEWEST_OF_DIRECTION} of each needed; log strokes in both directions"
         )
     theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     for _ in range(ROUNDS):

@@ -35,6 +35,7 @@ from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.nudged_search import (
     SEARCHES,
     STICK_PER_COULOMB,
+    SearchLimits,
     closest,
     loaded,
 )
@@ -134,7 +135,8 @@ def fitted_structure(
         banded = BREAKAWAY in outcomes and not missing and not by_loads
         known = {} if missing else left_open(plant.effects, prior)
         searches = 0 if missing else SEARCHES
-        done = closest(begins, logs, drive, rng, searches, banded, known, done, vain)
+        limits = SearchLimits(searches, banded, known, vain)
+        done = closest(begins, logs, drive, rng, limits, done)
     return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
 
 

@@ -130,38 +130,50 @@ def nearer(plants: Sequence[Plant], logs: Sequence[MotionLog], drive: Drive) -> 
     return min(plants, key=lambda one: loss(errors_of(one)))
 
 
+@dataclass(frozen=True)
+class SearchLimits:
+    """How long a plant is searched.
+
+    most: searches on the whole logs, none where no search will do; told: the first plant has
+    everything but its band from the equations, so it is searched close by before; known: by name,
+    how far the equations leave a parameter open; vain: misfit on the short logs beyond which what
+    was found already stays.
+    """
+
+    most: int = SEARCHES
+    told: bool = False
+    known: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
+    vain: float = np.inf
+
+
+USUAL_LIMITS = SearchLimits()
+
+
 def closest(
     begins: Sequence[Plant], logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES, told: bool = False,
-    known: Mapping[str, float] = MappingProxyType({}), done: Refit | None = None,
-    vain: float = np.inf,
+    limits: SearchLimits = USUAL_LIMITS, done: Refit | None = None,
 ) -> Refit:  # fmt: skip
     """The plant searched on short logs from afar, and closer (`closer`) on the whole.
 
-    begins: plants to begin from in turn, as long as more is left than should be; searches: on the
-    whole at most, none where no search will do; told: the first has everything but its band from
-    the equations, so it is searched close by before; known: by name, how far the equations leave
-    a parameter open; done: found already, and beside the searches one that may be agreed with;
-    vain: misfit on the short logs beyond which what was found already stays.
+    begins: plants to begin from in turn, as long as more is left than should be; done: found
+    already, and beside the searches one that may be agreed with.
     """
     short = [shortened(one, SHORT_SECONDS) for one in logs]
     best, poor = done, 0
-    for i, plant in enumerate([*begins[: int(told)], *begins]):
-        if told and i == 0:
+    around = replace(CLOSE_RANGE, known=limits.known)
+    for i, plant in enumerate([*begins[: int(limits.told)], *begins]):
+        if limits.told and i == 0:
             banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
             near = nudged_search(banded, short, drive, rng, ((0.0, TOLD_RANGE), (0.0, CLOSE_RANGE)))
         else:
-            stages = (
-                (1.0, replace(FAR_RANGE, known=known)),
-                (0.0, replace(CLOSE_RANGE, known=known)),
-            )
+            stages = ((1.0, replace(FAR_RANGE, known=limits.known)), (0.0, around))
             near = nudged_search(plant, short, drive, rng, stages)
         begun = refit(near, short, drive, prior=even(near), effort="quick")
-        if best is not None and begun.misfit > vain:
+        if best is not None and begun.misfit > limits.vain:
             break
         hopes = not plant.effects or begun.misfit <= PROMISING_MISFIT
-        worth = searches if hopes else min(searches, 1)
-        found = _on_whole(begun, logs, drive, rng, worth, replace(CLOSE_RANGE, known=known), best)
+        worth = limits.most if hopes else min(limits.most, 1)
+        found = _on_whole(begun, logs, drive, rng, worth, around, best)
         twice = agree(best, found)
         best = found if best is None or found.misfit < best.misfit else best
         poor += not hopes

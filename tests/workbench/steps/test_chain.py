@@ -374,5 +374,10 @@ def test_a_run_by_force_says_what_held_it() -> None:
     model = identified().model
     assert not any("held to" in line for line in fit_lines(model))
     by_force = replace(model, fit=replace(model.fit, drive="force", stiffness=123.0))
-    said = "held to the measured position by 123 N/m and restarted every 2 s"
+    said = (
+        "held to the measured position by 123 N/m and restarted from the measured state every 2 s"
+    )
     assert any(said in line for line in fit_lines(by_force))
+    alone = replace(model, fit=replace(model.fit, drive="force", stiffness=0.0))
+    assert any("restarted from" in line for line in fit_lines(alone))
+    assert not any("held to" in line for line in fit_lines(alone))

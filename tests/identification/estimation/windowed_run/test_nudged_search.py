@@ -14,6 +14,7 @@ from identification.estimation.windowed_run.nudged_search import (
     SIDES_RANGE,
     TOLD_RANGE,
     Range,
+    SearchLimits,
     agree,
     closer,
     closest,
@@ -96,7 +97,9 @@ def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
     monkeypatch.setattr("identification.estimation.windowed_run.nudged_search.nudged_search", spied)
     one = seen(made(4))
     unsure = replace(plant(), friction=replace(NINE, dv_p=0.003, dv_n=-0.003, F_sp=16.2))
-    found = closest([unsure], [one], "command", np.random.default_rng(0), 1, told=True)
+    found = closest(
+        [unsure], [one], "command", np.random.default_rng(0), SearchLimits(1, told=True)
+    )
     assert ranges[0] == TOLD_RANGE and FAR_RANGE not in ranges
     assert found.misfit <= COMPLETE
     assert found.plant.friction.array == pytest.approx(NINE.array, rel=0.06)
@@ -185,7 +188,7 @@ def test_a_search_that_ends_where_another_did_is_the_last(monkeypatch: pytest.Mo
         "identification.estimation.windowed_run.nudged_search.nudged_search", nearly
     )
     rng = np.random.default_rng(0)
-    found = closest([plant()] * 4, [one], "command", rng, 0)
+    found = closest([plant()] * 4, [one], "command", rng, SearchLimits(0))
     assert found.misfit > 5.0 and len(begun) == 2
 
 
