@@ -37,6 +37,7 @@ from identification.estimation.plain_search.problem import (
 from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.windowed_run.refinement import (
+    CANNOT_BE_FOLLOWED,
     Refit,
     even,
     names_of,
@@ -251,7 +252,8 @@ def _of_silent(plant: Plant, names: Sequence[str], values: Array, events: Events
 def _window_log(plant: Plant, recorded: RecordedLogs, index: int) -> LogFit:
     one = recorded.logs[index]
     errors = position_errors(plant, one, recorded.drive)
-    rms = float("inf") if errors is None else float(np.sqrt(np.mean(errors**2)))
+    lost = CANNOT_BE_FOLLOWED * one.noise_y
+    rms = lost if errors is None else float(np.sqrt(np.mean(errors**2)))
     return LogFit(
         log=one.log.name,
         start=measured_start(one.log),

@@ -55,7 +55,7 @@ def test_recovers_a_plant_from_the_force_alone() -> None:
 
 
 def test_motor_is_driven_by_its_command() -> None:
-    log = made_log(table(2), seed=4)
+    log = made_log(table(2), seed=4, seconds=3.0)
     motor = Log(log.name, {"t": log["t"], "y": log["y"], "F": 2.0 * log["u"], "u": log["u"]})
     fit = fit_plant([motor], np.random.default_rng(1), rig=Rig("motor", force_per_command=2.0))
     assert fit.actuator == Motor(2.0)
