@@ -57,10 +57,6 @@ class RecordedLogs:
             imposed=imposed,
         )  # fmt: skip
 
-    def as_imposed(self) -> "RecordedLogs":
-        """The same logs as a rig's that leads the body along a path."""
-        return replace(self, logs=tuple(self.record(one.log, imposed=True) for one in self.logs))
-
 
 def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
     """The logs with their motion; drive: by default the command where an actuator follows it.

@@ -8,7 +8,7 @@ widely in turn (either alone is led astray by some logs), then for one direction
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import cycle
 
 import numpy as np
@@ -33,7 +33,7 @@ SLIDING_SPEEDS = (0.05, 0.3)  # of the largest speed, above which samples are ta
 # Range around a regression's sliding parameters: its sd, and at least
 SLIDING_DEVIATIONS, LEAST_SLIDING_RANGE = 5.0, 0.02
 # Searches in turn: residual bounded tightly or not, sliding close to a regression or anywhere.
-CLIMB_ATTEMPTS = ((False, True), (True, True), (True, False), (False, True), (False, False)) * 2
+CLIMB_ATTEMPTS = ((False, True), (True, True), (True, False))
 CLIMB_ROUNDS = 6
 WIDER = 3.0  # times the box in which a search over long windows looks
 CLIMB_POPULATION, CLIMB_GENERATIONS, NEAR_GENERATIONS = 64, 150, 60
@@ -42,100 +42,54 @@ SAME_MINIMUM = 1.002  # relative cost of two searches that have found the same m
 # The same where nothing fits, and chi-square from which nothing does
 SAME_MINIMUM_OF_MISFIT, NOTHING_FITS = 1.05, 1e4
 LOST_A_STOP = 3.0  # times the adequate chi-square from which stretches have lost a stop
-STRETCH = 1.0  # s; mean length of stretches to be followed for a fit to count
 # Standard deviations around shorter stretches' fit that a longer one may need
 REACH_IN_DEVIATIONS = 8.0
 LEAST_GAIN_OF_ROUND = 0.003  # relative gain of a round below which there is no other
 
 
-@dataclass(frozen=True)
-class Climb:
-    """The problem with its wider box, the longest stretches reached, and the fit over them; sure:
-    two searches agreed on it."""
-
-    problem: Problem
-    cut: Stretches
-    optimum: Optimum
-    sure: bool
-
-    @property
-    def found(self) -> bool:
-        """Whether whole runs are followed to their noise."""
-        return self.cut.whole and self._adequate
-
-    @property
-    def followed(self) -> bool:
-        """Whether stretches of some length are followed to their noise, if not whole runs."""
-        seconds = sum(len(run.measured.y) * run.measured.h for run in self.problem.runs)
-        return self._adequate and seconds >= STRETCH * len(self.cut.all)
-
-    @property
-    def hopeless(self) -> bool:
-        """Whether not even the short stretches are followed, by far."""
-        return self.optimum.cost > NOTHING_FITS * self.problem.count
-
-    @property
-    def _adequate(self) -> bool:
-        return self.optimum.cost <= ADEQUATE * self.problem.count
-
-
-def climb(
-    problem: Problem,
-    rng: np.random.Generator,
-    report: Progress,
-    attempts: Sequence[tuple[bool, bool]] = CLIMB_ATTEMPTS,
-) -> Climb:
-    """The fit over whole runs that short stretches lead to, or over the longest that it follows.
-
-    attempts: searches at most, each with the residual tightly bounded or not, sliding close to a
-    regression or not.
-    """
+def climb(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
+    """The fit over whole runs that short stretches lead to, or over the longest that it follows."""
     box = problem.box.wider(WIDER)
     # A motor's first range of the band is narrow; short stretches show more of it.
     box = replace(box, low=np.where(np.isin(box.free, (DV_P, DV_N)), box.low / WIDER, box.low))
     problem = replace(problem, box=box)
     cut = stretches(problem.runs, _length(problem))
-    best, sure = _attempted(problem, cut, attempts, rng, report)
+    best = _attempted(problem, cut, rng, report)
     if best.cost > NOTHING_FITS * problem.count:
-        return Climb(problem, cut.begun(best.starts), best, sure)
+        return best
     for narrow in range(CLIMB_ROUNDS):
         found = _by_side(problem, cut.begun(best.starts), best, 0.3 ** (narrow % 3), rng)
         same = found.cost > best.cost * (1 - LEAST_GAIN_OF_ROUND)
         best = found if found.cost < best.cost else best
         if same and (best.cost <= ADEQUATE * problem.count or narrow >= CLIMB_ROUNDS // 2):
             break
-    cut = cut.begun(best.starts)
-    if best.cost <= LOST_A_STOP * ADEQUATE * problem.count:
-        cut, best = _joined(problem, cut, best, rng)
-    return Climb(problem, cut, best, sure)
+    if best.cost > LOST_A_STOP * ADEQUATE * problem.count:
+        return best
+    return _joined(problem, cut.begun(best.starts), best, rng)
 
 
 def _attempted(
-    problem: Problem,
-    cut: Stretches,
-    attempts: Sequence[tuple[bool, bool]],
-    rng: np.random.Generator,
-    report: Progress,
-) -> tuple[Optimum, bool]:
-    """The best of searches over the stretches until two of them agree on it, and whether they did.
+    problem: Problem, cut: Stretches, rng: np.random.Generator, report: Progress
+) -> Optimum:
+    """The best of searches over the stretches until two of them agree on it.
 
     A single one can be caught beside the minimum with little more than noise left. Where they
     agree on much more than noise, the narrower searches that follow may still tell.
     """
     boxes = cycle(_regressed(problem))
     found: list[Optimum] = []
-    for attempt, (tight, close) in enumerate(attempts):
-        report("searching stretches", attempt / len(attempts))
+    for attempt, (tight, close) in enumerate(CLIMB_ATTEMPTS):
+        report("searching stretches", attempt / len(CLIMB_ATTEMPTS))
         box, row = next(boxes) if close else (problem.box, problem.row)
         found.append(_searched(problem, box, row, cut, TIGHT if tight else problem.cap, rng))
         found.sort(key=lambda one: one.cost)
         best = found[0].cost / problem.count
         second = found[1].cost / found[0].cost if len(found) > 1 else np.inf
         if best <= ADEQUATE and second < SAME_MINIMUM:
-            return found[0], True
+            break
         if best > NOTHING_FITS and second < SAME_MINIMUM_OF_MISFIT:
             break
-    return found[0], False
+    return found[0]
 
 
 def _length(problem: Problem) -> float:
@@ -182,16 +136,13 @@ def _searched(
     found = evolve(lambda z: total_cost(runs, box.rows(z), cap), first, CLIMB_GENERATIONS, rng)
     row = box.rows(found.members[:1])[0]
     near = refine(cut.all, row, problem.free, cap=cap)
-    optimum = _refined(problem, cut.begun(near.starts), near.p)
-    spent = found.evaluations + near.evaluations + optimum.evaluations
-    return replace(optimum, evaluations=spent)
+    return _refined(problem, cut.begun(near.starts), near.p)
 
 
 def _refined(problem: Problem, cut: Stretches, row: Array) -> Optimum:
     """The nearest minimum over the stretches and their starts, outliers bounded at first."""
     near = refine(cut.all, row, problem.free, cap=problem.cap)
-    optimum = refine(cut.begun(near.starts).all, near.p, problem.free)
-    return replace(optimum, evaluations=near.evaluations + optimum.evaluations)
+    return refine(cut.begun(near.starts).all, near.p, problem.free)
 
 
 def _by_side(
@@ -206,7 +157,6 @@ def _by_side(
     share = narrow * float(np.clip(0.02 * np.sqrt(misfit), 0.01, 0.5))
     runs, row = cut.restarted(), best.p
     low, high = problem.box.low, problem.box.high
-    spent = 0
     for side in PARAMETERS_OF_SIDE:
         free: IntArray = np.array(side, dtype=np.int64)
         sliding = np.abs(row[free[:2]])
@@ -216,44 +166,39 @@ def _by_side(
             np.concatenate([sliding * (1 + share), high[free[2:]]]),
             row,
         )
-        row, used = _evolved(problem, box, runs, rng)
-        spent += used
-    optimum = _refined(problem, cut, row)
-    return replace(optimum, evaluations=spent + optimum.evaluations)
+        row = _evolved(problem, box, runs, rng)
+    return _refined(problem, cut, row)
 
 
 def _evolved(
     problem: Problem, box: Box, runs: Sequence[FittedRun], rng: np.random.Generator
-) -> tuple[Array, int]:
+) -> Array:
     """Best row (11,) of a search anywhere in a small box, its own row among the first."""
     first = rng.random((CLIMB_POPULATION, len(box.free)))
     first[0] = box.point(box.row)
     found = evolve(
         lambda z: total_cost(runs, box.rows(z), problem.cap), first, NEAR_GENERATIONS, rng
     )
-    return box.rows(found.members[:1])[0], found.evaluations
+    best: Array = box.rows(found.members[:1])[0]
+    return best
 
 
-def _joined(
-    problem: Problem, cut: Stretches, best: Optimum, rng: np.random.Generator
-) -> tuple[Stretches, Optimum]:
+def _joined(problem: Problem, cut: Stretches, best: Optimum, rng: np.random.Generator) -> Optimum:
     """The fit carried from the stretches over longer ones, to whole runs where it follows them."""
-    enough, spent = ADEQUATE * problem.count, best.evaluations
+    enough = ADEQUATE * problem.count
     while not cut.whole:
         longer = cut.longer(JOINED)
         found = _refined(problem, longer, best.p)
         if found.cost > enough:
-            row, used = _evolved(problem, _close(problem, best), longer.restarted(), rng)
+            row = _evolved(problem, _close(problem, best), longer.restarted(), rng)
             rescued = _refined(problem, longer, row)
-            spent += used + rescued.evaluations
             found = rescued if rescued.cost < found.cost else found
-        spent += found.evaluations
         if found.cost > enough and best.cost <= enough:
             longer, found = _kept(problem, cut, best)
             if found.cost > enough or len(longer.all) == len(cut.all):
                 break
         best, cut = found, longer.begun(found.starts)
-    return cut, replace(best, evaluations=spent)
+    return best
 
 
 def _kept(problem: Problem, cut: Stretches, best: Optimum) -> tuple[Stretches, Optimum]:

@@ -32,7 +32,7 @@ LONGEST_RUN = 40.0  # s; a run without a stiffness that holds it is compared at 
 @dataclass(frozen=True)
 class Problem:
     """Logs, how they are driven, and where to look; noise of position [m] and force [N]; the
-    motor's k_a [N/V], 0 for other rigs; stretched: the runs restart where their windows say."""
+    motor's k_a [N/V], 0 for other rigs."""
 
     logs: tuple[Log, ...]
     runs: tuple[FittedRun, ...]
@@ -45,7 +45,6 @@ class Problem:
     actuator: ActuatorFit | None
     noise: tuple[float, float]
     k_a: float
-    stretched: bool = False
 
     @property
     def adequate(self) -> float:
@@ -69,8 +68,6 @@ class Problem:
     @property
     def long_runs(self) -> tuple[FittedRun, ...]:
         """Runs as long as the model may be asked to follow without a restart."""
-        if self.stretched:
-            return self.runs
         if self.drive == "command":
             return tuple(run.whole() for run in self.runs)
         if not self.hold:

@@ -8,7 +8,6 @@ import numpy as np
 from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.cost import START_V, START_Y
 from identification.estimation.plain_search.fitted_runs import total_cost
-from identification.estimation.plain_search.growing_windows import CLIMB_ATTEMPTS as CLIMBS
 from identification.estimation.plain_search.growing_windows import climb
 from identification.estimation.plain_search.likely_sets import Progress
 from identification.estimation.plain_search.local_search import Optimum, refine
@@ -21,7 +20,6 @@ from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP
 SEARCH_POPULATION = 64
 SEARCH_GENERATIONS = 150
 WORTH_A_SEARCH = 300.0  # chi-square over windows up to which a fit is worth a closer search
-FIRST_CLIMBS = 3  # searches over stretches
 
 
 def searched_plant(
@@ -33,10 +31,7 @@ def searched_plant(
     where a signal is missing.
     """
     problem = pose(logs, rig, None if rig.kind == "motor" else drive)
-    if problem.hold:
-        found = climb(opened(problem), rng, report, CLIMBS[:FIRST_CLIMBS]).optimum
-    else:
-        found = _search(problem, rng, report)
+    found = climb(opened(problem), rng, report) if problem.hold else _search(problem, rng, report)
     return plant_of(problem, found)
 
 
