@@ -22,7 +22,6 @@ from identification.estimation.recorded_logs import RecordedLogs, led_by_rig, re
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
-    hard,
     hopeless,
     plain_structure,
     searched,
@@ -35,6 +34,7 @@ from identification.thresholds import COMPLETE, NO_RUN
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+WIDER_SEARCHES = 2  # for the plain plant, ever wider
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
 ACTUATOR_SHARE = 0.02  # of the force, that it has to leave as well
 
@@ -81,9 +81,8 @@ def finished(
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
-    left = found.imposed or (found.misfit > COMPLETE and hard(found, recorded))
-    if left and not hopeless(found, recorded):
-        found = searched(found, recorded, search, report)
+    if (found.imposed or found.misfit > COMPLETE) and not hopeless(found, recorded):
+        found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded, found.misfit)
         if said:

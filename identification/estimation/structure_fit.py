@@ -370,18 +370,22 @@ def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
 
 def searched(
     model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
-    report: Progress = quiet,
+    report: Progress = quiet, attempts: int = 1,
 ) -> FittedStructure:  # fmt: skip
-    """The plain model from a global search, where that follows the logs better."""
-    try:
-        plant = searched_plant(
-            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report
-        )
-    except UserError:
-        return model
-    found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
-    left_by = misfit(plant, recorded.logs, recorded.drive)
-    best, least = (found.plant, found.misfit) if found.misfit < left_by else (plant, left_by)
-    if least >= model.misfit:
-        return model
-    return replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+    """The plain model from global searches, where one of these follows the logs better."""
+    for attempt in range(attempts):
+        try:
+            plant = searched_plant(
+                recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
+                attempt=attempt,
+            )  # fmt: skip
+        except UserError:
+            return model
+        found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
+        left_by = misfit(plant, recorded.logs, recorded.drive)
+        best, least = (found.plant, found.misfit) if found.misfit < left_by else (plant, left_by)
+        if least < model.misfit:
+            model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+        if model.misfit <= COMPLETE:
+            break
+    return model

@@ -19,19 +19,27 @@ from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP
 
 SEARCH_POPULATION = 64
 SEARCH_GENERATIONS = 150
+# Factors on a residual's bound and on the search's box, of each attempt after the first
+LOOSER, WIDER_BOX = 25.0, 3.0
 WORTH_A_SEARCH = 300.0  # chi-square over windows up to which a fit is worth a closer search
 
 
 def searched_plant(
-    logs: Sequence[Log], rng: np.random.Generator, *, rig: Rig, drive: Drive, report: Progress
-) -> Plant:
+    logs: Sequence[Log], rng: np.random.Generator, *, rig: Rig, drive: Drive, report: Progress,
+    attempt: int = 0,
+) -> Plant:  # fmt: skip
     """The plant of one global search for the nine parameters, without intervals.
 
-    drive: "command" (of a motor too) or "force". Raises NotIdentifiable where nothing moves, BadLog
+    drive: "command" (of a motor too) or "force"; attempt: how many have failed before, perhaps
+    around a bad first estimate. Raises NotIdentifiable where nothing moves, BadLog
     where a signal is missing.
     """
     problem = pose(logs, rig, None if rig.kind == "motor" else drive)
-    found = climb(opened(problem), rng, report) if problem.hold else _search(problem, rng, report)
+    found = (
+        climb(opened(problem), rng, report)
+        if problem.hold
+        else _search(problem, rng, report, attempt)
+    )
     return plant_of(problem, found)
 
 
@@ -44,9 +52,10 @@ def opened(problem: Problem) -> Problem:
     return replace(problem, runs=runs)
 
 
-def _search(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
+def _search(problem: Problem, rng: np.random.Generator, report: Progress, attempt: int) -> Optimum:
     """The best member of a global search over windows, refined over the whole run."""
-    cap, box, runs = problem.cap, problem.box, problem.runs
+    cap, runs = problem.cap * LOOSER**attempt, problem.runs
+    box = problem.box.wider(WIDER_BOX**attempt)
     # k1 and k2 come from the regression: searched over in the refinement only.
     population = evolve(
         lambda z: total_cost(runs, box.rows(z), cap),
