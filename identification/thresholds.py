@@ -7,7 +7,8 @@ is. `benchmarks/ablation.py` shows what each changes on the blind benchmark, off
 decides on either side. A misfit is a mean square in units of the sensors' noise.
 """
 
-# Misfit of a free run in windows, chi-square of whole runs: mean squares in units of the noise.
+# Misfit of a free run in windows, chi-square of whole runs: mean squares in units of the noise
+# (clean and single runs of blind.py, nine_parameters.py; LIKE: drift.py).
 COMPLETE = 1.1  # nothing is missing (1: what is left is noise)
 ADEQUATE = 1.5  # hardly more than noise: a fit is adequate, a structure found in the run is taken
 FOLLOWED = 2.0  # a stop lost here or there: the structure still follows the log
@@ -16,12 +17,12 @@ NEARLY_FOLLOWED = 8.0  # not followed, but near; beyond, a plain plant's sets ar
 NO_RUN = 50.0  # a run by the measured force is not the body's own motion
 LIKE = 4.0  # times the misfit of the model in force, where that leaves more than noise
 
-# What the equations' rows leave, in units of their noise.
+# What the equations' rows leave, in units of their noise (blind.py, chapters.py).
 MUCH = 2.0  # root mean square: something is missing from an equation
 MUCH_IS_LEFT = 25.0  # mean square: far more than noise is left
 INERT = 2.0  # times what is left, below which inertia does not show
 
-# Which effects the equations name.
+# Which effects the equations name (blind.py: clean, single; chapters.py).
 PENALTY = 5.0  # criterion (twice a log-likelihood) that each parameter has to gain
 CALLED = 10.0  # the same, of an optional parameter
 CHANCE_LEVEL = 0.01  # chance up to which the largest gain of the library is no luck
@@ -33,7 +34,7 @@ CARRIES = 0.95  # of the error on stretches left out, that an effect leaves at m
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle leaves at most
 LUCK_IN_GAIN = 10.0  # criterion by which two effects that explain equally may differ
 
-# Which effects the free run confirms: shares of a misfit in excess of 1.
+# Which effects the free run confirms: shares of a misfit beyond 1 (blind.py: single, removed).
 HELPS = 0.75  # left at most by effects that leave more than noise, or they are useless
 EARNS = 0.8  # left at most by one effect more
 HALF_OF_EXCESS = 0.5  # left at most by an effect that only the run shows
@@ -42,7 +43,7 @@ UNCONTESTED = 0.1  # left by effects that need no contest
 NEEDLESS = 1.02  # times the misfit, without an effect that is not needed
 DOES_NOTHING = 1.002  # the same, of the plant as it is
 
-# What is left, and whether it carries over to other logs.
+# What is left, and whether it carries over (blind.py: removed; outside.py --strange; chapters.py).
 SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noise
 IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
@@ -51,12 +52,12 @@ CARRIED = 2.0  # times the training logs' force error, that the test logs' may b
 LEAST_DEPENDENCE = 0.08  # share of the rest that a signal explains, or it depends on none
 MOST_PLACES = 3  # effects of place in one machine, which rather are pieces of another law
 
-# What differs between the logs: drift.
+# What differs between the logs: drift (blind.py: drift; chapters.py).
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
 DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
 DRIFT_LEAST = 0.01  # of its value, that it changes
 
-# What a log tells of a parameter, and what drives it.
+# What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.3  # deviation over the value, beyond which the value says nothing
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
