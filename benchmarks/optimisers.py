@@ -33,7 +33,7 @@ from identification.estimation.windowed_run.refinement import (
     units_in,
     values_of,
 )
-from identification.log import Log, Rig
+from identification.log import Log
 from identification.model.plant import Plant
 
 MACHINES = ("table2", "motor", "force")
@@ -93,7 +93,7 @@ def wide(seed: int, name: str) -> dict[str, tuple[float, float]]:
     """Cost a value reached and seconds of each search over the box."""
     one = machine(name, seed)
     log: Log = simulated(one, (), seed, "train", SECONDS).log
-    problem = pose([log], one.rig if one.rig.kind == "motor" else Rig("force"), None)
+    problem = pose([log], one.rig, recorded_logs([log], one.rig).drive)
     box, runs, cap = problem.box, problem.runs, problem.cap
 
     def cost(z: Array) -> Array:

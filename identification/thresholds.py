@@ -62,3 +62,5 @@ EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.3  # deviation over the value, beyond which the value says nothing
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
+ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
+ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well

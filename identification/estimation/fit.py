@@ -17,26 +17,24 @@ import numpy as np
 
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.plain_search.actuator_fit import fit_actuator
-from identification.estimation.plain_search.likely_sets import Progress, quiet
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig, recorded_logs
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
-    hopeless,
     plain_structure,
+    search_is_hopeless,
     searched,
 )
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, even, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Plant
-from identification.thresholds import COMPLETE, NO_RUN
+from identification.progress import Progress, quiet
+from identification.thresholds import ACTUATOR_MISFIT, ACTUATOR_SHARE, COMPLETE, NO_RUN
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
-ACTUATOR_MISFIT = 3.0  # times the sensors' noise from which the actuator is not linear
-ACTUATOR_SHARE = 0.02  # of the force, that it has to leave as well
 
 
 def fit_plant(
@@ -64,7 +62,7 @@ def fit_plant(
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            return settled(near.plant, recorded, near.misfit, settle, report)
+            return settled(near.plant, recorded, near.misfit, settle, report, refined=near)
     found = plain_structure(recorded, begin)
     return finished(found, recorded, settle, report, by=drive)
 
@@ -81,7 +79,7 @@ def finished(
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
-    if (found.imposed or found.misfit > COMPLETE) and not hopeless(found, recorded):
+    if (found.imposed or found.misfit > COMPLETE) and not search_is_hopeless(found, recorded):
         found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded, found.misfit)
@@ -113,16 +111,24 @@ def _with_effects(
         band = max(p.dv_p, -p.dv_n)
         again = refit(prior, logs, drive, prior=held, band=band, rescues=RESCUES)
         best = again if again.misfit < best.misfit else best
-    return settled(best.plant, recorded, best.misfit, rng, report, prior=held)
+    return settled(best.plant, recorded, best.misfit, rng, report, refined=best)
 
 
 def _not_linear(recorded: RecordedLogs, misfit: float) -> str:
     """What to say where a linear actuator leaves much of the force; "" where it does not."""
     found = fit_actuator(recorded.plain)
     noise = [one.noise_F**2 + (found.k2 * one.noise_y) ** 2 for one in recorded.logs]
-    if found.relative <= ACTUATOR_SHARE or found.rms <= ACTUATOR_MISFIT * np.sqrt(np.mean(noise)):
+    if not leaves_much(found.relative, found.rms / float(np.sqrt(np.mean(noise)))):
         return ""
     return (
         f"the linear actuator leaves {100 * found.relative:.1f} % of the force (misfit"
         f" {misfit:.3g}), so the run was driven by the logged force"
     )
+
+
+def leaves_much(of_force: float, of_noise: float) -> bool:
+    """Whether a linear actuator is none: it leaves so much of the force, so many times the noise.
+
+    of_force, of_noise: root mean square that it leaves, over the force's own and the sensors'.
+    """
+    return of_force > ACTUATOR_SHARE and of_noise > ACTUATOR_MISFIT

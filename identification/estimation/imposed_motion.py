@@ -13,7 +13,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.arx.residual_tests import effective_samples
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import Events, estimates, normal_samples
+from identification.estimation.estimates import NORMAL_SETS, Events, estimates, normal_samples
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
@@ -78,8 +78,8 @@ def fit_imposed(
     fit = _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
-    samples = np.tile(center, (1024, 1))
-    drawn = rng.multivariate_normal(fit.theta, fit.covariance, 1024, check_valid="ignore")
+    samples = np.tile(center, (NORMAL_SETS, 1))
+    drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
     nine = _assumed(center, firsts)
     friction = Karnopp.from_array(nine)

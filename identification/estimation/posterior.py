@@ -59,7 +59,7 @@ def sample_posterior(
     The walkers start around the fit. Where the fit leaves more than noise, a set's likelihood is
     that of as many independent samples as the residual's correlation leaves.
     """
-    problem = pose(logs, rig, None if rig.kind == "motor" else fit.drive)
+    problem = pose(logs, rig, fit.drive)
     k1, k2 = 0.0, float(problem.row[K2])
     if problem.drive == "command":
         k1, k2 = (float(fit.estimates[name].value or 0.0) for name in ("k1", "k2"))

@@ -24,11 +24,15 @@ from identification.thresholds import LINEAR_ACTUATOR
 
 @dataclass(frozen=True, eq=False)
 class RecordedLogs:
-    """Logs of one machine with their motion; drive: what drives their runs."""
+    """Logs of one machine with their motion.
+
+    drive: what drives their runs; imposed: a rig leads the body along a path.
+    """
 
     logs: tuple[MotionLog, ...]
     rig: Rig
     drive: Drive
+    imposed: bool = False
 
     @property
     def held(self) -> bool:
@@ -50,12 +54,16 @@ class RecordedLogs:
         """The logs as they were given."""
         return tuple(one.log for one in self.logs)
 
-    def record(self, log: Log, *, imposed: bool = False) -> MotionLog:
-        """Another log of the machine with its motion; imposed: by a rig that leads it."""
+    def record(self, log: Log) -> MotionLog:
+        """Another log of the machine with its motion."""
         return motion_log(
             log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
-            imposed=imposed,
+            imposed=self.imposed,
         )  # fmt: skip
+
+    def of(self, logs: Sequence[Log]) -> "RecordedLogs":
+        """These logs recorded in the same way."""
+        return replace(self, logs=tuple(self.record(log) for log in logs))
 
 
 def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
@@ -66,9 +74,7 @@ def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> 
     """
     for log in logs:
         check_driven(log)
-    chosen = chosen_drive(logs, rig, drive)
-    empty = RecordedLogs((), rig, chosen)
-    found = replace(empty, logs=tuple(empty.record(log) for log in logs))
+    found = RecordedLogs((), rig, chosen_drive(logs, rig, drive)).of(logs)
     for one in found.logs:
         if not np.any(one.signals["d"]):
             raise NotIdentifiable(

@@ -14,6 +14,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.estimates import (
+    NORMAL_SETS,
     Events,
     effect_estimates,
     estimates,
@@ -21,7 +22,6 @@ from identification.estimation.estimates import (
     normal_samples,
 )
 from identification.estimation.plain_search.likely_sets import (
-    Progress,
     Solution,
     weigh_misfit,
     weigh_noise,
@@ -48,12 +48,12 @@ from identification.estimation.windowed_run.windows import position_errors, star
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
+from identification.progress import Progress
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
 from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED, NEARLY_FOLLOWED
 
-DRAWN = 1024  # parameter sets that stand for a normal spread
 # Relative deviations that the force between its samples adds where it drives the run, by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
@@ -78,11 +78,11 @@ class Spread:
 
 def settled(
     plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
-    report: Progress, *, prior: dict[str, float] | None = None,
+    report: Progress, *, refined: Refit | None = None,
 ) -> KarnoppFit:  # fmt: skip
     """The fit of a plant that a search or refinement has come to, near its minimum.
 
-    misfit: what it leaves in windows; prior: deviations by name that hold effects' shapes.
+    misfit: what it leaves in windows; refined: the refinement that it comes from, if it is one.
     """
     exact = recorded.drive == "command" and not plant.effects
     spread = None
@@ -91,7 +91,7 @@ def settled(
     elif exact and misfit > NEARLY_FOLLOWED:
         spread = _over_likely_sets(plant, recorded, rng, report)
     if spread is None:
-        spread = _over_windows(plant, recorded, misfit, rng, prior)
+        spread = _over_windows(plant, recorded, misfit, rng, refined)
     return _told(spread, recorded)
 
 
@@ -139,8 +139,7 @@ def _over_likely_sets(
 
 
 def _posed(recorded: RecordedLogs) -> Problem:
-    drive = None if recorded.held else recorded.drive
-    return pose(recorded.plain, recorded.rig, drive)
+    return pose(recorded.plain, recorded.rig, recorded.drive)
 
 
 def _row(problem: Problem, plant: Plant) -> Array:
@@ -183,11 +182,10 @@ def _whole_log(problem: Problem, optimum: Optimum, run: FreeRun, index: int) -> 
 
 def _over_windows(
     plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
-    prior: dict[str, float] | None,
+    refined: Refit | None,
 ) -> Spread:  # fmt: skip
     """By runs in windows from measured states, within which what is left walks together."""
-    held = even(plant) if prior is None else prior
-    near = refit(plant, recorded.logs, recorded.drive, prior=held, effort="near")
+    near = refined or refit(plant, recorded.logs, recorded.drive, prior=even(plant), effort="near")
     if near.misfit <= misfit:
         plant = near.plant
     names = near.names
@@ -195,7 +193,7 @@ def _over_windows(
     left = min(near.misfit, misfit)
     events = _events(plant, recorded)
     covariance = _covariance(near, recorded, values, events)
-    samples = rng.multivariate_normal(values, covariance, DRAWN, check_valid="ignore")
+    samples = rng.multivariate_normal(values, covariance, NORMAL_SETS, check_valid="ignore")
     said = [] if not is_adequate(left) or recorded.drive == "force" else [WINDOWS_ONLY]
     return Spread(
         plant=plant,

@@ -10,7 +10,6 @@ from identification.effects._base import AT_REST, Acting, Effect
 from identification.errors import UserError
 from identification.estimation.estimates import untold
 from identification.estimation.plain_search.actuator_fit import fit_actuator
-from identification.estimation.plain_search.likely_sets import Progress, quiet
 from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
 from identification.estimation.regression.effect_columns import Values, by_load, in_columns
@@ -53,6 +52,7 @@ from identification.estimation.windowed_run.refinement import (
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.progress import Progress, quiet
 from identification.thresholds import ADEQUATE, COMPLETE, INERT, MUCH
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
@@ -328,17 +328,17 @@ def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedS
     if MECHANICAL not in first:
         return _from_first_estimate(stage, first, recorded)
     model = fitted_structure(stage, first, (), recorded, regressed)
-    if model.imposed or model.misfit <= COMPLETE or hard(model, recorded):
+    if model.imposed or model.misfit <= COMPLETE or search_is_hard(model, recorded):
         return model
     return searched(model, recorded, search)
 
 
-def hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
+def search_is_hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
     """Whether a search for the plain plant takes long, or hardly has a chance."""
     return loose(model.plant, recorded.drive) or rough(model.outcomes)
 
 
-def hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
+def search_is_hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
     """Whether it takes long and hardly has a chance."""
     return loose(model.plant, recorded.drive) and rough(model.outcomes)
 

@@ -12,7 +12,6 @@ from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.estimation.regression.row_fit import RowFit, base_fits
 from identification.estimation.structure_fit import FittedStructure, band, plain_structure
 from identification.estimation.windowed_run.refinement import misfit
-from identification.log import Rig
 from identification.thresholds import ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
 
@@ -34,11 +33,9 @@ class PlainModel:
     recorded: RecordedLogs
 
 
-def plain_model(
-    rows: RecordedRows, rig: Rig, library: Library, rng: np.random.Generator
-) -> PlainModel:
+def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) -> PlainModel:
     """The plain model of the rows; raises NotIdentifiable where these tell nothing."""
-    recorded = RecordedLogs(rows.logs, rig, rows.drive)
+    recorded = rows.recorded
     model = plain_structure(recorded, rng)
     # Imposed, and the inertia not only hidden by what is missing.
     imposed = model.imposed and inertia_has_no_part(rows.logs)
@@ -46,7 +43,7 @@ def plain_model(
         raise rows.refused
     if imposed:
         rows = imposed_rows(rows)
-        model = plain_structure(replace(recorded, logs=rows.logs), rng)
+        model = plain_structure(rows.recorded, rng)
         library, said = told_by_speed(library, rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
     start, first = model.stage, model.outcomes
@@ -58,5 +55,5 @@ def plain_model(
     start = replace(start, band=slow, sliding=model.plant.friction)
     if misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE:
         library = {}  # the plain plant's run leaves nothing but noise
-    rows = replace(rows, logs=logs)
+    rows = replace(rows, recorded=replace(rows.recorded, logs=logs))
     return PlainModel(rows, start, base_fits(start), model, library, recorded)

@@ -1,14 +1,18 @@
 """Rows: the logs with their motion, and which equations and effects they can show at all."""
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
-from identification.estimation.recorded_logs import commanded, left_by_actuator, left_share
+from identification.estimation.recorded_logs import (
+    RecordedLogs,
+    commanded,
+    left_by_actuator,
+    left_share,
+)
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
 from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.row_fit import first_stage
@@ -24,37 +28,44 @@ OF_SPEED = frozenset({"v", "reversal"})
 
 @dataclass(frozen=True, eq=False)
 class RecordedRows:
-    """The training logs with their motion, and how another log is recorded in the same way.
+    """The training logs as the estimator takes them, and what is to be said of them.
 
-    by_command: whether the actuator's equation is judged too; refused: why they tell nothing
-    unless a rig imposes their motion, None where they do.
+    refused: why they tell nothing unless a rig imposes their motion, None where they do.
     """
 
-    logs: tuple[MotionLog, ...]
-    recorded: Callable[..., MotionLog]
-    drive: Drive
-    by_command: bool
+    recorded: RecordedLogs
     refused: NotIdentifiable | None
     remarks: tuple[str, ...]
+
+    @property
+    def logs(self) -> tuple[MotionLog, ...]:
+        """The logs with their motion."""
+        return self.recorded.logs
+
+    @property
+    def drive(self) -> Drive:
+        """What drives their runs."""
+        return self.recorded.drive
 
 
 def recorded_rows(train: Sequence[Log], rig: Rig, library: Library) -> RecordedRows:
     """The training logs as rows; raises NotIdentifiable where too little of the motion slides."""
     remarks: list[str] = []
-    by_command = _by_command(train, rig, library, remarks)
-    held = rig.kind == "motor"
-    recorded = partial(motion_log, held=held, by_command=by_command, rotary=rig.motion == "rotary")
-    drive: Drive = "command" if by_command or held else "force"
-    logs, refused = _logs(train, recorded, drive)
-    return RecordedRows(tuple(logs), recorded, drive, by_command, refused, tuple(remarks))
+    driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
+    recorded = RecordedLogs((), rig, "command" if driven else "force").of(train)
+    recorded, refused = _told(recorded)
+    return RecordedRows(recorded, refused, tuple(remarks))
 
 
 def imposed_rows(rows: RecordedRows) -> RecordedRows:
     """The same logs as a rig's that imposes the motion; raises NotIdentifiable as above."""
-    recorded = partial(rows.recorded, imposed=True)
-    logs = tuple(recorded(one.log) for one in rows.logs)
-    _enough(logs)
-    return RecordedRows(logs, recorded, rows.drive, rows.by_command, None, rows.remarks)
+    recorded = _imposed(rows.recorded)
+    _enough(recorded.logs)
+    return RecordedRows(recorded, None, rows.remarks)
+
+
+def _imposed(recorded: RecordedLogs) -> RecordedLogs:
+    return replace(recorded, imposed=True).of(recorded.plain)
 
 
 def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[str]) -> bool:
@@ -80,24 +91,21 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
     return True
 
 
-def _logs(
-    train: Sequence[Log], recorded: Callable[..., MotionLog], drive: Drive
-) -> tuple[list[MotionLog], NotIdentifiable | None]:
-    """The logs with their motion; imposed where only a rig's slow motion may hold enough, and then
-    the error that they are otherwise."""
-    logs = [recorded(log) for log in train]
+def _told(recorded: RecordedLogs) -> tuple[RecordedLogs, NotIdentifiable | None]:
+    """The logs; imposed where only a rig's slow motion may hold enough, and then the error that
+    they are otherwise."""
     try:
-        _enough(logs)
+        _enough(recorded.logs)
     except NotIdentifiable as error:
-        if drive != "force":
+        if recorded.drive != "force":
             raise
-        logs = [recorded(log, imposed=True) for log in train]
+        led = _imposed(recorded)
         try:
-            _enough(logs)
+            _enough(led.logs)
         except NotIdentifiable:
             raise error from None
-        return logs, error
-    return logs, None
+        return led, error
+    return recorded, None
 
 
 def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library, tuple[str, ...]]:

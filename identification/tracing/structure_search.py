@@ -11,6 +11,7 @@ from identification.estimation.structure_fit import FittedStructure, inertia_is_
 from identification.estimation.windowed_run.refinement import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
+from identification.progress import Progress
 from identification.thresholds import HELPS, MUCH, SHARE_LEFT
 from identification.tracing.free_run.backward_elimination import (
     Setting,
@@ -22,7 +23,7 @@ from identification.tracing.free_run.backward_elimination import (
 from identification.tracing.free_run.forward_selection import at_once, judged_forward
 from identification.tracing.free_run.rivals import told_apart
 from identification.tracing.plain_model import PlainModel
-from identification.tracing.regression.stepwise import Choice, Progress, choose
+from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import before_pieces, in_pieces
 
 

@@ -5,13 +5,14 @@ Five stages: the logs as rows; the plain model; the effects that the equations c
 and selection); those that the free run confirms, refined; the verdict.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from identification.effects._library import Library
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.log import Log, Rig
+from identification.progress import Progress, quiet
 from identification.signals.check import check_driven
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
@@ -34,8 +35,6 @@ from identification.tracing.verdict import (
     run_residual,
 )
 
-Progress = Callable[[str, float], None]
-
 
 def trace(
     train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
@@ -50,15 +49,15 @@ def trace(
     """
     for log in (*train, *test):
         check_driven(log)
-    report = on_progress or (lambda _stage, _share: None)
+    report = on_progress or quiet
     begin, settle, choose = rng.spawn(3)
     rows = recorded_rows(train, rig, library)
     report("tracing", 0.0)
-    plain = plain_model(rows, rig, library, begin)
+    plain = plain_model(rows, library, begin)
     chosen = selection(plain, rig, choose, report)
     report("refitting", 0.5)
     chosen, found = settled_plain(chosen, refinement(chosen, report), settle, report)
-    seen = [plain.rows.recorded(log) for log in test]
+    seen = [plain.rows.recorded.record(log) for log in test]
     return _told(chosen, found, judgement(chosen, found, seen, rig))
 
 

@@ -18,7 +18,7 @@ from identification.drift.practical_margin import moved
 from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.estimation.estimates import Events, estimates
-from identification.estimation.fit import is_no_run
+from identification.estimation.fit import is_no_run, leaves_much
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.effect_rows import EffectRows
@@ -478,6 +478,18 @@ def test_linear_actuator() -> None:
 
     assert drive(0.9) == "command"
     assert drive(0.99) == "force"
+
+
+def test_actuator_misfit() -> None:
+    """A linear actuator that leaves hardly more than the sensors' noise is one."""
+    assert not leaves_much(0.1, 2.4)
+    assert leaves_much(0.1, 3.8)
+
+
+def test_actuator_share() -> None:
+    """One that leaves a trifle of the force is one, however little noise there is."""
+    assert not leaves_much(0.016, 100.0)
+    assert leaves_much(0.025, 100.0)
 
 
 def test_every_threshold_has_a_test() -> None:

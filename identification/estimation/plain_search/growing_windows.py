@@ -16,12 +16,12 @@ import numpy as np
 from identification.arrays import Array, IntArray
 from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.fitted_runs import FittedRun, total_cost
-from identification.estimation.plain_search.likely_sets import Progress
 from identification.estimation.plain_search.local_search import Optimum, refine
 from identification.estimation.plain_search.problem import Problem
 from identification.estimation.plain_search.search_bounds import Box
 from identification.estimation.plain_search.short_windows import Stretches, stretches
 from identification.estimation.regression.sliding_friction import fit_sliding
+from identification.progress import Progress
 from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
 from identification.thresholds import ADEQUATE
 

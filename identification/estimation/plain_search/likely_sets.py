@@ -26,9 +26,9 @@ from identification.estimation.plain_search.local_search import (
 )
 from identification.estimation.plain_search.problem import Problem, simulated
 from identification.estimation.plain_search.search_bounds import Box
+from identification.progress import Progress
 from identification.simulation.karnopp_step import F_SN, F_SP, K1, K2
 
-Progress = Callable[[str, float], None]
 # Independent samples granted to a residual that is not noise
 LEAST_GRANTED, MOST_GRANTED = 12.0, 400.0
 # What walls of the likelihood add to the spread of a settled cloud, and of walkers in one that
@@ -40,10 +40,6 @@ SLIDING_INDICES, STICKING_INDICES = np.arange(0, 5), np.array([F_SP, F_SN])
 FIT_WALKERS = 64
 WALK_STEPS = 200
 LONG_WALK = 1500
-
-
-def quiet(_stage: str, _share: float) -> None:
-    """No progress is shown."""
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.errors import BadLog
 from identification.estimation.plain_search.actuator_fit import ActuatorFit, fit_actuator
 from identification.estimation.plain_search.fitted_runs import (
     FittedRun,
@@ -21,7 +20,6 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.signals.check import check_driven
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.karnopp_step import K1, K2
 from identification.thresholds import ADEQUATE
@@ -42,7 +40,6 @@ class Problem:
     free: IntArray
     drive: Drive
     hold: bool
-    actuator: ActuatorFit | None
     noise: tuple[float, float]
     k_a: float
 
@@ -83,41 +80,29 @@ class Problem:
         return tuple(out)
 
 
-def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
-    """The logs as a fitting problem: drive chosen, noise estimated, search box drawn."""
-    if rig.kind == "motor" and not rig.force_per_command:
-        raise BadLog(
-            f"{logs[0].name}: a motor needs its force_per_command, not 0; set it in the card"
-            " (1 where it is not known: a force is then in units of the command)"
-        )
-    if rig.kind == "motor" and drive == "force":
-        raise BadLog(
-            f"{logs[0].name}: a motor is driven by its command; leave out the drive by force"
-        )
-    for log in logs:
-        check_driven(log)
+def pose(logs: Sequence[Log], rig: Rig, drive: Drive) -> Problem:
+    """The logs as a fitting problem: noise estimated, search box drawn.
+
+    drive: what drives their runs (`recorded_logs.chosen_drive`), the command of a motor. Raises
+    NotIdentifiable where nothing moves.
+    """
     hold = rig.kind == "motor"
     firsts = tuple(first_estimate(log, held=hold) for log in logs)
-    with_command = not hold and all("u" in log and np.ptp(log["u"]) > 0 for log in logs)
-    actuator = fit_actuator(logs) if with_command else None
-    if drive == "command" and not hold and actuator is None:
-        raise BadLog(f"{logs[0].name}: drive by command asked for, but no command u is logged")
-    chosen: Drive = "force"
-    if actuator and drive != "force" and (actuator.plausible or drive == "command"):
-        chosen = "command"
-    by_command = chosen == "command" and actuator is not None
-    k1 = actuator.k1 if actuator and by_command else 0.0
-    k2 = actuator.k2 if actuator and by_command else 0.0
+    by_command = drive == "command" and not hold
+    actuator = fit_actuator(logs) if by_command else None
+    k1, k2 = (actuator.k1, actuator.k2) if actuator else (0.0, 0.0)
+    # A motor's run is driven by its force, that of its command.
+    chosen: Drive = "command" if by_command else "force"
     window = 1.0 if by_command or hold else 2.0
     runs = tuple(
         prepare_run(
             log,
             first,
             chosen,
-            constant=float(actuator.constants[i]) if actuator and by_command else 0.0,
+            constant=float(actuator.constants[i]) if actuator else 0.0,
             window=window,
             hold=hold,
-            noise=_noise(log, first, actuator if by_command else None),
+            noise=_noise(log, first, actuator),
         )
         for i, (log, first) in enumerate(zip(logs, firsts, strict=True))
     )
@@ -127,11 +112,11 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Problem:
     free: IntArray = np.arange(9, dtype=np.int64)
     if by_command:
         free = np.concatenate([free, np.array([K1, K2], dtype=np.int64)])
-    noise = _noise(logs[0], firsts[0], actuator if by_command else None)
+    noise = _noise(logs[0], firsts[0], actuator)
     if hold:
         noise = (noise[0], 0.0)
     k_a = rig.force_per_command or 0.0
-    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, actuator, noise, k_a)
+    return Problem(tuple(logs), runs, firsts, box, row, free, chosen, hold, noise, k_a)
 
 
 def _noise(log: Log, first: FirstEstimate, actuator: ActuatorFit | None) -> tuple[float, float]:

@@ -9,12 +9,12 @@ from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.cost import START_V, START_Y
 from identification.estimation.plain_search.fitted_runs import total_cost
 from identification.estimation.plain_search.growing_windows import climb
-from identification.estimation.plain_search.likely_sets import Progress
 from identification.estimation.plain_search.local_search import Optimum, refine
 from identification.estimation.plain_search.problem import Problem, plant_of, pose
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
+from identification.progress import Progress
 from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP
 
 SEARCH_POPULATION = 64
@@ -34,7 +34,7 @@ def searched_plant(
     around a bad first estimate. Raises NotIdentifiable where nothing moves, BadLog
     where a signal is missing.
     """
-    problem = pose(logs, rig, None if rig.kind == "motor" else drive)
+    problem = pose(logs, rig, drive)
     found = (
         climb(opened(problem), rng, report)
         if problem.hold

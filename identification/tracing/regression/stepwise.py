@@ -32,6 +32,7 @@ from identification.estimation.regression.signals_behind_effects import (
     reached,
     shown_to_true,
 )
+from identification.progress import Progress
 from identification.thresholds import (
     CARRIES,
     ELASTIC,
@@ -49,7 +50,6 @@ MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
 HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)

@@ -34,7 +34,7 @@ def motor_log(seed: int = 0, seconds: float = 10.0) -> Log:
 
 
 def test_stretches_hold_every_sample_once_and_join_to_the_whole() -> None:
-    problem = pose([motor_log()], RIG, None)
+    problem = pose([motor_log()], RIG, "command")
     cut = stretches(problem.runs, 0.4)
     whole = problem.runs[0].measured
     assert len(cut.all) > 15
@@ -51,7 +51,7 @@ def test_stretches_hold_every_sample_once_and_join_to_the_whole() -> None:
 
 
 def test_restarted_run_costs_what_its_parts_cost() -> None:
-    problem = pose([made_log(table(2), seconds=6.0)], Rig("force"), None)
+    problem = pose([made_log(table(2), seconds=6.0)], Rig("force"), "command")
     cut = stretches(problem.runs, 0.4)
     rows = problem.row[None]
     parts = total_cost(cut.all, rows, 0.0)[0]
@@ -59,7 +59,7 @@ def test_restarted_run_costs_what_its_parts_cost() -> None:
 
 
 def test_starts_of_stretches_are_found_at_the_truth() -> None:
-    problem = pose([motor_log()], RIG, None)
+    problem = pose([motor_log()], RIG, "command")
     cut = stretches(problem.runs, 0.4)
     row = np.concatenate([SERVO.array, [0.0, 0.0]])
     found = refine(cut.all, row, problem.free[:0])
@@ -79,14 +79,14 @@ def test_elimination_of_starts_equals_the_dense_solution() -> None:
 
 
 def test_weak_form_gives_mass_and_sliding_friction() -> None:
-    problem = pose([motor_log()], RIG, None)
+    problem = pose([motor_log()], RIG, "command")
     found = fit_sliding(problem.logs[0], problem.firsts[0], 0.1, held=True)
     assert found is not None
     assert np.max(np.abs(found.five / SERVO.array[:5] - 1.0)) < 0.05
 
 
 def test_climb_reaches_the_whole_run() -> None:
-    problem = pose([made_log(table(1), seed=2, seconds=6.0)], Rig("force"), None)
+    problem = pose([made_log(table(1), seed=2, seconds=6.0)], Rig("force"), "command")
     reached = climb(problem, np.random.default_rng(0), lambda _stage, _share: None)
     assert len(reached.starts) == 1  # the whole run
     assert reached.cost / problem.count == pytest.approx(1.0, abs=0.2)
