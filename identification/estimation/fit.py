@@ -17,7 +17,12 @@ import numpy as np
 
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.plain_search.actuator_fit import fit_actuator
-from identification.estimation.recorded_logs import RecordedLogs, led_by_rig, recorded_logs
+from identification.estimation.recorded_logs import (
+    RecordedLogs,
+    commanded,
+    led_by_rig,
+    recorded_logs,
+)
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
@@ -28,7 +33,7 @@ from identification.estimation.structure_fit import (
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, even, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
-from identification.model.plant import Plant
+from identification.model.plant import Actuator, Plant
 from identification.progress import Progress, quiet
 from identification.thresholds import ACTUATOR_MISFIT, ACTUATOR_SHARE, COMPLETE, NO_RUN
 
@@ -59,12 +64,15 @@ def fit_plant(
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
         return _with_effects(prior, recorded, settle, report)
+    near = None
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
             return settled(near.plant, recorded, near.misfit, settle, report, refined=near)
     found = plain_structure(recorded, begin)
-    return finished(found, recorded, settle, report, by=drive)
+    if near is not None and near.misfit < found.misfit:
+        found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
+    return _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
 
 
 def finished(
@@ -112,6 +120,15 @@ def _with_effects(
         again = refit(prior, logs, drive, prior=held, band=band, rescues=RESCUES)
         best = again if again.misfit < best.misfit else best
     return settled(best.plant, recorded, best.misfit, rng, report, refined=best)
+
+
+def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
+    """A fit by the measured force with the actuator that a regression gives, where it explains most
+    of the force: not told by the fit, but good enough to simulate with."""
+    if fit.drive == "command" or fit.actuator is not None or not commanded(recorded.plain):
+        return fit
+    found = fit_actuator(recorded.plain)
+    return replace(fit, actuator=Actuator(found.k1, found.k2)) if found.plausible else fit
 
 
 def _not_linear(recorded: RecordedLogs, misfit: float) -> str:

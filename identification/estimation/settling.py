@@ -301,7 +301,7 @@ def _remarks(spread: Spread, recorded: RecordedLogs) -> Sequence[str]:
             " an effect is missing, or the structure is wrong; intervals are widened for it"
         )
     if recorded.drive == "force":
-        out.append("driven by the measured force in windows: no command explains the force")
+        out.append("driven by the measured force, in windows of 2 s from measured states")
     return out
 
 

@@ -1,17 +1,21 @@
 """The nine-parameter fit on logs of known plants, and its honesty where a log is silent."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
+from identification.estimation import fit as fitting
 from identification.estimation.fit import fit_plant
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.structure_fit import FittedStructure, plain_structure
+from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
-from identification.model.plant import Actuator, Motor
+from identification.model.plant import Actuator, Motor, Plant
 from tests.identification.plants import ACTUATOR, made_log, table
 
 FORCE = Rig("force")
@@ -121,6 +125,45 @@ def test_a_wrong_structure_is_not_called_adequate() -> None:
     fit = fit_plant([spring], np.random.default_rng(3), rig=FORCE)
     assert not fit.adequate
     assert any("effect is missing" in r or "no free run follows" in r for r in fit.remarks)
+
+
+def test_a_fit_by_force_keeps_the_actuator_that_a_regression_gives() -> None:
+    log = made_log(table(2), seed=5, seconds=6.0)
+    fit = fit_plant([log], np.random.default_rng(1), rig=FORCE, drive="force")
+    assert fit.drive == "force"
+    assert not {"k1", "k2"} & set(fit.estimates)
+    assert isinstance(fit.actuator, Actuator)
+    assert fit.actuator.k1 == pytest.approx(ACTUATOR.k1, rel=0.01)
+
+
+def test_the_plant_in_force_is_kept_where_a_new_start_ends_farther_off(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    log = made_log(table(2), seed=9, seconds=4.0)
+    usual = fitted(log)
+    truth = Plant(table(2), ACTUATOR)
+    astray = replace(table(2), F_cp=1.3 * table(2).F_cp)
+
+    def unsure(plant: Plant, *_: object, **__: object) -> Refit:
+        """The plant as it is, with more than noise left."""
+        return Refit(plant, 1.2, (), {}, lambda: np.zeros((0, 0)))
+
+    def lost(recorded: RecordedLogs, rng: np.random.Generator) -> FittedStructure:
+        """What the equations lead to, far from the log."""
+        return replace(plain_structure(recorded, rng), plant=Plant(astray, ACTUATOR), misfit=9.0)
+
+    monkeypatch.setattr(fitting, "refit", unsure)
+    monkeypatch.setattr(fitting, "plain_structure", lost)
+    begun: list[FittedStructure] = []
+
+    def goes_on(found: FittedStructure, *_: object, **__: object) -> KarnoppFit:
+        """Remembers where the fit goes on from."""
+        begun.append(found)
+        return usual
+
+    monkeypatch.setattr(fitting, "finished", goes_on)
+    fit_plant([log], np.random.default_rng(1), rig=FORCE, prior=truth)
+    assert begun[0].plant == truth and begun[0].misfit == 1.2
 
 
 def test_refusals() -> None:
