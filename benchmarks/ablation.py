@@ -1,6 +1,7 @@
 """Which rules of the tracer change what it says: each switched off, or its number doubled.
 
     python benchmarks/ablation.py [--first 700] [--how off] [--rules HELPS ...] [--quick] [--jobs 2]
+    python benchmarks/ablation.py --together    groups of rules, halved until none changes anything
 
 A rule is a number that decides; off is the value at which it never does. The cases are those of
 the blind benchmark (benchmarks/blind_cases.py), one of every kind that a verdict can go wrong in,
@@ -13,7 +14,7 @@ import argparse
 import contextlib
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
@@ -41,6 +42,19 @@ CASES = (
     "removed:table2:spring:0.2:{0}",
     "removed:force:stribeck:0.2:{0}",
     "drift:table2:-:0.1:{0}",
+    "clean:random:-:0:{0}",
+    "clean:table2:-:0:{0}",
+    "single:motor:cogging:0.2:{0}",
+    "single:motor:load_dependent_friction:0.2:{0}",
+    "single:random:nonlinear_viscous:0.2:{0}",
+    "single:random:presliding:0.2:{0}",
+    "single:force:rising_stiction:0.2:{0}",
+    "single:force:position_dependent_friction:0.2:{0}",
+    "single:table2:stribeck:0.2:{0}",
+    "two:table2:stribeck+position_dependent_friction:0.2:{0}",
+    "removed:random:valve_dead_zone:0.2:{0}",
+    "removed:motor:presliding:0.2:{0}",
+    "removed:random:load_dependent_friction:0.2:{0}",
 )
 SLOW = (0, 4, 6, 10, 11)  # of them
 ALL, NONE = float("inf"), 0.0
@@ -61,7 +75,8 @@ RULES: dict[str, float] = {
     "DRIFT_LEAST": NONE, "INERT": NONE, "WIDEST_BAND": ALL, "SLIGHT": NONE, "MUCH": ALL,
     "MUCH_IS_LEFT": ALL, "TRIM": 1e9, "FEWEST_EVENTS": 99999, "ROBUST_SQUARE": 1e9,
     "SPEEDS_APART": NONE, "COMPLETE": 1.5, "ADEQUATE": 1.1, "FOLLOWED": 1.5, "LINEAR_ACTUATOR":
-    ALL, "PROMISING_MISFIT": ALL, "POOR": 99, "LUCKY_WINDOWS": NONE,
+    ALL, "NO_RUN": ALL, "LIKE": ALL, "EVENTS_NEEDED": 0, "WIDEST_SD": ALL, "ACTUATOR_MISFIT":
+    NONE, "ACTUATOR_SHARE": NONE, "PROMISING_MISFIT": ALL, "POOR": 99, "LUCKY_WINDOWS": NONE,
 }  # fmt: skip
 
 
@@ -100,7 +115,7 @@ def said_of(one: Made) -> Said:
         found = trace(
             [one.train.log], [one.test.log], one.machine.rig, library, np.random.default_rng(0)
         )
-    except UserError as error:
+    except (UserError, ArithmeticError, ValueError, IndexError, np.linalg.LinAlgError) as error:
         return Said(type(error).__name__, (), (), time.perf_counter() - begin)
     keys = tuple(e.effect.key for e in found.effects)
     return Said(found.verdict, keys, found.unknown.depends_on, time.perf_counter() - begin)
@@ -125,14 +140,33 @@ def changed(rule: str, how: str) -> Iterator[None]:
             setattr(module, rule, before)
 
 
-def tried(rule: str, first: int, quick: bool, how: str) -> tuple[str, list[Said]]:
-    """What is said of every case with this rule changed."""
+def tried(
+    rules: Sequence[str], first: int, quick: bool, how: str
+) -> tuple[Sequence[str], list[Said]]:
+    """What is said of every case with these rules changed together."""
     cases = made(first, quick)
-    with changed(rule, how) if rule else contextlib.nullcontext():
-        return rule, [said_of(one) for one in cases]
+    with contextlib.ExitStack() as stack:
+        for rule in rules:
+            stack.enter_context(changed(rule, how))
+        return rules, [said_of(one) for one in cases]
 
 
-def told(rule: str, cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]) -> str:
+Run = Callable[[Sequence[str]], tuple[Sequence[str], list[Said]]]
+Tell = Callable[[Sequence[str], list[Said]], bool]
+
+
+def halved(rules: Sequence[str], run: Run, tell: Tell) -> list[str]:
+    """Those of the rules that change something, by groups halved until one is left."""
+    _, found = run(rules)
+    if not tell(rules, found):
+        return []
+    if len(rules) == 1:
+        return list(rules)
+    middle = len(rules) // 2
+    return halved(rules[:middle], run, tell) + halved(rules[middle:], run, tell)
+
+
+def told(rules: Sequence[str], cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]) -> str:
     """A line of the table."""
     off = [
         f"{one.case.name}: {a.verdict} {' '.join(a.effects)} -> {b.verdict} {' '.join(b.effects)}"
@@ -141,7 +175,7 @@ def told(rule: str, cases: Sequence[Made], usual: Sequence[Said], found: Sequenc
         if not a.same(b)
     ]
     took = sum(b.seconds for b in found) / max(sum(a.seconds for a in usual), 1e-9)
-    return f"{rule:20s} {len(off)} of {len(cases)} changed, {took:.2f} of the time; " + "; ".join(
+    return f"{' '.join(rules):20s} {len(off)} of {len(cases)} changed, {took:.2f} of the time; " + "; ".join(
         off
     )
 
@@ -151,21 +185,30 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=700)
     parser.add_argument("--how", choices=("off", "double", "halve"), default="off")
     parser.add_argument("--rules", nargs="*", default=list(RULES))
+    parser.add_argument("--together", action="store_true")
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--jobs", type=int, default=2)
     asked = parser.parse_args()
     cases = made(asked.first, asked.quick)
-    _, usual = tried("", asked.first, asked.quick, asked.how)
+    _, usual = tried((), asked.first, asked.quick, asked.how)
     for one, said in zip(cases, usual, strict=True):
         print(
             f"{one.case.name:60s} {said.verdict} {' '.join(said.effects)}"
             f" {' '.join(said.depends_on)} {said.seconds:.1f} s",
             flush=True,
         )
+    run = partial(tried, first=asked.first, quick=asked.quick, how=asked.how)
+    if asked.together:
+
+        def tell(rules: Sequence[str], found: list[Said]) -> bool:
+            print(told(rules, cases, usual, found), flush=True)
+            return not all(a.same(b) for a, b in zip(usual, found, strict=True))
+
+        print("decide:", " ".join(halved(asked.rules, run, tell)))
+        return
     with ProcessPoolExecutor(asked.jobs) as pool:
-        run = partial(tried, first=asked.first, quick=asked.quick, how=asked.how)
-        for rule, found in pool.map(run, asked.rules):
-            print(told(rule, cases, usual, found), flush=True)
+        for rules, found in pool.map(run, [(rule,) for rule in asked.rules]):
+            print(told(rules, cases, usual, found), flush=True)
 
 
 if __name__ == "__main__":
