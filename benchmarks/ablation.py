@@ -166,7 +166,9 @@ def halved(rules: Sequence[str], run: Run, tell: Tell) -> list[str]:
     return halved(rules[:middle], run, tell) + halved(rules[middle:], run, tell)
 
 
-def told(rules: Sequence[str], cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]) -> str:
+def told(
+    rules: Sequence[str], cases: Sequence[Made], usual: Sequence[Said], found: Sequence[Said]
+) -> str:
     """A line of the table."""
     off = [
         f"{one.case.name}: {a.verdict} {' '.join(a.effects)} -> {b.verdict} {' '.join(b.effects)}"
@@ -175,8 +177,9 @@ def told(rules: Sequence[str], cases: Sequence[Made], usual: Sequence[Said], fou
         if not a.same(b)
     ]
     took = sum(b.seconds for b in found) / max(sum(a.seconds for a in usual), 1e-9)
-    return f"{' '.join(rules):20s} {len(off)} of {len(cases)} changed, {took:.2f} of the time; " + "; ".join(
-        off
+    return (
+        f"{' '.join(rules):20s} {len(off)} of {len(cases)} changed, {took:.2f} of the time; "
+        + "; ".join(off)
     )
 
 

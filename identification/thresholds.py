@@ -62,5 +62,6 @@ EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.3  # deviation over the value, beyond which the value says nothing
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
+SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well

@@ -51,6 +51,13 @@ class Minimum:
             wider = spare**2 * (wider + inverse * self.mean)
         return np.asarray(wider, dtype=np.float64)
 
+    def covariance_by(self, noise: Array) -> Array:
+        """Of x, (k, k), where draws of the first n residuals' noise are known: noise (draws, n)."""
+        J = jacobian(self.fun, self.x, None, FINE_STEP)
+        inverse = np.linalg.pinv(J.T @ J)
+        moved = noise @ J[: noise.shape[1]] @ inverse
+        return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
+
 
 def gauss_newton(
     fun: Callable[[Array], Array], x: Array, steps: int, step_by: float = WIDE_STEP,

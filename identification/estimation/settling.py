@@ -44,7 +44,12 @@ from identification.estimation.windowed_run.refinement import (
     refit,
     values_of,
 )
-from identification.estimation.windowed_run.windows import position_errors, starts, window_run
+from identification.estimation.windowed_run.windows import (
+    position_errors,
+    starts,
+    walks,
+    window_run,
+)
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
@@ -54,7 +59,8 @@ from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
 from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED, NEARLY_FOLLOWED
 
-# Relative deviations that the force between its samples adds where it drives the run, by name;
+# Relative deviations that the force between its samples adds where it drives the run (where it
+# corrects one, so much less as its gain squared), by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
 SPREAD = 0.15  # of the search's box, in which sets that do about as well are looked for
@@ -84,7 +90,8 @@ def settled(
 
     misfit: what it leaves in windows; refined: the refinement that it comes from, if it is one.
     """
-    exact = recorded.drive == "command" and not plant.effects
+    walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
+    exact = recorded.drive == "command" and not plant.effects and not walking
     spread = None
     if exact and misfit <= FOLLOWED:
         spread = _over_whole_runs(plant, recorded, rng, report)
@@ -194,7 +201,7 @@ def _over_windows(
     events = _events(plant, recorded)
     covariance = _covariance(near, recorded, values, events)
     samples = rng.multivariate_normal(values, covariance, NORMAL_SETS, check_valid="ignore")
-    said = [] if not is_adequate(left) or recorded.drive == "force" else [WINDOWS_ONLY]
+    said = [] if not is_adequate(left) or recorded.drive == "force" else [_why_windows(recorded)]
     return Spread(
         plant=plant,
         names=names,
@@ -212,10 +219,19 @@ def _over_windows(
     )
 
 
-WINDOWS_ONLY = (
-    "the model follows the logs in windows of 2 s from measured states, but not the whole: a stop"
-    " turns on less than the noise there, or the logged command has noise of its own"
-)
+def _why_windows(recorded: RecordedLogs) -> str:
+    """What to say of a fit that follows its logs in windows."""
+    walk = max(one.walk for one in recorded.logs)
+    if walk == 0.0:
+        return (
+            "the model follows the logs in windows of 2 s from measured states, but not the whole:"
+            " a stop turns on less than the noise there"
+        )
+    return (
+        "the logged command has noise of its own: integrated, it takes the force"
+        f" {walk / np.sqrt(recorded.logs[0].log.h):.2g} N away in 1 s (one sigma); the model's"
+        " force is corrected by the measured one for it, in windows of 2 s"
+    )
 
 
 def is_adequate(left: float) -> bool:
@@ -229,9 +245,9 @@ def _covariance(near: Refit, recorded: RecordedLogs, values: Array, events: Even
     # What changes nothing in the run is not known, rather than known exactly.
     silent = ~(np.diag(covariance) > 0.0)
     covariance[silent, silent] = _of_silent(near.plant, near.names, values, events)[silent] ** 2
-    if recorded.drive == "force":
-        floor = np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
-        covariance = covariance + np.diag(floor**2)
+    by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
+    floor = by_force * np.array([BETWEEN.get(name, 0.0) for name in near.names]) * np.abs(values)
+    covariance = covariance + np.diag(floor**2)
     if not np.all(np.isfinite(covariance)):
         covariance = np.diag(np.abs(values) ** 2)
     return np.asarray(covariance)

@@ -97,6 +97,7 @@ def effect_run_kernel(
     q: Array,
     s: Array,
     held: bool,
+    gain: float,
     k_a: float,
     t: Array,
     u: Array,
@@ -143,6 +144,8 @@ def effect_run_kernel(
             start_states(codes, addresses, q, s_k, z, plant, now, y, v, F, u[k], k > 0)
         shown = shown_position(h, codes, addresses, q, s_k, z, plant, now, y, v, F, u[k])
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, F, shown
+        if gain > 0.0 and not restart:
+            F += gain * (force[k] - F)
         few = 1 if mode == STUCK and v == 0.0 and bristle < 0 else rough
         z_0[:] = z
         state = effect_step(

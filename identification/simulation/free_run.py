@@ -36,6 +36,8 @@ from identification.simulation.karnopp_step import (
     settled_mode,
 )
 
+Restarts = tuple[IntArray, Array, Array] | tuple[IntArray, Array, Array, Array]
+
 
 @dataclass(frozen=True)
 class FreeRun:
@@ -56,6 +58,7 @@ def run_kernel(
     p: Array,
     h: float,
     held: bool,
+    gain: float,
     u: Array,
     force: Array,
     slope: Array,
@@ -70,7 +73,8 @@ def run_kernel(
     """One plant p (1, 11) along one log: out[:3] takes position, velocity, force; modes (n,).
 
     held: take the force from `force` and `slope` at every sample, corrected by k2 (y_m - y);
-    at, at_y, at_v, at_f: samples at which the run restarts, and from where.
+    gain: share of its distance to `force` by which the run's own force is corrected at a sample,
+    where it is not held; at, at_y, at_v, at_f: samples at which the run restarts, and from where.
     """
     table = np.zeros((MODES, COLUMNS))
     plant = parameters(p, 0)
@@ -90,12 +94,16 @@ def run_kernel(
             f = force[k] + k2 * (y_m[k] - y)
             following = k + 1 if k + 1 < len(u) else k
             g = slope[k] + k2 * (y_m[following] - y_m[k]) / h
-        if moved_here or (held and (f < row[F_LO] or f > row[F_HI])):
+        shown = f
+        if gain > 0.0 and not moved_here:
+            f += gain * (force[k] - f)
+        nudged = held or gain > 0.0
+        if moved_here or (nudged and (f < row[F_LO] or f > row[F_HI])):
             mode = settled_mode(plant, v, f)
             v = 0.0 if mode == STUCK else v
         if mode != before:
             row = mode_row(table, mode)
-        out[0, k], out[1, k], out[2, k] = y, v, f
+        out[0, k], out[1, k], out[2, k] = y, v, shown
         modes[k] = mode
         moved, v_next, f_next, left = exact_step(row, k2, h, v, f, g)
         if left:
@@ -119,39 +127,37 @@ def free_run(
     drive: Drive,
     *,
     stiffness: float = 0.0,
-    restarts: tuple[IntArray, Array, Array] | None = None,
-    forces: Array | None = None,
+    restarts: Restarts | None = None,
+    gain: float = 0.0,
     bristle_step: float = LONGEST_BRISTLE,
 ) -> FreeRun:
     """Response of `plant` to the log's command or force; it sees the measured position only where
     it restarts and, for `stiffness` > 0, through stiffness * (y_m - y) added to the force.
 
-    start: position [m], velocity [m/s], force [N] at the first sample; restarts: samples (k,),
-    positions and velocities from which the run starts anew; forces: (k,) [N] there (the log's
-    where they are not given); bristle_step: longest sub-step of a plant with a bristle [s]. The
-    log must have an even clock.
+    start: position [m], velocity [m/s], force [N] at the first sample; restarts: samples (k,)
+    from which the run starts anew, positions and velocities there, and forces [N] (the log's where
+    they are not given); gain: share of its distance to the measured force by which the force
+    of a run by command is corrected after each sample (F is the force before it); bristle_step:
+    longest sub-step of a plant with a bristle [s]. The log must have an even clock.
     Raises BadModel where drive is "command" and the plant has no actuator.
     """
     if drive == "command" and not isinstance(plant.actuator, Actuator | Motor):
         raise BadModel("the model has no actuator: drive the run by force, not by the command")
     motor = isinstance(plant.actuator, Motor)
     held = drive == "force" or motor
-    k1, k2, k_a = 0.0, stiffness, 0.0
+    k1, k2 = 0.0, stiffness
     if isinstance(plant.actuator, Actuator) and not held:
         k1, k2 = plant.actuator.k1, plant.actuator.k2
-    if isinstance(plant.actuator, Motor) and drive == "command":
-        k_a = plant.actuator.k_a
-        force = k_a * log["u"]
-    else:
-        force = log["F"] if held else np.zeros(len(log))
-    begun = _begun(log, start, force, restarts, forces)
+    gain = 0.0 if held else gain
+    k_a, force = _force(plant, log, drive, seen=held or gain > 0.0)
+    begun = _begun(log, start, force, restarts)
     out, modes = np.zeros((4, len(log))), np.zeros(len(log), dtype=np.int64)
     u = read_only(log["u"] if "u" in log else np.zeros(len(log)))
     force = read_only(force)
     slope = np.zeros(len(log)) if motor or not held else force_slope(force, log.h, hold=False)
     p = kernel_parameters(plant.friction.array, k1, k2)[np.newaxis]
     if not plant.effects:
-        run_kernel(p, log.h, held, u, force, slope, log["y"], *begun, out, modes)
+        run_kernel(p, log.h, held, gain, u, force, slope, log["y"], *begun, out, modes)
         out[3] = out[0]
     else:
         table, signals = effect_table(plant.effects), signal_table(plant.effects, log)
@@ -160,18 +166,28 @@ def free_run(
             acting = effective_commands(*own, np.zeros(len(table.codes)), log["t"], u, log.h)
             force = read_only(k_a * acting) if k_a != 0.0 else force
             run_kernel(
-                p, log.h, held, read_only(acting), force, slope, log["y"], *begun, out, modes
+                p, log.h, held, gain, read_only(acting), force, slope, log["y"], *begun, out, modes
             )
             shown_run(p, log.h, *own, log["t"], u, begun[0], out)
         else:
             count = pieces(table, log.h, bristle_step)
             few = fewer(table, count, bristle_step)
             effect_run_kernel(
-                p, log.h, few, count, *own, held, k_a, log["t"], u, force, slope, log["y"], *begun,
-                out, modes,
+                p, log.h, few, count, *own, held, gain, k_a, log["t"], u, force, slope, log["y"],
+                *begun, out, modes,
             )  # fmt: skip
     _refuse_lost(log, out[0])
     return FreeRun(out[0], out[1], out[2], modes, out[3])
+
+
+def _force(plant: Plant, log: Log, drive: Drive, seen: bool) -> tuple[float, Array]:
+    """A motor's k_a (0 where it does not drive the run), and the force (n,) [N] that does.
+
+    seen: the measured force has a part in the run.
+    """
+    if isinstance(plant.actuator, Motor) and drive == "command":
+        return plant.actuator.k_a, plant.actuator.k_a * log["u"]
+    return 0.0, log["F"] if seen else np.zeros(len(log))
 
 
 def _refuse_lost(log: Log, y: Array) -> None:
@@ -188,15 +204,15 @@ def _begun(
     log: Log,
     start: tuple[float, float, float],
     force: Array,
-    restarts: tuple[IntArray, Array, Array] | None,
-    forces: Array | None,
+    restarts: Restarts | None,
 ) -> tuple[IntArray, Array, Array, Array]:
     """Samples (k,) at which the run begins and begins anew, with position, velocity and force."""
-    at, at_y, at_v = restarts if restarts else (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
+    none = (np.zeros(0, dtype=np.int64), *np.zeros((2, 0)))
+    at, at_y, at_v, *forces = none if restarts is None else restarts
     keep = at > 0
     at = np.concatenate([[0], at[keep]]).astype(np.int64)
     at_f = log["F"][at] if "F" in log else force[at]
-    if forces is not None:
-        at_f = np.concatenate([at_f[:1], forces[keep]])
+    if forces:
+        at_f = np.concatenate([at_f[:1], forces[0][keep]])
     at_f = np.concatenate([[start[2]], at_f[1:]])
     return at, np.append(start[0], at_y[keep]), np.append(start[1], at_v[keep]), at_f

@@ -36,6 +36,7 @@ from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.signals.force_walk import shows
 from identification.tracing.dependence import dependence
 from identification.tracing.free_run.backward_elimination import (
     Setting,
@@ -490,6 +491,12 @@ def test_actuator_share() -> None:
     """One that leaves a trifle of the force is one, however little noise there is."""
     assert not leaves_much(0.016, 100.0)
     assert leaves_much(0.025, 100.0)
+
+
+def test_sure_of_walk() -> None:
+    """A force that walks off its command by less than chance does not walk."""
+    assert not shows(16.0)
+    assert shows(25.0)
 
 
 def test_every_threshold_has_a_test() -> None:

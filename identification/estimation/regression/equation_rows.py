@@ -18,6 +18,7 @@ from identification.errors import BadLog
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.signals.differentiate import Motion, differentiate, resolution
+from identification.signals.force_walk import corrected_share, force_walk
 from identification.signals.intersample import kinks
 from identification.signals.weak_form import (
     WeakWindows,
@@ -46,6 +47,8 @@ CONTROL_LAGS = 25  # samples of the position that a controller's force is taken 
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
 OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
 CALM_SHARE = 0.9  # of the samples, those that tell the controller
+OF_WALK = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
+LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
 QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
 
 
@@ -56,7 +59,8 @@ class MotionLog:
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
     plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
-    leads the body along a path.
+    leads the body along a path. walk: by how much a sample more may take the force away from what
+    the command makes of it [N], one sigma (0: the command is exact, or there is none).
     """
 
     log: Log
@@ -73,6 +77,12 @@ class MotionLog:
     rotary: bool = False
     imposed: bool = False
     reference: Karnopp | None = None
+    walk: float = 0.0
+
+    @property
+    def gain(self) -> float:
+        """Share of its distance to the measured force, by which a run's by command is corrected."""
+        return corrected_share(self.walk, self.noise_F)
 
     def again(self, log: Log) -> "MotionLog":
         """The same of another log of this machine."""
@@ -184,7 +194,13 @@ def motion_log(
         log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
         rotary, imposed,
     )  # fmt: skip
-    return replace(one, noise_F=min(noise_F, _unexplained(one))) if by_command else one
+    if not by_command:
+        return one
+    noise_F = min(noise_F, _unexplained(one))
+    walk = force_walk(log["F"], motion.y, integral(u, h), h, 1.0 / motion.cutoff)
+    # A walk's steps are in the third differences by which the sensor's noise was seen.
+    noise_F = float(np.sqrt(max(noise_F**2 - OF_WALK * walk**2, LEAST_PART_OF_NOISE * noise_F**2)))
+    return replace(one, noise_F=noise_F, walk=walk)
 
 
 def _direction(motion: Motion) -> Array:
@@ -211,7 +227,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
         begin = int(np.argmax(one.signals["d"] != 0)) - round(BEFORE_MOTION / one.log.h)
     begin = min(max(begin, 0), len(one.log) - n)
     cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
-    part = replace(one.again(cut), noise_y=one.noise_y, noise_F=one.noise_F)
+    part = replace(one.again(cut), noise_y=one.noise_y, noise_F=one.noise_F, walk=one.walk)
     return replace(part, reference=one.reference)
 
 
@@ -286,7 +302,9 @@ def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | No
     reached = integral(one.log["u"], one.log.h) if u is None else u
     X = np.column_stack([w.first @ reached, -(w.first @ y), np.ones(len(w.start))])
     _, first, *_ = weights(w.length, one.log.h)
-    sd = np.sqrt(one.noise_F**2 + (theta[1] * one.noise_y) ** 2) * np.sqrt(noise_gain(first))
+    white = one.noise_F**2 + (theta[1] * one.noise_y) ** 2
+    walked = one.walk**2 * noise_gain(np.cumsum(first))
+    sd = float(np.sqrt(white * noise_gain(first) + walked))
     r = len(w.start)
     return Rows(
         w.first @ one.log["F"], X, np.full(r, sd), _blocks(w, len(one.log)), np.full(r, np.inf),

@@ -23,6 +23,7 @@ from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     WHOLE,
     freed,
+    noise_errors,
     starts,
     walks,
     window_of,
@@ -53,6 +54,7 @@ ONWARD_ROUNDS, ONWARD_GAIN = 4, 0.9
 REFIT_STEPS, BRISTLE_STEPS, QUICK_STEPS = 12, 10, 4
 IN_REACH = 20.0  # misfit up to which a bristle is refined with a simulation's short sub-steps
 MOTOR_WINDOW = 8.0  # s, of those in which a motor is followed in the end
+NOISE_DRAWS = 60  # of every signal's noise, from which the parameters' deviations follow
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 LUCKY_WINDOWS = 0.15  # of the windows, that luck may have spoilt
 CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
@@ -362,9 +364,14 @@ def refit(
     def spread() -> Array:
         # Where what is left is no noise, a window counts as one sample.
         factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
-        walking = any(walks(one, drive) for one in logs)
-        cluster = _windows(logs, drive) if walking else None
-        return factor * at.covariance(cluster) * np.outer(unit[free], unit[free])
+        scale = np.outer(unit[free], unit[free])
+        if not any(walks(one, drive) for one in logs):
+            return factor * at.covariance() * scale
+        if found <= COMPLETE:
+            noise = _noise(unknowns.plant_at(at.x), logs, drive)
+            if noise is not None:
+                return at.covariance_by(noise) * scale
+        return factor * at.covariance(_windows(logs, drive)) * scale
 
     names = tuple(unknowns.names[i] for i in free)
     return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread)
@@ -436,6 +443,21 @@ def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
         plant, left_by = best.plant, best.misfit
     assert best is not None
     return best
+
+
+def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | None:
+    """Errors (draws, n) over all logs, which the noise of every signal alone makes of a run."""
+    parts = []
+    for one in logs:
+        found = freed(plant, one, drive, starts(one, drive))
+        if found is None:
+            return None
+        rng = np.random.default_rng(0)  # a quadrature: nothing random
+        draws = [noise_errors(plant, one, drive, found, rng) for _ in range(NOISE_DRAWS)]
+        if any(r is None for r in draws):
+            return None
+        parts.append(np.array([soft(r.ravel()) for r in draws if r is not None]))
+    return np.concatenate(parts, axis=1)
 
 
 def _windows(logs: Sequence[MotionLog], drive: Drive) -> IntArray:

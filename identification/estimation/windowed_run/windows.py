@@ -7,7 +7,7 @@ r'(I + B P B')^-1 r for residuals r, B their change with the states and P the st
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.regression.standstill import rest_stretches
 from identification.log import Log
 from identification.model.estimates import Drive
-from identification.model.plant import Motor, Plant
+from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.sampling import samples
 from identification.simulation.free_run import FreeRun, free_run
 
@@ -118,8 +118,8 @@ def window_run(
             driven,
             start,
             drive,
-            restarts=(begun.at, y, v),
-            forces=F,
+            restarts=(begun.at, y, v, F),
+            gain=one.gain if drive == "command" else 0.0,
             bristle_step=begun.step,
         )
 
@@ -147,7 +147,8 @@ def window_errors(run: FreeRun, one: MotionLog, drive: Drive) -> Array:
     """Position (and, by command, force) errors in units of the sensors' noise, (k, n)."""
     out = [(run.shown - one.log["y"]) / one.noise_y]
     if drive == "command" and not one.held:
-        out.append((run.F - one.log["F"]) / max(one.noise_F, 1e-12))
+        # Beside the sensor's noise, that of the force before it was corrected.
+        out.append((run.F - one.log["F"]) * np.sqrt(1.0 - one.gain) / max(one.noise_F, 1e-12))
     return np.array(out)
 
 
@@ -286,24 +287,52 @@ def _sureness(
 
 
 def walks(one: MotionLog, drive: Drive) -> bool:
-    """Whether a run walks away with the noise of the force that drives it."""
-    return (drive == "force" or one.held) and one.noise_F > 0.0
+    """Whether a run walks away with the noise of the force that drives or corrects it."""
+    return (drive == "force" or one.held or one.walk > 0.0) and one.noise_F > 0.0
 
 
 def _walk(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
     """Variance (n,) of a run by the force's noise, in units of the position's."""
     square = np.zeros(len(one.log))
-    own = driven_by(one, drive)
-    sd = np.hypot(one.noise_F, one.kinks) if drive == "force" else one.noise_F
     for seed in range(NOISE_RUNS):
-        noise = sd * np.random.default_rng(seed).standard_normal(len(one.log))
-        more = {"F": own["F"] + noise}
-        if isinstance(plant.actuator, Motor):
-            more["u"] = own["u"] + noise / plant.actuator.k_a
-        run = window_run(plant, one, drive, begun, log=own.with_signals(**more))
+        noisy = _noisier(plant, one, drive, np.random.default_rng(seed))
+        run = window_run(plant, one, drive, begun, log=noisy)
         if run is not None:
             square += ((run.shown - base.shown) / one.noise_y) ** 2 / NOISE_RUNS
     return square
+
+
+def _noisier(plant: Plant, one: MotionLog, drive: Drive, rng: np.random.Generator) -> Log:
+    """The log that drives a run, with its force's (and command's) noise once more."""
+    own = driven_by(one, drive)
+    sd = np.hypot(one.noise_F, one.kinks) if drive == "force" else one.noise_F
+    noise = sd * rng.standard_normal(len(one.log))
+    more = {"F": own["F"] + noise}
+    if isinstance(plant.actuator, Motor):
+        more["u"] = own["u"] + noise / plant.actuator.k_a
+    elif drive == "command" and isinstance(plant.actuator, Actuator):
+        step = one.walk / (plant.actuator.k1 * one.log.h)
+        more["u"] = own["u"] + step * rng.standard_normal(len(one.log))
+    return own.with_signals(**more)
+
+
+def noise_errors(
+    plant: Plant, one: MotionLog, drive: Drive, found: Freed, rng: np.random.Generator
+) -> Array | None:
+    """Errors (k, n), less their states' part, that every signal's noise alone makes of a run.
+
+    Noise of force and command enters the run and walks, that of the states moves whole windows,
+    that of the position is white.
+    """
+    base = window_run(plant, one, drive, found.begun)
+    noisy = _noisier(plant, one, drive, rng)
+    shift = found.begun.sd * rng.standard_normal(found.begun.sd.shape)
+    run = window_run(plant, one, drive, found.begun, shift, noisy)
+    if base is None or run is None:
+        return None
+    y = one.log["y"] + one.noise_y * rng.standard_normal(len(one.log))
+    seen = replace(one, log=one.log.with_signals(y=y, F=noisy["F"]))
+    return found(window_errors(run, seen, drive) - window_errors(base, one, drive))
 
 
 def window_residual(

@@ -47,6 +47,27 @@ def test_recovers_the_papers_plants(number: int) -> None:
         assert abs(found.value - value) < 5 * found.sd + 1e-4 * abs(value)
 
 
+@pytest.mark.parametrize(("noise", "off"), [(3e-5, 0.003), (1e-4, 0.01), (1e-3, 0.03)])
+def test_noise_of_the_logged_command_is_the_logs_and_not_the_plants(
+    noise: float, off: float
+) -> None:
+    """The valve did not see it: its integral walks, and the measured force tells how far."""
+    truth = table(2)
+    log = made_log(truth, seed=2)
+    heard = log.with_signals(
+        u=log["u"] + noise * np.random.default_rng(5).standard_normal(len(log))
+    )
+    fit = fitted(heard)
+    assert fit.adequate and fit.drive == "command"
+    assert fit.chi_square < 1.15
+    assert any("command has noise" in remark for remark in fit.remarks)
+    assert np.max(errors(fit, truth)) < off
+    for name, value in zip(NAMES, truth.array, strict=True):
+        found = fit.estimates[name]
+        assert found.value is not None and found.sd is not None, found.reason
+        assert abs(found.value - value) < 4 * found.sd
+
+
 def test_recovers_a_plant_from_the_force_alone() -> None:
     truth = table(2)
     log = made_log(truth, seed=3)

@@ -60,7 +60,7 @@ def alone(
     force, slope, y_m = held or (zero, zero, zero)
     y, v, f = (np.array([value]) for value in start)
     out, modes = np.zeros((3, n)), np.zeros(n, dtype=np.int64)
-    run_kernel(p[None], H, held is not None, u, force, slope, y_m, at, y, v, f, out, modes)
+    run_kernel(p[None], H, held is not None, 0.0, u, force, slope, y_m, at, y, v, f, out, modes)
     return out
 
 

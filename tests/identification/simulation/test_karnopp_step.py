@@ -48,7 +48,7 @@ def run(
     at = np.zeros(1, dtype=np.int64)
     y, v, force = (np.array([value]) for value in start)
     p = kernel_parameters(nine.array, k1, k2)[np.newaxis]
-    run_kernel(p, h, False, u, zero, zero, zero, at, y, v, force, out, modes)
+    run_kernel(p, h, False, 0.0, u, zero, zero, zero, at, y, v, force, out, modes)
     return out, modes
 
 
