@@ -9,11 +9,17 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.model.plant import units_of
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, IMPOSED_LEFT
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.constant_force import beyond_friction, constant_remark
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
-from identification.tracing.model_errors import carries, errors_of, share_left
+from identification.tracing.model_errors import (
+    carries,
+    errors_of,
+    noise_floor,
+    predicted,
+    share_left,
+)
 from identification.tracing.parameter_drift import parameter_drift
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import (
@@ -25,10 +31,11 @@ from identification.tracing.remaining_structure import (
     strongest,
     too_much,
     unrepeated,
+    unsized,
 )
-from identification.tracing.result import Change, Dependence, Errors, TraceVerdict
+from identification.tracing.result import Change, Dependence, Errors, Left, TraceVerdict
 from identification.tracing.structure_search import Refinement, Selection, without_effects
-from identification.tracing.verdict import verdict_of
+from identification.tracing.verdict import is_headline, other_law, verdict_of
 
 NOTHING = Dependence((), 0.0)
 
@@ -43,6 +50,8 @@ class Judgement:
     left: Dependence
     drift: tuple[Change, ...]
     remarks: tuple[str, ...]
+    complete: bool
+    rest: Left
 
 
 def judgement(
@@ -53,20 +62,39 @@ def judgement(
     choice, after, logs = found.choice, found.model, list(rows.logs)
     changed = parameter_drift(after, choice.steps, seen, rig) if seen else ()
     left = _left(choice, after, chosen)
-    verdict = verdict_of(choice, left, changed)
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(plain, slowest, (), logs, seen, rows.drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, rows.drive)
-    doubts = _doubts(chosen, found, errors_before, errors_after, bool(changed))
-    if verdict != "unknown" and (doubts or too_much(choice, after)):
+    noise = noise_floor(choice.base, logs)
+    share = share_left(errors_before, errors_after, noise)
+    doubts = _doubts(found, errors_before, errors_after, share, chosen.pieces, bool(changed))
+    of_other_law = other_law(choice, left, share)
+    headline = bool(choice.steps) and not doubts and not of_other_law and is_headline(share)
+    verdict = verdict_of(choice, left, changed, headline=headline)
+    if verdict != "unknown" and (doubts or (too_much(choice, after) and not headline)):
         verdict = "unknown"
         # A law of place is told from what the plain model leaves.
         of_place = PIECES in doubts or LONGER in doubts
         left = NOTHING if of_place else strongest(choice, after, logs, rows.drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             left = remaining_structure(without_effects(chosen.plain, choice), plain, any_size=True)
-    said = (*_remarks(choice, after, left, logs, seen, rig), *doubts)
-    return Judgement(verdict, errors_before, errors_after, left, tuple(changed), said)
+    said = (
+        *_remarks(choice, after, left, logs, seen, rig),
+        *doubts,
+        *map(_not_its_law, of_other_law),
+    )
+    whole = predicted(after, errors_after["test"], noise, seen or logs, rows.drive)
+    return Judgement(
+        verdict, errors_before, errors_after,
+        left if verdict == "unknown" else NOTHING, tuple(changed), said,
+        complete=whole and verdict != "unknown",
+        rest=Left(share, left.depends_on),
+    )  # fmt: skip
+
+
+def _not_its_law(key: str) -> str:
+    """What to say of an effect whose own signals tell of what it leaves."""
+    return f"like {key}, but not its law: what is left depends on the same signals"
 
 
 def _left(choice: Choice, after: FittedStructure, chosen: Selection) -> Dependence:
@@ -86,6 +114,8 @@ PIECES = (
     " that the library does not have"
 )
 LONGER = "a force is said to repeat over more than the travel shows: it stands in for another"
+UNSURE = "an effect is named of which the logs leave every size open"
+UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
 STANDS_IN = (
     "what explains the training logs does not explain the test logs: it stands in for something"
     " else, or the machine differs in them"
@@ -93,20 +123,23 @@ STANDS_IN = (
 
 
 def _doubts(
-    chosen: Selection, found: Refinement, before: Mapping[str, Errors], after: Mapping[str, Errors],
-    changed: bool,
+    found: Refinement, before: Mapping[str, Errors], after: Mapping[str, Errors], share: float,
+    apart: bool, changed: bool,
 ) -> tuple[str, ...]:  # fmt: skip
-    """Why the effects found may stand in for one that the library lacks; changed: by drift."""
+    """Why the effects found may stand in for one that the library lacks.
+
+    share: of what was missing, that is left; apart: the search came on pieces of a law of place;
+    changed: by drift.
+    """
     choice, model = found.choice, found.model
-    if model.stage.imposed:
-        carried = share_left(before, after) <= IMPOSED_LEFT
-    else:
-        carried = not equations_explained(choice.base) or carries(before, after)
-    pieces = in_pieces(choice) or (chosen.pieces and places(choice) > 1 and model.misfit > COMPLETE)
+    carried = model.stage.imposed or not equations_explained(choice.base) or carries(before, after)
+    pieces = in_pieces(choice) or (apart and places(choice) > 1 and model.misfit > COMPLETE)
     doubts = {
         PIECES: pieces,
         LONGER: not model.imposed and unrepeated(model),
         STANDS_IN: bool(choice.steps) and not changed and not carried,
+        UNDER_HALF: bool(choice.steps) and not changed and carried and not is_headline(share),
+        UNSURE: bool(choice.steps) and model.misfit > ASTRAY and unsized(choice, model),
     }
     return tuple(said for said, holds in doubts.items() if holds)
 

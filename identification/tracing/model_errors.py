@@ -1,7 +1,7 @@
 """Errors of a model on the logs of its fit and on logs that it has not seen."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.row_fit import RowFit, rms
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.windowed_run.refinement import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import CARRIED, ROUGH_LEFT
+from identification.thresholds import ADEQUATE, CARRIED, STANDS_OUT, ROUGH_LEFT
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
@@ -65,10 +66,46 @@ def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
     return other <= CARRIED * own or other**2 - own**2 <= little
 
 
-def share_left(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> float:
-    """Share of the square of the test logs' force error that is left; 0 without one."""
-    left, missing = after["test"].force_rms, before["test"].force_rms
-    return 0.0 if left is None or not missing else (left / missing) ** 2
+@dataclass(frozen=True)
+class NoiseFloor:
+    """What the sensors alone leave: of the equation of motion [N], of the run's position [m], of
+    the actuator's equation [N/s], None where there is none."""
+
+    force_rms: float
+    position_rms: float
+    actuator_rms: float | None
+
+
+def noise_floor(base: Mapping[str, RowFit], logs: Sequence[MotionLog]) -> NoiseFloor:
+    """What the sensors of these logs alone leave."""
+    noise_y = float(np.mean([one.noise_y for one in logs]))
+    return NoiseFloor(row_noise(base, MECHANICAL) or 0.0, noise_y, row_noise(base, ACTUATOR))
+
+
+def share_left(
+    before: Mapping[str, Errors], after: Mapping[str, Errors], noise: NoiseFloor
+) -> float:
+    """Share of what was missing on the test logs that is left, of the error that stood out most.
+
+    Of squares, beyond what the sensors alone leave; 0 where nothing stood out of that.
+    """
+    most, share = STANDS_OUT, 0.0
+    for name in ("force_rms", "position_rms", "actuator_rms"):
+        own, left, least = (getattr(x, name) for x in (before["test"], after["test"], noise))
+        if own is None or left is None or not least:
+            continue
+        if (own / least) ** 2 > most:
+            most = (own / least) ** 2
+            share = max(left**2 - least**2, 0.0) / (own**2 - least**2)
+    return share
+
+
+def predicted(model: FittedStructure, errors: Errors, noise: NoiseFloor,
+    logs: Sequence[MotionLog], drive: Drive) -> bool:  # fmt: skip
+    """Whether a model is complete: its errors on these logs are hardly more than noise."""
+    if errors.force_rms is not None and errors.force_rms**2 > ADEQUATE * noise.force_rms**2:
+        return False
+    return model.imposed or misfit(model.plant, logs, drive) <= ADEQUATE
 
 
 def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:

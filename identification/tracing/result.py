@@ -59,6 +59,15 @@ class Dependence:
 
 
 @dataclass(frozen=True)
+class Left:
+    """What the effects named leave: the share of the square that was missing on the test logs
+    beyond the sensors' noise, where it shows most, and the signals on which that depends."""
+
+    share: float
+    depends_on: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Change:
     """A parameter that differs between the training and the test logs."""
 
@@ -92,7 +101,8 @@ class Trace:
     parameters_before, parameters_after: the nine and k1, k2 by name; plant: the model after, with
     its effects; residuals: of the equations; run: of the position in the free run [m], None where
     it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
-    each.
+    each. complete: the model predicts the test logs down to the sensors' noise; left: what is
+    missing beside the effects named.
     """
 
     verdict: TraceVerdict
@@ -112,4 +122,6 @@ class Trace:
     plant: Plant
     residuals: tuple[Residual, ...]
     run: Residual | None = None
+    complete: bool = True
+    left: Left = Left(0.0, ())
     remarks: tuple[str, ...] = field(default=())

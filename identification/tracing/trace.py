@@ -84,4 +84,6 @@ def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
         residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
         run=run_residual(before, after, logs, rows.drive),
         remarks=(*rows.remarks, *judged.remarks),
+        complete=judged.complete,
+        left=judged.rest,
     )

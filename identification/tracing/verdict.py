@@ -15,6 +15,7 @@ from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
+from identification.thresholds import HEADLINE, OTHER_LAW
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
@@ -51,15 +52,37 @@ POSITION = "position"  # the residual of the free run
 RIVALS_SHOWN = 6  # rivals of each effect
 
 
-def verdict_of(choice: Choice, left: Dependence, drift: Sequence[Change]) -> TraceVerdict:
-    """The verdict in one word: what is left comes first, then rivals, effects and drift."""
-    if left.depends_on:
+def verdict_of(
+    choice: Choice, left: Dependence, drift: Sequence[Change], *, headline: bool = False
+) -> TraceVerdict:
+    """The verdict in one word: what is left comes first, then rivals, effects and drift.
+
+    headline: effects explain most of what was missing, so they are told before the rest.
+    """
+    if left.depends_on and not headline:
         return "unknown"
     if any(equal_rivals(step) for step in choice.steps):
         return "inseparable"
     if choice.steps:
         return "effect"
     return "drift" if drift else "none"
+
+
+def is_headline(share: float) -> bool:
+    """Whether effects that leave this share of what was missing are told first."""
+    return share <= HEADLINE
+
+
+def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]:
+    """Effects whose own signals tell of what is left (`share` of what was missing): their law is
+    not the machine's."""
+    if share * left.explained <= OTHER_LAW:
+        return ()
+    return tuple(
+        step.candidate.effect.key
+        for step in choice.steps
+        if set(step.candidate.effect.depends_on) & set(left.depends_on)
+    )
 
 
 def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEffect:

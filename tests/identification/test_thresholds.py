@@ -49,7 +49,7 @@ from identification.tracing.free_run.backward_elimination import (
 )
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
-from identification.tracing.model_errors import carries
+from identification.tracing.model_errors import NoiseFloor, carries, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.recorded_rows import told_by_speed
 from identification.tracing.regression.candidates import EffectCandidate, shaped
@@ -63,8 +63,9 @@ from identification.tracing.regression.stepwise import (
     merit,
 )
 from identification.tracing.remaining_structure import in_pieces, is_slight, too_much
-from identification.tracing.result import Errors
+from identification.tracing.result import Dependence, Errors
 from identification.tracing.structure_search import useless
+from identification.tracing.verdict import is_headline, other_law
 from tests.identification.motor_logs import K_A, NOISE, H, plant, seen
 
 N = 100  # rows
@@ -368,6 +369,30 @@ def test_imposed_left() -> None:
     """Of an imposed motion effects may leave a good part of what was missing, 100 here."""
     assert not too_much(choice("spring", first=101.0, base=1.0 + 24.0), run(np.inf, imposed=True))
     assert too_much(choice("spring", first=101.0, base=1.0 + 37.5), run(np.inf, imposed=True))
+
+
+FLOOR = NoiseFloor(1.0, 1.0, None)  # of the sensors
+
+
+def test_stands_out() -> None:
+    """An error on the test logs is spoken of where it stands out of the sensors' noise."""
+    assert share_left(errors(1.0, np.sqrt(1.04)), errors(1.0, np.sqrt(1.02)), FLOOR) == 0.0
+    left = share_left(errors(1.0, np.sqrt(1.62)), errors(1.0, np.sqrt(1.31)), FLOOR)
+    assert left == pytest.approx(0.5)
+
+
+def test_headline() -> None:
+    """Effects that explain most of what was missing are told first."""
+    assert is_headline(0.4)
+    assert not is_headline(0.625)
+
+
+def test_other_law() -> None:
+    """A rest that depends on an effect's own signals is another law, where it is much of all."""
+    found, own = choice("spring"), Dependence(("y",), 0.5)
+    assert other_law(found, own, 0.08) == ()
+    assert other_law(found, own, 0.125) == ("spring",)
+    assert other_law(found, Dependence(("v",), 0.5), 0.125) == ()
 
 
 def test_structured() -> None:

@@ -110,6 +110,7 @@ def trace_of(
         plant=Plant(NINE, Actuator(19530.0, 10405.0), acting),
         residuals=tuple(residuals),
         remarks=("a remark of the trace",),
+        complete=verdict != "unknown",
     )
 
 

@@ -63,7 +63,7 @@ def trace_sentence(traced: Traced) -> str:
             return nothing_missing(found, shown(traced.model.rotary).force)
         case "effect":
             also = f" The test logs also differ in {changed}." if changed else ""
-            return f"Missing: {names}.{errors}{also}"
+            return f"Missing: {names}.{share_explained(traced)}{errors}{also}"
         case "drift":
             return (
                 f"Drift: between training and test logs the machine changed in {changed};"
@@ -83,6 +83,24 @@ def trace_sentence(traced: Traced) -> str:
                 f"Unknown: what is left depends on {signals} (which accounts for {share} of it),"
                 f" and no effect of the library explains it.{known}"
             )
+
+
+def share_explained(traced: Traced) -> str:
+    """How much of what was missing the effects explain, and on what the rest depends."""
+    found = traced.trace
+    if told_by(traced) is None:  # no error in which they would show
+        return ""
+    share = 100 * found.left.share
+    it, where = (
+        "It explains" if len(found.effects) == 1 else "They explain",
+        "on the held-out logs" if traced.test else "on the stretches left out",
+    )
+    if found.complete:
+        return f" {it} all of what was missing {where}, down to the sensors' noise."
+    rest = "the rest depends on none of the signals"
+    if found.left.depends_on:
+        rest = f"the rest depends on {listed(found.left.depends_on)}"
+    return f" {it} {100 - share:.3g} % of what was missing {where}; {rest}."
 
 
 def unexplained(traced: Traced) -> str:

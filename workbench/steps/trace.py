@@ -129,7 +129,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
             noise_y=found.noise_y,
             noise_F=found.noise_F,
             chi_square=chi,
-            adequate=found.verdict != "unknown",
+            adequate=found.complete,
             evaluations=0,
             force_relative=errors.force_relative,
             force_rms=errors.force_rms,
@@ -205,6 +205,8 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             "depends_on": list(found.unknown.depends_on),
             "explained": found.unknown.explained,
         },
+        "complete": found.complete,
+        "left": {"share": found.left.share, "depends_on": list(found.left.depends_on)},
         "drift": [asdict(change) for change in found.drift],
         "next_experiment": found.next_experiment,
         "parameters": {

@@ -2,7 +2,7 @@
 
 import pytest
 
-from identification.tracing.model_errors import carries, share_left
+from identification.tracing.model_errors import NoiseFloor, carries, share_left
 from identification.tracing.result import Errors
 
 
@@ -28,8 +28,17 @@ def test_a_structure_carries_over_or_stands_in_for_another(
 
 def test_without_a_force_error_nothing_is_held_against_it() -> None:
     assert carries(of(None, None), of(None, None))
-    assert share_left(of(None, None), of(None, None)) == 0.0
+    assert share_left(of(None, None), of(None, None), NoiseFloor(0.1, 1.0, None)) == 0.0
 
 
 def test_the_share_left_is_that_of_the_test_logs() -> None:
-    assert share_left(of(1.0, 2.0), of(0.1, 1.0)) == pytest.approx(0.25)
+    """Beyond what the sensors leave alone."""
+    left = share_left(of(1.0, 2.0), of(0.1, 1.0), NoiseFloor(0.5, 1.0, None))
+    assert left == pytest.approx((1.0 - 0.25) / (4.0 - 0.25))
+
+
+def test_the_share_is_that_of_the_error_that_stood_out_most() -> None:
+    """An effect of stops hardly shows in the equation of sliding."""
+    before = {"test": Errors(1.2, None, 50e-6, None)}
+    after = {"test": Errors(1.19, None, 5e-6, None)}
+    assert share_left(before, after, NoiseFloor(1.0, 5e-6, None)) == 0.0

@@ -11,7 +11,7 @@ import pytest
 from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.model.karnopp import NAMES
-from identification.tracing.result import Dependence, Errors, Residual, TraceVerdict
+from identification.tracing.result import Dependence, Errors, Left, Residual, TraceVerdict
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.model import model_document, read_model
@@ -44,7 +44,7 @@ CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
     "next_experiment",
 }  # fmt: skip
-BESIDE = {"remarks", "parameters", "card", "log", "test_log", "versions"}
+BESIDE = {"complete", "left", "remarks", "parameters", "card", "log", "test_log", "versions"}
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
 
@@ -156,6 +156,8 @@ def test_logs_that_are_not_named_are_the_cards() -> None:
     [
         ("none", (), "Nothing is missing: the model leaves 0.07 N"),
         ("effect", ("stribeck",), "Missing: stribeck – friction falls with speed"),
+        ("effect", ("stribeck",), "It explains all of what was missing on the held-out logs"),
+        ("effect", ("stribeck", "spring"), "They explain all of what was missing"),
         ("drift", (), "Drift: between training and test logs the machine changed in F_cp from 12 "),
         ("unknown", (), "what is left depends on y (which accounts for 40 % of it)"),
         ("unknown", ("stribeck",), "Part of it is stribeck"),
@@ -169,6 +171,18 @@ def test_the_verdict_is_a_plain_sentence(
     assert said in text
     errors = "Held-out force error 1.83 N -> 0.07 N (sensors' noise 0.069 N)."
     assert (errors in text) == bool(keys)
+
+
+def test_an_effect_that_is_not_all_is_told_with_its_share_and_the_rest() -> None:
+    found = replace(trace_of("effect"), complete=False, left=Left(0.0012, ("v",)))
+    text = trace_sentence(traced(found))
+    assert text.startswith("Missing: stribeck")
+    assert "It explains 99.9 % of what was missing on the held-out logs" in text
+    assert "the rest depends on v." in text
+    alone = replace(found, left=Left(0.3, ()))
+    said = trace_sentence(traced(alone, tested=False))
+    assert "It explains 70 % of what was missing on the stretches left out" in said
+    assert "the rest depends on none of the signals" in said
 
 
 def test_signals_that_no_log_has_are_said_in_words() -> None:
