@@ -92,7 +92,8 @@ class Trace:
     parameters_before, parameters_after: the nine and k1, k2 by name; plant: the model after, with
     its effects; residuals: of the equations; run: of the position in the free run [m], None where
     it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
-    each.
+    each; not_tried: in words, what a halted trace has not looked for, so that its verdict is one
+    for the time being.
     """
 
     verdict: TraceVerdict
@@ -113,3 +114,4 @@ class Trace:
     residuals: tuple[Residual, ...]
     run: Residual | None = None
     remarks: tuple[str, ...] = field(default=())
+    not_tried: tuple[str, ...] = ()

@@ -11,14 +11,16 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.estimation.structure_fit import FittedStructure
 from identification.log import Log, Rig
-from identification.progress import Progress, quiet
+from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.signals.check import check_driven
+from identification.thresholds import COMPLETE
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
-from identification.tracing.result import Trace
+from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
     Refinement,
     Selection,
@@ -39,34 +41,45 @@ from identification.tracing.verdict import (
 def trace(
     train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
     rng: np.random.Generator, *, on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
 ) -> Trace:  # fmt: skip
     """What the logs call for beyond the plain model, and the errors before and after.
 
     train: logs for choice and fit; test: logs that neither sees (where there are none, stretches
     of the training logs are left out in turn, and a remark says so). Each has y [m], F [N] and,
-    where the command is logged, u [V], on an even clock. Raises BadLog where a signal is missing,
-    NotIdentifiable where too little of the motion slides.
+    where the command is logged, u [V], on an even clock. keep_going: asked before every run; once
+    it says no, the best so far is the result, and `not_tried` says what is not in it. Raises BadLog
+    where a signal is missing, NotIdentifiable where too little of the motion slides.
     """
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
     begin, settle, choose = rng.spawn(3)
-    rows = recorded_rows(train, rig, library)
-    report("tracing", 0.0)
+    halt = Halt(keep_going)
+    report("recording", 0.0)
+    rows = recorded_rows(train, rig, library, halt)
+    report("refining", 0.0)
     plain = plain_model(rows, library, begin)
+    report("tracing", 0.0)
     chosen = selection(plain, rig, choose, report)
-    report("refitting", 0.5)
-    chosen, found = settled_plain(chosen, refinement(chosen, report), settle, report)
-    seen = [plain.rows.recorded.record(log) for log in test]
-    return _told(chosen, found, judgement(chosen, found, seen, rig))
+    report("refitting", 0.0)
+    found = refinement(chosen, report)
+    report("settling", 0.0)
+    chosen, found = settled_plain(chosen, found, settle, report)
+    report("telling", 0.0)
+    with halt.closing():
+        seen = [plain.rows.recorded.record(log) for log in test]
+        return _told(chosen, found, judgement(chosen, found, seen, rig), halt.not_tried)
 
 
-def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
+def _told(
+    chosen: Selection, found: Refinement, judged: Judgement, not_tried: tuple[str, ...]
+) -> Trace:
     """All of it as the trace's result."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
     return Trace(
-        verdict=judged.verdict,
+        verdict=_so_far(judged.verdict, after, not_tried),
         before=judged.before,
         after=judged.after,
         noise_y=float(np.mean([one.noise_y for one in logs])),
@@ -78,6 +91,7 @@ def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
         unknown=judged.left,
         drift=judged.drift,
         next_experiment=next_experiment(judged.verdict, choice, judged.left),
+        not_tried=not_tried,
         parameters_before=parameters_of(before, chosen.plain.recorded),
         parameters_after=parameters_of(after, chosen.plain.recorded),
         plant=after.plant,
@@ -85,3 +99,11 @@ def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
         run=run_residual(before, after, logs, rows.drive),
         remarks=(*rows.remarks, *judged.remarks),
     )
+
+
+def _so_far(
+    verdict: TraceVerdict, after: FittedStructure, not_tried: tuple[str, ...]
+) -> TraceVerdict:
+    """The verdict of a trace that may have been halted: what was not looked for may be missing."""
+    unsure = verdict in ("none", "drift") and bool(not_tried) and after.misfit > COMPLETE
+    return "unknown" if unsure else verdict

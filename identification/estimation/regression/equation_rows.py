@@ -8,7 +8,7 @@ Each row is divided by what the sensors' noise makes of it, so a complete model 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import BadLog
 from identification.log import Log
 from identification.model.karnopp import Karnopp
+from identification.progress import Halt
 from identification.signals.differentiate import Motion, differentiate, resolution
 from identification.signals.intersample import kinks
 from identification.signals.weak_form import (
@@ -56,7 +57,7 @@ class MotionLog:
     kinks: by how much the measured force lies beyond the lines through its samples [N], (n,).
     reference: friction with which a run walks at most under the noise of the measured force; a
     plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
-    leads the body along a path.
+    leads the body along a path. halt: asked before every run along the log.
     """
 
     log: Log
@@ -73,13 +74,15 @@ class MotionLog:
     rotary: bool = False
     imposed: bool = False
     reference: Karnopp | None = None
+    halt: Halt = field(default_factory=Halt)
 
     def again(self, log: Log) -> "MotionLog":
         """The same of another log of this machine."""
         by_command = self.whole is not None
-        return motion_log(
+        other = motion_log(
             log, held=self.held, by_command=by_command, rotary=self.rotary, imposed=self.imposed
         )
+        return replace(other, halt=self.halt)
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
