@@ -6,6 +6,7 @@ and selection); those that the free run confirms, refined; the verdict.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from identification.effects._library import Library
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Log, Rig
+from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
@@ -20,6 +22,7 @@ from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
+from identification.tracing.regression.stepwise import Choice
 from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
     Refinement,
@@ -36,6 +39,8 @@ from identification.tracing.verdict import (
     rivals_of,
     run_residual,
 )
+
+FOR_NOW = "for now, since the trace ended early"
 
 
 def trace(
@@ -90,15 +95,40 @@ def _told(
         rivals=rivals_of(choice),
         unknown=judged.left,
         drift=judged.drift,
-        next_experiment=next_experiment(judged.verdict, choice, judged.left),
+        next_experiment=_next(judged, choice, not_tried),
         not_tried=not_tried,
-        parameters_before=parameters_of(before, chosen.plain.recorded),
-        parameters_after=parameters_of(after, chosen.plain.recorded),
+        parameters_before=_estimates(before, chosen, not_tried),
+        parameters_after=_estimates(after, chosen, not_tried),
         plant=after.plant,
         residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
         run=run_residual(before, after, logs, rows.drive),
-        remarks=(*rows.remarks, *judged.remarks),
+        remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
     )
+
+
+def _left_out(not_tried: tuple[str, ...]) -> list[str]:
+    """What is to be said of a trace that was halted."""
+    return [f"the trace ended early; not tried: {'; '.join(not_tried)}"] if not_tried else []
+
+
+def _next(judged: Judgement, choice: Choice, not_tried: tuple[str, ...]) -> str:
+    """The run that would tell more; of a halted trace that knows nothing yet, its rest."""
+    if not_tried and judged.verdict in ("none", "unknown"):
+        return "first the rest of this trace, which ended early: give it more time"
+    return next_experiment(judged.verdict, choice, judged.left)
+
+
+def _estimates(
+    model: FittedStructure, chosen: Selection, not_tried: tuple[str, ...]
+) -> dict[str, Estimate]:
+    """The parameters of a model; a null of a halted trace is one for now."""
+    found = parameters_of(model, chosen.plain.recorded)
+    if not not_tried or model.fit is not None:
+        return found
+    return {
+        k: e if e.value is not None else replace(e, reason=f"{FOR_NOW}: {e.reason}")
+        for k, e in found.items()
+    }
 
 
 def _so_far(

@@ -182,7 +182,9 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
             best = part, model
         if setting.halt.reached():
             for step in choice.steps[n:]:
-                setting.halt.left_out(f"{step.candidate.effect.key} beside them, on the free run")
+                setting.halt.left_out(
+                    f"{step.candidate.effect.key}, called for by the equations, on the free run"
+                )
             return best
     if free and best is not None and best[1].misfit > vain(setting):
         return only(choice, (), [step.candidate for step in choice.steps]), setting.plain

@@ -51,10 +51,8 @@ SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
 HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
 # What a halted choice leaves out
-EFFECTS, FURTHER_EFFECT = (
-    "effects of the library, in the equations",
-    "a further effect, in the equations",
-)
+EFFECTS = "the effects of the library"
+FURTHER_EFFECT = "a further effect beside the first"
 
 
 @dataclass(frozen=True, eq=False)
