@@ -44,6 +44,7 @@ class Course:
     _stage: str = field(init=False, default="")
     _low: float = field(init=False, default=0.0)
     _here: float = field(init=False, default=0.0)
+    _from: float = field(init=False, default=0.0)
     _since: float = field(init=False)
     _stopped: bool = field(init=False, default=False)
     _moving: threading.Lock = field(init=False, default_factory=threading.Lock)
@@ -59,6 +60,7 @@ class Course:
         place = self._low + (self._high - self._low) * min(max(share, 0.0), 1.0)
         if place > self._here:
             self._here, self._since = place, self.clock()
+            self._from = max(place, self.shown)
         self.beat()
 
     def keep_going(self) -> bool:
@@ -95,20 +97,23 @@ class Course:
     def expected(self) -> float:
         """Share of the whole that should be done by now.
 
-        From the last place that was told, at the pace so far, ever more slowly towards the end of
-        the stage, which is not passed unseen; or the share of the budget, where that is more.
+        From the last place that was told (or shown by then), at the pace so far, ever more slowly
+        towards the end of the stage, which is not passed unseen; or the share of the budget, where
+        that is more.
         """
         now = self.clock()
         passed = self._since - self._begun
         pace = self._here / passed if self._here > 0.0 and passed > 0.0 else 1.0 / FIRST_GUESS
-        room = self._high - self._here
-        more = room * -math.expm1(-(now - self._since) * pace / room) if room > 0.0 else 0.0
-        return max(self._here + more, (now - self._begun) / self.budget)
+        room = self._high - self._from
+        due = (now - self._since) * pace
+        more = room * due / (room + due) if room > 0.0 else 0.0
+        return max(self._from + more, (now - self._begun) / self.budget)
 
     @property
     def _high(self) -> float:
-        high = self.stages[self._stage][1] if self._stage else 1.0
-        return max(high, self._low + AT_LEAST * (1.0 - self._low))
+        low, high = self.stages.get(self._stage, (0.0, 1.0))
+        late = self._low + AT_LEAST * (1.0 - self._low)
+        return max(high, late) if self._low > low else high
 
 
 @contextmanager

@@ -42,9 +42,8 @@ TRACE_STAGES = {
 @click.option(
     "--budget",
     type=SECONDS_ABOVE_0,
-    default=math.inf,
     metavar="SECONDS",
-    help="End after so long with the best so far; the first Ctrl-C does the same.  [default: none]",
+    help="End after so long with the best so far; the first Ctrl-C does the same.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @output_options
@@ -53,7 +52,7 @@ def command(
     tests: tuple[str, ...],
     card: str,
     effects: tuple[Path, ...],
-    budget: float,
+    budget: float | None,
     seed: int,
     as_json: bool,
     out: Path | None,
@@ -79,7 +78,7 @@ def command(
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
             test = read_sources(held_out, card) if held_out else None
-            left = budget - (time.monotonic() - begun)
+            left = math.inf if budget is None else budget - (time.monotonic() - begun)
             course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
             with watched(course):
                 found = trace_sources(
