@@ -22,7 +22,7 @@ FIRST_GUESS = 30.0  # s, of a computation of which nothing is known yet
 AT_LEAST = 0.3  # of what is left of the bar, for a stage that begins late
 ALL_BUT = 0.99  # of the bar, that only the end itself fills
 COMPILING = "compiling (once after an installation)"
-ENDING = "Ctrl-C: ending with the best so far (once more aborts)"
+ENDS_SOON = "Ctrl-C: ending with the best so far (once more aborts)"
 
 
 @dataclass
@@ -139,7 +139,7 @@ def moving(course: Course) -> Iterator[None]:
             course.beat()
             if course.stopped and not said:  # a signal's handler is no place to write from
                 said = True
-                click.echo(ENDING, err=True)
+                click.echo(ENDS_SOON, err=True)
 
     beating = threading.Thread(target=beats, daemon=True)
     beating.start()
