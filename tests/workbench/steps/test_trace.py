@@ -44,7 +44,7 @@ CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
     "next_experiment",
 }  # fmt: skip
-BESIDE = {"remarks", "parameters", "card", "log", "test_log", "versions"}
+BESIDE = {"not_tried", "remarks", "parameters", "card", "log", "test_log", "versions"}
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
 
