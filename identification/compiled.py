@@ -3,12 +3,14 @@
 import hashlib
 import linecache
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import CodeType, FunctionType, ModuleType
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numba
 import numpy as np
 from llvmlite import ir  # type: ignore[import-untyped]
+from numba.core import event
 from numba.core.ccallback import CFunc
 from numba.extending import intrinsic
 
@@ -40,6 +42,31 @@ def _jit(function: Callable[Arguments, Result], **options: Any) -> Callable[Argu
     wrapped: Any = numba.njit(cache=True, nogil=True, error_model="numpy", **options)(function)
     _follow_sources(wrapped._cache, function)
     return cast(Callable[Arguments, Result], wrapped)
+
+
+class _Compiling(event.Listener):
+    """Tells when the first of the kernels under compilation begins, and when the last ends."""
+
+    def __init__(self, told: Callable[[bool], None]) -> None:
+        self._told, self._depth = told, 0
+
+    def on_start(self, event: Any) -> None:
+        self._depth += 1
+        if self._depth == 1:
+            self._told(True)
+
+    def on_end(self, event: Any) -> None:
+        self._depth -= 1
+        if self._depth == 0:
+            self._told(False)
+
+
+@contextmanager
+def while_compiling(told: Callable[[bool], None]) -> Iterator[None]:
+    """Within the block, told whenever kernels that are in no cache begin to be compiled (True), and
+    when they have been (False)."""
+    with event.install_listener("numba:compile", _Compiling(told)):
+        yield
 
 
 DOUBLES = 9  # arguments of an effect's kernel before its signals and parameters

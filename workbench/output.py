@@ -14,7 +14,7 @@ from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 
 import click
 
@@ -26,8 +26,24 @@ if TYPE_CHECKING:
 Row = tuple[str, ...]
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-Advance = Callable[[float], None]
 PIPED_WIDTH = 120
+
+
+class Bar(Protocol):
+    """A bar of progress: called with a step, it moves on; told, it says what goes on."""
+
+    def __call__(self, step: float) -> None: ...
+
+    def told(self, words: str) -> None:
+        """Say these words behind the bar's own."""
+
+
+class NoBar:
+    """What is shown where nobody looks."""
+
+    def __call__(self, step: float) -> None: ...
+
+    def told(self, words: str) -> None: ...
 
 
 class BadOutput(UserError):
@@ -191,20 +207,29 @@ def emit(result: object, as_json: bool, table: Callable[[], object]) -> None:
 
 
 @contextmanager
-def progress(label: str, total: float | None = None, *, as_json: bool = False) -> Iterator[Advance]:
-    """A function that advances a bar on standard error; mute without a terminal or with JSON.
+def progress(label: str, total: float | None = None, *, as_json: bool = False) -> Iterator[Bar]:
+    """A bar on standard error; mute without a terminal or with JSON.
 
     total: what the advances add up to; None shows that something goes on.
     """
     if as_json or not sys.stderr.isatty():
-        yield lambda _step: None
+        yield NoBar()
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import Progress, TaskID
+
+    class Shown(NoBar):
+        def __init__(self, bar: Progress, task: TaskID) -> None:
+            self.bar, self.task = bar, task
+
+        def __call__(self, step: float) -> None:
+            self.bar.advance(self.task, step)
+
+        def told(self, words: str) -> None:
+            self.bar.update(self.task, description=f"{label}: {words}" if words else label)
 
     with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(label, total=total)
-        yield lambda step: bar.advance(task, step)
+        yield Shown(bar, bar.add_task(label, total=total))
 
 
 def written(folder: Path, *names: str) -> str:

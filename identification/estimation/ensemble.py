@@ -63,7 +63,7 @@ def ensemble(
     # A walker that starts where no member can be compares infinity with infinity, and stays.
     with np.errstate(invalid="ignore"):
         for done, _ in enumerate(chain, start=1):
-            if on_progress and done % 20 == 0:
+            if on_progress:
                 on_progress(done / steps)
         longest = float(np.max(sampler.get_autocorr_time(tol=0, discard=steps // 2)))
     kept = sampler.get_chain(discard=steps // 2, flat=True)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, IntArray
+from identification.progress import Halted
 from identification.thresholds import FOLLOWED
 
 WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the minimum: it smooths
@@ -66,33 +67,50 @@ def gauss_newton(
     """Minimum of the square sum of `fun` near x, within this reach of it (k,).
 
     Levenberg and Marquardt's damping, differences for the Jacobian, at most so many steps; little:
-    share of the cost below which a step is the last in any case.
+    share of the cost below which a step is the last in any case. Halted, it gives the x reached.
     """
     low, high = x - reach, x + reach
     r = fun(x)
     cost, damping = float(r @ r), 1e-3
     for _ in range(steps):
-        J = jacobian(fun, x, r, step_by)
-        A, g = J.T @ J, J.T @ r
-        if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
-            break  # beyond what can be computed with: no direction is known
-        size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
-        for _ in range(DAMPING_TRIES):
-            step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
-            step = np.clip(x + step, low, high) - x
-            after = fun(x + step)
-            gained = cost - float(after @ after)
-            if gained > 0:
-                break
-            damping *= 10.0
-        else:
+        try:
+            found = _step(fun, x, r, (cost, damping, step_by), (low, high))
+        except Halted:
             break
-        x, r, cost, damping = x + step, after, cost - gained, damping * 0.1
+        if found is None:
+            break
+        x, r, gained, damping = found
+        cost -= gained
         # What is left of much more than noise need not be known to its last digits.
         ends = LAST_STEP if cost < FOLLOWED * len(r) else LITTLE
         if gained < max(ends, little) * cost:
             break
     return Minimum(fun, x, cost / len(r))
+
+
+def _step(
+    fun: Callable[[Array], Array], x: Array, r: Array, at: tuple[float, float, float],
+    bounds: tuple[Array, Array],
+) -> tuple[Array, Array, float, float] | None:  # fmt: skip
+    """The next x, `fun` there, by how much the cost falls, and the next damping; None without one.
+
+    r: `fun` at x; at: cost there, damping, and the step of the differences.
+    """
+    cost, damping, step_by = at
+    J = jacobian(fun, x, r, step_by)
+    A, g = J.T @ J, J.T @ r
+    if not (np.all(np.isfinite(A)) and np.all(np.isfinite(g))):
+        return None  # beyond what can be computed with: no direction is known
+    size = np.maximum(np.diag(A), 1e-12 * float(np.max(np.diag(A))) + 1e-300)
+    for _ in range(DAMPING_TRIES):
+        step = np.linalg.lstsq(A + np.diag(damping * size), -g, rcond=1e-14)[0]
+        step = np.clip(x + step, *bounds) - x
+        after = fun(x + step)
+        gained = cost - float(after @ after)
+        if gained > 0:
+            return x + step, after, gained, damping * 0.1
+        damping *= 10.0
+    return None
 
 
 def jacobian(

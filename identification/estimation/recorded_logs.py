@@ -1,7 +1,7 @@
 """Logs as the estimator takes them: with their motion, and with what drives a run of them."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.progress import Halt
 from identification.signals.check import check_driven
 from identification.thresholds import LINEAR_ACTUATOR
 
@@ -26,13 +27,15 @@ from identification.thresholds import LINEAR_ACTUATOR
 class RecordedLogs:
     """Logs of one machine with their motion.
 
-    drive: what drives their runs; imposed: a rig leads the body along a path.
+    drive: what drives their runs; imposed: a rig leads the body along a path; halt: whether
+    whatever is made of them is to go on.
     """
 
     logs: tuple[MotionLog, ...]
     rig: Rig
     drive: Drive
     imposed: bool = False
+    halt: Halt = field(default_factory=Halt)
 
     @property
     def held(self) -> bool:
@@ -56,10 +59,11 @@ class RecordedLogs:
 
     def record(self, log: Log) -> MotionLog:
         """Another log of the machine with its motion."""
-        return motion_log(
+        one = motion_log(
             log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
             imposed=self.imposed,
         )  # fmt: skip
+        return replace(one, halt=self.halt)
 
     def of(self, logs: Sequence[Log]) -> "RecordedLogs":
         """These logs recorded in the same way."""

@@ -112,8 +112,9 @@ def _over_whole_runs(
     if optimum.cost > COMPLETE * problem.count:
         # A stop that turns on less than the noise makes minima beside the right one.
         other = searched_plant(
-            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report
-        )
+            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
+            halt=recorded.halt,
+        )  # fmt: skip
         optimum = min(optimum, _nearest(problem, other), key=lambda one: one.cost)
     if optimum.cost > ADEQUATE * problem.count:
         return None
@@ -146,7 +147,7 @@ def _over_likely_sets(
 
 
 def _posed(recorded: RecordedLogs) -> Problem:
-    return pose(recorded.plain, recorded.rig, recorded.drive)
+    return pose(recorded.plain, recorded.rig, recorded.drive, recorded.halt)
 
 
 def _row(problem: Problem, plant: Plant) -> Array:

@@ -41,6 +41,7 @@ from identification.estimation.windowed_run.nudged_search import (
 from identification.estimation.windowed_run.refinement import (
     RESCUES,
     Effort,
+    HaltedRefit,
     Refit,
     even,
     loose,
@@ -52,7 +53,7 @@ from identification.estimation.windowed_run.refinement import (
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.progress import Progress, quiet
+from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, COMPLETE, INERT, MUCH
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
@@ -104,7 +105,8 @@ def fitted_structure(
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
     limits to begin from too, where those of the regression lead nowhere; vain: misfit of short logs
-    from which no search is worth its while.
+    from which no search is worth its while. Halted, it gives the best so far, with the deviations
+    that the regression tells.
     """
     logs, drive = recorded.logs, recorded.drive
     told = _regressed(stage, outcomes, effects, recorded)
@@ -117,27 +119,60 @@ def fitted_structure(
     left = [mean_square(outcomes[e]) for e in (MECHANICAL, ACTUATOR) if e in outcomes]
     missing = max(left) > MUCH**2 and not remembers
     hopeless = missing and (bool(effects) or rough(outcomes))
-    done = _refined(told, logs, drive, near, "rough" if hopeless else "whole")
-    free = loose(plant, drive)
-    smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
-    if smooth and done.misfit > COMPLETE and not hopeless:
-        again = replace(onward(done.plant, logs, drive), prior=prior)
-        done = again if again.misfit < done.misfit else done
-    followed = ADEQUATE if effects else COMPLETE
-    if free and done.misfit > followed and not hopeless:
-        by_loads = any(by_load(one.effect) for one in plant.effects)
-        begins = [plant, done.plant]
-        if near is not None and by_loads:
-            # What the plain run tells is what the load leaves of it.
-            begins = [loaded(replace(plant, friction=near)), plant]
-        if missing:  # it will not do, however closely it is searched
-            begins = begins[:1]
-        banded = BREAKAWAY in outcomes and not missing and not by_loads
-        known = {} if missing else left_open(plant.effects, prior)
-        searches = 0 if missing else SEARCHES
-        limits = SearchLimits(searches, banded, known, vain)
-        done = closest(begins, logs, drive, rng, limits, done)
-    return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+    done: Refit | None = None
+    try:
+        done = _refined(told, logs, drive, near, "rough" if hopeless else "whole")
+        free = loose(plant, drive)
+        smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
+        if smooth and done.misfit > COMPLETE and not hopeless:
+            again = replace(onward(done.plant, logs, drive), prior=prior)
+            done = again if again.misfit < done.misfit else done
+        followed = ADEQUATE if effects else COMPLETE
+        if free and done.misfit > followed and not hopeless:
+            banded = BREAKAWAY in outcomes and not missing
+            done = _closest(told, recorded, rng, (near, missing, banded, vain), done)
+        return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+    except Halted as halted:
+        best, least = _best_so_far(plant, done, halted, recorded)
+        spreads = {**prior, **told.silent}
+        return FittedStructure(stage, outcomes, best, spreads, False, least)
+
+
+def _closest(
+    told: _Regressed, recorded: RecordedLogs, rng: np.random.Generator,
+    known: tuple[Karnopp | None, bool, bool, float], done: Refit,
+) -> Refit:  # fmt: skip
+    """The plant searched where nothing holds its run to the log's position.
+
+    known: what else to begin from, whether sliding is not explained, whether breakaways are told,
+    and the misfit of short logs from which no search is worth its while.
+    """
+    near, missing, banded, vain = known
+    plant = told.plant
+    by_loads = any(by_load(one.effect) for one in plant.effects)
+    begins = [plant, done.plant]
+    if near is not None and by_loads:
+        # What the plain run tells is what the load leaves of it.
+        begins = [loaded(replace(plant, friction=near)), plant]
+    if missing:  # it will not do, however closely it is searched
+        begins = begins[:1]
+    open_to = {} if missing else left_open(plant.effects, dict(told.prior))
+    limits = SearchLimits(0 if missing else SEARCHES, banded and not by_loads, open_to, vain)
+    return closest(begins, recorded.logs, recorded.drive, rng, limits, done)
+
+
+def _best_so_far(
+    plant: Plant, done: Refit | None, halted: Halted, recorded: RecordedLogs
+) -> tuple[Plant, float]:
+    """The best of a plant, of its refinement, if any, and of what a halted one has come to; and
+    what it leaves."""
+    begun = [halted.plant] if isinstance(halted, HaltedRefit) else []
+    if done is None:
+        begun = begun or [plant]
+    found = [] if done is None else [(done.plant, done.misfit)]
+    with recorded.halt.closing():
+        found += [(one, misfit(one, recorded.logs, recorded.drive)) for one in begun]
+    return min(found, key=lambda one: one[1])
 
 
 def _refined(
@@ -146,8 +181,20 @@ def _refined(
     """The regression's plant refined on the free run, from another band and on a piece first where
     that leaves more than noise."""
     plant, prior = told.plant, dict(told.prior)
-    free = loose(plant, drive)
     done = refit(plant, logs, drive, band=max(told.slow, 1e-4), prior=prior, effort=effort)
+    try:
+        return _rebegun(done, told, logs, drive, near, effort)
+    except Halted:
+        return done  # which the next ask halts
+
+
+def _rebegun(
+    done: Refit, told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
+    effort: Effort,
+) -> Refit:  # fmt: skip
+    """The better of a refinement and of those from another band and on a piece first."""
+    plant, prior = told.plant, dict(told.prior)
+    free = loose(plant, drive)
     if near is not None and not free and done.misfit > COMPLETE:
         same = {name: getattr(near, name) for name in ("dv_p", "dv_n", "F_sp", "F_sn")}
         beside = replace(plant, friction=replace(plant.friction, **same))
@@ -351,11 +398,16 @@ def _from_first_estimate(
     plant = Plant(nine, actuator_of(recorded))
     if led_by_rig(recorded):
         return FittedStructure(stage, first, plant, {}, True)
-    done = refit(
-        plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
-        rescues=RESCUES,
-    )  # fmt: skip
-    return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
+    done: Refit | None = None
+    try:
+        done = refit(
+            plant, recorded.logs, recorded.drive, prior={}, band=max(nine.dv_p, -nine.dv_n),
+            rescues=RESCUES,
+        )  # fmt: skip
+        return FittedStructure(stage, first, done.plant, done.sd, False, done.misfit)
+    except Halted as halted:
+        best, least = _best_so_far(plant, done, halted, recorded)
+        return FittedStructure(stage, first, best, {}, False, least)
 
 
 def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
@@ -372,20 +424,27 @@ def searched(
     model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
     report: Progress = quiet, attempts: int = 1,
 ) -> FittedStructure:  # fmt: skip
-    """The plain model from global searches, where one of these follows the logs better."""
+    """The plain model from global searches, where one of these follows the logs better.
+
+    Halted, it is the best so far.
+    """
     for attempt in range(attempts):
         try:
             plant = searched_plant(
                 recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
-                attempt=attempt,
+                attempt=attempt, halt=recorded.halt,
             )  # fmt: skip
-        except UserError:
+        except (UserError, Halted):
             return model
-        found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
-        left_by = misfit(plant, recorded.logs, recorded.drive)
-        best, least = (found.plant, found.misfit) if found.misfit < left_by else (plant, left_by)
-        if least < model.misfit:
-            model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+        try:
+            found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
+            left_by = misfit(plant, recorded.logs, recorded.drive)
+            better = found.misfit < left_by
+            best, least = (found.plant, found.misfit) if better else (plant, left_by)
+            if least < model.misfit:
+                model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+        except Halted:
+            return model
         if model.misfit <= COMPLETE:
             break
     return model

@@ -18,7 +18,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.refinement import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, CARRIED, STANDS_OUT, ROUGH_LEFT
+from identification.thresholds import ADEQUATE, CARRIED, ROUGH_LEFT, STANDS_OUT
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors

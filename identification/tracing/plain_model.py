@@ -15,6 +15,8 @@ from identification.estimation.windowed_run.refinement import misfit
 from identification.thresholds import ASTRAY, COMPLETE
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
 
+REFINEMENT = "the refinement of the plain model to its end"
+
 
 @dataclass(frozen=True, eq=False)
 class PlainModel:
@@ -34,8 +36,11 @@ class PlainModel:
 
 
 def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) -> PlainModel:
-    """The plain model of the rows; raises NotIdentifiable where these tell nothing."""
-    recorded = rows.recorded
+    """The plain model of the rows; raises NotIdentifiable where these tell nothing.
+
+    Halted, it is the best so far.
+    """
+    recorded, halt = rows.recorded, rows.recorded.halt
     model = plain_structure(recorded, rng)
     # Imposed, and the inertia not only hidden by what is missing.
     imposed = model.imposed and inertia_has_no_part(rows.logs)
@@ -46,6 +51,8 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
         model = plain_structure(rows.recorded, rng)
         library, said = told_by_speed(library, rows.logs)
         rows = replace(rows, remarks=(*rows.remarks, *said))
+    if halt.reached():
+        halt.left_out(REFINEMENT)
     start, first = model.stage, model.outcomes
     if model.imposed:
         return PlainModel(rows, start, first, model, library, recorded)
@@ -53,7 +60,8 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     # A run that is not followed may have swollen its band in place of what is missing.
     slow = band(model) if model.misfit <= ASTRAY else 0.0
     start = replace(start, band=slow, sliding=model.plant.friction)
-    if misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE:
-        library = {}  # the plain plant's run leaves nothing but noise
+    with halt.closing():  # or it would be open whether an effect is worth a trial at all
+        if misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE:
+            library = {}  # the plain plant's run leaves nothing but noise
     rows = replace(rows, recorded=replace(rows.recorded, logs=logs))
     return PlainModel(rows, start, base_fits(start), model, library, recorded)

@@ -18,6 +18,7 @@ from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.progress import Halt
 from identification.thresholds import LINEAR_ACTUATOR, SPEEDS_APART
 from identification.tracing.regression.candidates import best_of
 from identification.tracing.remaining_structure import FEWEST_ROWS
@@ -48,11 +49,17 @@ class RecordedRows:
         return self.recorded.drive
 
 
-def recorded_rows(train: Sequence[Log], rig: Rig, library: Library) -> RecordedRows:
-    """The training logs as rows; raises NotIdentifiable where too little of the motion slides."""
+def recorded_rows(
+    train: Sequence[Log], rig: Rig, library: Library, halt: Halt | None = None
+) -> RecordedRows:
+    """The training logs as rows; raises NotIdentifiable where too little of the motion slides.
+
+    halt: asked before whatever is made of them.
+    """
     remarks: list[str] = []
     driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
-    recorded = RecordedLogs((), rig, "command" if driven else "force").of(train)
+    drive: Drive = "command" if driven else "force"
+    recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
     recorded, refused = _told(recorded)
     return RecordedRows(recorded, refused, tuple(remarks))
 

@@ -102,7 +102,8 @@ class Trace:
     its effects; residuals: of the equations; run: of the position in the free run [m], None where
     it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
     each. complete: the model predicts the test logs down to the sensors' noise; left: what is
-    missing beside the effects named.
+    missing beside the effects named. not_tried: in words, what a halted trace has not looked
+    for, so that its verdict is one for the time being.
     """
 
     verdict: TraceVerdict
@@ -125,3 +126,4 @@ class Trace:
     complete: bool = True
     left: Left = Left(0.0, ())
     remarks: tuple[str, ...] = field(default=())
+    not_tried: tuple[str, ...] = ()

@@ -26,6 +26,8 @@ from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import before_pieces, in_pieces
 
+INTERVALS = "the last step of the plain model's fit, with its intervals"
+
 
 @dataclass(frozen=True, eq=False)
 class Selection:
@@ -76,19 +78,33 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
     unsure = setting.start.band == 0.0 and not hidden
     # Where the first effect leaves next to nothing of the equations, the run may tell the next.
     more = alone is not None and 0 < len(alone.plant.effects) < len(choice.steps)
-    found = at_once(begun, alone, setting, report) if alone is not None and more else None
+    halt = setting.halt
+    found = None
+    if alone is not None and more:
+        what = "a second effect that the free run shows at once"
+        found = halt.tried(what, lambda: at_once(begun, alone, setting, report), None)
     if found is not None:
         choice, model = found
     elif choice.steps:
         choice, model = fewest(choice, setting, unsure)
     if unsure:
-        choice, model = doubted(choice, model, setting)
+        choice, model = _doubted(choice, model, setting)
         setting = replace(setting, doubted=choice.steps)
     report("judging", 0.0)
     choice, model = judged_forward(choice, model, setting, report)
-    if useless(choice, plain, model):
+    if not halt.reached() and useless(choice, plain, model):
         choice, model = without_effects(chosen.plain, choice), plain
     return Refinement(told_apart(choice, model, setting), model)
+
+
+def _doubted(
+    choice: Choice, model: FittedStructure, setting: Setting
+) -> tuple[Choice, FittedStructure]:
+    """As `doubted`; halted, the choice and its model as they are."""
+    if not choice.steps:
+        return choice, model
+    what = "whether the plain model's band had hidden an effect of slow motion"
+    return setting.halt.tried(what, lambda: doubted(choice, model, setting), (choice, model))
 
 
 def without_effects(plain: PlainModel, choice: Choice) -> Choice:
@@ -126,10 +142,15 @@ def settled_plain(
     if found.choice.steps:
         return chosen, found
     plain, recorded = chosen.plain, chosen.plain.recorded
-    fit = finished(plain.model, recorded, rng, report)
+    asking = recorded.halt.asking(report)
+    fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
+    if fit is None:
+        return chosen, found
     model = replace(plain.model, fit=fit)
     if fit.drive == recorded.drive and not fit.imposed:
         plant = Plant(fit.friction, fit.actuator)
-        model = replace(model, plant=plant, misfit=misfit(plant, recorded.logs, recorded.drive))
+        with recorded.halt.closing():
+            left = misfit(plant, recorded.logs, recorded.drive)
+        model = replace(model, plant=plant, misfit=left)
     chosen = replace(chosen, plain=replace(plain, model=model))
     return chosen, replace(found, model=model)

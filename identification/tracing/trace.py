@@ -6,19 +6,24 @@ and selection); those that the free run confirms, refined; the verdict.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identification.effects._library import Library
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.estimation.structure_fit import FittedStructure
 from identification.log import Log, Rig
-from identification.progress import Progress, quiet
+from identification.model.estimates import Estimate
+from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.signals.check import check_driven
+from identification.thresholds import COMPLETE
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.recorded_rows import recorded_rows
-from identification.tracing.result import Trace
+from identification.tracing.regression.stepwise import Choice
+from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
     Refinement,
     Selection,
@@ -35,38 +40,51 @@ from identification.tracing.verdict import (
     run_residual,
 )
 
+FOR_NOW = "for now, since the trace ended early"
+
 
 def trace(
     train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
     rng: np.random.Generator, *, on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
 ) -> Trace:  # fmt: skip
     """What the logs call for beyond the plain model, and the errors before and after.
 
     train: logs for choice and fit; test: logs that neither sees (where there are none, stretches
     of the training logs are left out in turn, and a remark says so). Each has y [m], F [N] and,
-    where the command is logged, u [V], on an even clock. Raises BadLog where a signal is missing,
-    NotIdentifiable where too little of the motion slides.
+    where the command is logged, u [V], on an even clock. keep_going: asked before every run; once
+    it says no, the best so far is the result, and `not_tried` says what is not in it. Raises BadLog
+    where a signal is missing, NotIdentifiable where too little of the motion slides.
     """
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
     begin, settle, choose = rng.spawn(3)
-    rows = recorded_rows(train, rig, library)
-    report("tracing", 0.0)
+    halt = Halt(keep_going)
+    report("recording", 0.0)
+    rows = recorded_rows(train, rig, library, halt)
+    report("refining", 0.0)
     plain = plain_model(rows, library, begin)
+    report("tracing", 0.0)
     chosen = selection(plain, rig, choose, report)
-    report("refitting", 0.5)
-    chosen, found = settled_plain(chosen, refinement(chosen, report), settle, report)
-    seen = [plain.rows.recorded.record(log) for log in test]
-    return _told(chosen, found, judgement(chosen, found, seen, rig))
+    report("refitting", 0.0)
+    found = refinement(chosen, report)
+    report("settling", 0.0)
+    chosen, found = settled_plain(chosen, found, settle, report)
+    report("telling", 0.0)
+    with halt.closing():
+        seen = [plain.rows.recorded.record(log) for log in test]
+        return _told(chosen, found, judgement(chosen, found, seen, rig), halt.not_tried)
 
 
-def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
+def _told(
+    chosen: Selection, found: Refinement, judged: Judgement, not_tried: tuple[str, ...]
+) -> Trace:
     """All of it as the trace's result."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
     return Trace(
-        verdict=judged.verdict,
+        verdict=_so_far(judged.verdict, after, not_tried),
         before=judged.before,
         after=judged.after,
         noise_y=float(np.mean([one.noise_y for one in logs])),
@@ -77,13 +95,47 @@ def _told(chosen: Selection, found: Refinement, judged: Judgement) -> Trace:
         rivals=rivals_of(choice),
         unknown=judged.left,
         drift=judged.drift,
-        next_experiment=next_experiment(judged.verdict, choice, judged.left),
-        parameters_before=parameters_of(before, chosen.plain.recorded),
-        parameters_after=parameters_of(after, chosen.plain.recorded),
+        next_experiment=_next(judged, choice, not_tried),
+        not_tried=not_tried,
+        parameters_before=_estimates(before, chosen, not_tried),
+        parameters_after=_estimates(after, chosen, not_tried),
         plant=after.plant,
         residuals=residuals_of(choice.start, choice.first, choice.end, choice.base),
         run=run_residual(before, after, logs, rows.drive),
-        remarks=(*rows.remarks, *judged.remarks),
-        complete=judged.complete,
+        remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
+        complete=judged.complete and not not_tried,
         left=judged.rest,
     )
+
+
+def _left_out(not_tried: tuple[str, ...]) -> list[str]:
+    """What is to be said of a trace that was halted."""
+    return [f"the trace ended early; not tried: {'; '.join(not_tried)}"] if not_tried else []
+
+
+def _next(judged: Judgement, choice: Choice, not_tried: tuple[str, ...]) -> str:
+    """The run that would tell more; of a halted trace that knows nothing yet, its rest."""
+    if not_tried and judged.verdict in ("none", "unknown"):
+        return "first the rest of this trace, which ended early: give it more time"
+    return next_experiment(judged.verdict, choice, judged.left)
+
+
+def _estimates(
+    model: FittedStructure, chosen: Selection, not_tried: tuple[str, ...]
+) -> dict[str, Estimate]:
+    """The parameters of a model; a null of a halted trace is one for now."""
+    found = parameters_of(model, chosen.plain.recorded)
+    if not not_tried or model.fit is not None:
+        return found
+    return {
+        k: e if e.value is not None else replace(e, reason=f"{FOR_NOW}: {e.reason}")
+        for k, e in found.items()
+    }
+
+
+def _so_far(
+    verdict: TraceVerdict, after: FittedStructure, not_tried: tuple[str, ...]
+) -> TraceVerdict:
+    """The verdict of a trace that may have been halted: what was not looked for may be missing."""
+    unsure = verdict in ("none", "drift") and bool(not_tried) and after.misfit > COMPLETE
+    return "unknown" if unsure else verdict

@@ -1,20 +1,18 @@
 """`workbench demo`: the whole chain on a shipped recipe, and one folder with all its results."""
 
+import time
 from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.commands.trace import staged
+from workbench.commands.trace import TRACE_STAGES
+from workbench.course import Course, moving
 from workbench.output import OutputFolder, emit, output_options, progress
 
 RECIPE = "demo"
-DEMO_STAGES = {
-    "tracing": (0.0, 0.6),
-    "refitting": (0.6, 0.85),
-    "judging": (0.85, 0.9),
-    "designing": (0.9, 1.0),
-}
+DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.items()}
+DEMO_STAGES["designing"] = (0.85, 1.0)
 
 
 @click.command(epilog="Example: workbench demo --out demo")
@@ -45,8 +43,10 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
 
     card = load_card(card_path(RECIPE))
     with OutputFolder("demo", out, now=datetime.now()) as folder:
-        with progress("demo", 1.0, as_json=as_json) as advance:
-            found = demonstrate(card, folder.path, seed, staged(advance, DEMO_STAGES))
+        with progress("demo", 1.0, as_json=as_json) as bar:
+            course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
+            with moving(course):
+                found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
         folder.write_json("trace.json", trace_document(traced))
         folder.write_json("model.json", model_document(traced.model))

@@ -1,22 +1,24 @@
 """`workbench identify`: logs -> model.json and report.html."""
 
-from collections.abc import Callable
+import time
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
 import click
 
+from workbench.course import Course, moving
 from workbench.options import POSITIVE, card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 IDENTIFY_STAGES = {
-    "searching": (0.0, 0.5),
-    "searching near": (0.5, 0.6),
-    "refining": (0.6, 0.65),
-    "posterior": (0.9, 1.0),
+    "refining": (0.0, 0.4),
+    "searching": (0.4, 0.6),
+    "searching stretches": (0.4, 0.6),
+    "searching near": (0.6, 0.65),
+    "weighing": (0.5, 0.95),
+    "posterior": (0.6, 1.0),
 }
-OTHER_STAGES = (0.65, 0.9)
 
 
 @click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")
@@ -63,16 +65,18 @@ def command(
 
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
     with OutputFolder("identify", out, now=datetime.now()) as folder:
-        with progress("identifying", 1.0, as_json=as_json) as advance:
+        with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
             if drive == "force" and sources.rig.kind == "motor":
                 raise click.UsageError(
                     "--drive force: the rig is a motor, whose force is its command times a"
                     " constant; leave --drive out."
                 )
-            found = identify_sources(
-                sources, options, seed, posterior=posterior, on_progress=staged(advance)
-            )
+            course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
+            with moving(course):
+                found = identify_sources(
+                    sources, options, seed, posterior=posterior, on_progress=course.report
+                )
         folder.write_json("model.json", model_document(found.model))
         folder.write_text("report.html", identification_report(found))
     emit(
@@ -80,18 +84,3 @@ def command(
         as_json,
         lambda: model_view(found.model, found.remarks, folder.final),
     )
-
-
-def staged(advance: Callable[[float], None]) -> Callable[[str, float], None]:
-    """Progress by stages as steps of one bar that only moves forward."""
-    reached = 0.0
-
-    def report(stage: str, share: float) -> None:
-        nonlocal reached
-        low, high = IDENTIFY_STAGES.get(stage, OTHER_STAGES)
-        place = low + (high - low) * min(max(share, 0.0), 1.0)
-        if place > reached:
-            advance(place - reached)
-            reached = place
-
-    return report

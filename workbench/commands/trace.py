@@ -1,15 +1,29 @@
 """`workbench trace`: logs and held-out logs -> trace.json, model.json and report.html."""
 
-from collections.abc import Callable, Mapping
+import math
+import time
 from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.options import card_option, effects_option
+from workbench.course import Course, watched
+from workbench.options import SECONDS_ABOVE_0, card_option, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
-TRACE_STAGES = {"tracing": (0.0, 0.6), "refitting": (0.6, 0.9), "judging": (0.9, 1.0)}
+TRACE_STAGES = {
+    "recording": (0.0, 0.03),
+    "refining": (0.03, 0.35),
+    "tracing": (0.35, 0.55),
+    "refitting": (0.55, 0.75),
+    "judging": (0.75, 0.9),
+    "settling": (0.45, 0.5),
+    "searching": (0.5, 0.7),
+    "searching stretches": (0.5, 0.7),
+    "searching near": (0.7, 0.75),
+    "weighing": (0.6, 0.95),
+    "telling": (0.95, 1.0),
+}
 
 
 @click.command(
@@ -25,6 +39,12 @@ TRACE_STAGES = {"tracing": (0.0, 0.6), "refitting": (0.6, 0.9), "judging": (0.9,
 )
 @card_option
 @effects_option
+@click.option(
+    "--budget",
+    type=SECONDS_ABOVE_0,
+    metavar="SECONDS",
+    help="End after so long with the best so far; the first Ctrl-C does the same.",
+)
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @output_options
 def command(
@@ -32,6 +52,7 @@ def command(
     tests: tuple[str, ...],
     card: str,
     effects: tuple[Path, ...],
+    budget: float | None,
     seed: int,
     as_json: bool,
     out: Path | None,
@@ -40,9 +61,10 @@ def command(
 
     Writes trace.json (verdict, errors before and after, effects, rivals), model.json with the
     effects in it, and report.html. Without --test, stretches of the logs are left out in turn;
-    without LOG, the card's [split] names the logs of both kinds. Exit status 0 whatever the
-    verdict.
+    without LOG, the card's [split] names the logs of both kinds. Ended by --budget or Ctrl-C, it
+    says what was not tried. Exit status 0 whatever the verdict.
     """
+    begun = time.monotonic()
     from workbench.cards.own_effects import library
     from workbench.documents.model import model_document
     from workbench.logs.sources import read_sources
@@ -52,30 +74,18 @@ def command(
 
     known = library(effects)
     with OutputFolder("trace", out, now=datetime.now()) as folder:
-        with progress("tracing", 1.0, as_json=as_json) as advance:
+        with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
             test = read_sources(held_out, card) if held_out else None
-            found = trace_sources(train, test, known, seed, staged(advance, TRACE_STAGES))
+            left = math.inf if budget is None else budget - (time.monotonic() - begun)
+            course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
+            with watched(course):
+                found = trace_sources(
+                    train, test, known, seed, course.report, keep_going=course.keep_going
+                )
         document = trace_document(found)
         folder.write_json("trace.json", document)
         folder.write_json("model.json", model_document(found.model))
         folder.write_text("report.html", trace_report(found))
     emit({**document, "out": folder.final}, as_json, lambda: trace_view(found, folder.final))
-
-
-def staged(
-    advance: Callable[[float], None], stages: Mapping[str, tuple[float, float]]
-) -> Callable[[str, float], None]:
-    """Progress by stages as steps of one bar that only moves forward."""
-    reached = 0.0
-
-    def report(stage: str, share: float) -> None:
-        nonlocal reached
-        low, high = stages.get(stage, (0.0, 1.0))
-        place = low + (high - low) * min(max(share, 0.0), 1.0)
-        if place > reached:
-            advance(place - reached)
-            reached = place
-
-    return report

@@ -52,13 +52,21 @@ def errors_head(tested: bool) -> Row:
 
 
 def trace_sentence(traced: Traced) -> str:
-    """The verdict in one or two plain sentences."""
+    """The verdict in one or two plain sentences, and whether it is one for the time being."""
+    left_out = traced.trace.not_tried
+    early = f" Ended early, so this is for now; not tried: {'; '.join(left_out)}."
+    return _verdict_sentence(traced) + (early if left_out else "")
+
+
+def _verdict_sentence(traced: Traced) -> str:
     found = traced.trace
     names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
     told = fall_of_error(traced) if found.effects else ""
     errors = f" {told}" if told else ""
     changed = ", ".join(_changed(change) for change in found.drift)
     match found.verdict:
+        case "unknown" if found.not_tried and not found.effects:
+            return f"Open: {unexplained(traced, found.unknown.depends_on)}"
         case "none":
             return nothing_missing(found, shown(traced.model.rotary).force)
         case "effect":
@@ -103,19 +111,20 @@ def share_explained(traced: Traced) -> str:
     return f" {it} {100 - share:.3g} % of what was missing {where}; {rest}."
 
 
-def unexplained(traced: Traced) -> str:
-    """What is left where it is far more than noise and depends on no signal."""
+def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
+    """What is left where it is far more than noise; signals: on which it depends."""
+    depends = f"depends on {listed(signals)}" if signals else "depends on none of the signals"
     found, units = traced.trace, shown(traced.model.rotary)
     unit, left = units.force, found.after["train"].force_rms
     off = found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
             f"the free run is off by {off:.3g} {units.position} in 2 s (sensors' noise"
-            f" {found.noise_y:.3g} {units.position}), and it depends on none of the signals."
+            f" {found.noise_y:.3g} {units.position}), and it {depends}."
         )
     return (
         f"the model leaves {left:.3g} {unit} of force, the sensors' noise alone"
-        f" {found.noise_force:.3g} {unit}, and it depends on none of the signals."
+        f" {found.noise_force:.3g} {unit}, and it {depends}."
     )
 
 

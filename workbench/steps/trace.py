@@ -10,6 +10,7 @@ from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.progress import KeepGoing, without_end
 from identification.tracing.result import Errors, FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
@@ -57,9 +58,9 @@ def named_logs(
 
 def trace_sources(
     train: Sources, test: Sources | None, library: Library, seed: int = 0,
-    on_progress: Progress | None = None,
+    on_progress: Progress | None = None, *, keep_going: KeepGoing = without_end,
 ) -> Traced:  # fmt: skip
-    """The trace of the machine that the sources are of.
+    """The trace of the machine that the sources are of; keep_going: whether it is to go on.
 
     Raises BadLog where a test log is a training log, NotIdentifiable where too little slides.
     """
@@ -82,6 +83,7 @@ def trace_sources(
         library,
         np.random.default_rng(seed),
         on_progress=on_progress,
+        keep_going=keep_going,
     )
     remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
     model = traced_model(found, train, library)
@@ -209,6 +211,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
         "left": {"share": found.left.share, "depends_on": list(found.left.depends_on)},
         "drift": [asdict(change) for change in found.drift],
         "next_experiment": found.next_experiment,
+        "not_tried": list(found.not_tried),
         "parameters": {
             "before": _numbers(found.parameters_before),
             "after": _numbers(found.parameters_after),

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from identification.estimation.plain_search.cost import (
 from identification.estimation.regression.three_step import FirstEstimate
 from identification.log import Log
 from identification.model.estimates import Drive
+from identification.progress import Halt
 from identification.signals.differentiate import spectrum
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import force_slope
@@ -35,7 +36,7 @@ class FittedRun:
 
     `open` lists the entries of `start` that are fitted: a body that begins at rest has v = 0, a run
     driven by a force has no constant, and a motor's run begins in its measured state, since a
-    fitted one would take up what the model lacks.
+    fitted one would take up what the model lacks. halt: asked before the runs of a cost.
     """
 
     name: str
@@ -43,6 +44,7 @@ class FittedRun:
     windows: RestartWindows
     start: Array
     open: tuple[int, ...]
+    halt: Halt = field(default_factory=Halt, compare=False)
 
     def whole(self) -> "FittedRun":
         """The same log as one free run."""
@@ -137,8 +139,10 @@ def total_cost(
 ) -> Array:
     """Cost of parameter sets `p` (k, 11) over all runs, (k,); starts (runs, k, 3) where they vary.
 
-    cap: bound of one sample's squared residual, 0 for none. Works on all cores.
+    cap: bound of one sample's squared residual, 0 for none. Works on all cores. Raises Halted where
+    the runs' `halt` says so.
     """
+    runs[0].halt.ask()
     k = len(p)
     short = -k % WIDTH
     padded = np.concatenate([p, np.repeat(p[:1], short, axis=0)])

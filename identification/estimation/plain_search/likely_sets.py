@@ -26,7 +26,7 @@ from identification.estimation.plain_search.local_search import (
 )
 from identification.estimation.plain_search.problem import Problem, simulated
 from identification.estimation.plain_search.search_bounds import Box
-from identification.progress import Progress
+from identification.progress import Halt, Progress
 from identification.simulation.karnopp_step import F_SN, F_SP, K1, K2
 
 # Independent samples granted to a residual that is not noise
@@ -181,8 +181,10 @@ def log_cost(
 ) -> Callable[[Array], Array]:
     """Minus twice the log likelihood of unknowns (k, d), infinite outside `box`.
 
-    granted: where the residual is a misfit, for how many independent samples it counts.
+    granted: where the residual is a misfit, for how many independent samples it counts. Walkers are
+    halted between their steps: of what a cost raises, emcee would print a traceback.
     """
+    runs = [replace(run, halt=Halt()) for run in runs]
 
     def cost(members: Array) -> Array:
         sets, begun = unpack(runs, optimum.p, optimum.starts, optimum.free, members)

@@ -253,6 +253,7 @@ def _quadratic(
     k = len(free)
     d = len(theta)
     gradient, hessian, cost = np.zeros(d), np.zeros((d, d)), 0.0
+    runs[0].halt.ask()
     low = k
     for index, run in enumerate(runs):
         used = np.concatenate([np.arange(k), np.arange(low, low + len(run.open))])

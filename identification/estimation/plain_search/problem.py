@@ -20,6 +20,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.progress import Halt
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.karnopp_step import K1, K2
 from identification.thresholds import ADEQUATE
@@ -80,11 +81,11 @@ class Problem:
         return tuple(out)
 
 
-def pose(logs: Sequence[Log], rig: Rig, drive: Drive) -> Problem:
+def pose(logs: Sequence[Log], rig: Rig, drive: Drive, halt: Halt | None = None) -> Problem:
     """The logs as a fitting problem: noise estimated, search box drawn.
 
-    drive: what drives their runs (`recorded_logs.chosen_drive`), the command of a motor. Raises
-    NotIdentifiable where nothing moves.
+    drive: what drives their runs (`recorded_logs.chosen_drive`), the command of a motor; halt:
+    asked before each of them. Raises NotIdentifiable where nothing moves.
     """
     hold = rig.kind == "motor"
     firsts = tuple(first_estimate(log, held=hold) for log in logs)
@@ -106,6 +107,8 @@ def pose(logs: Sequence[Log], rig: Rig, drive: Drive) -> Problem:
         )
         for i, (log, first) in enumerate(zip(logs, firsts, strict=True))
     )
+    if halt is not None:
+        runs = tuple(replace(run, halt=halt) for run in runs)
     stiffness = None if by_command or hold else _stiffness_bounds(logs, firsts)
     box, row = search_box(firsts, k1, k2, stiffness)
     # A coupling is chosen by the search alone: the refinement would stiffen it without end.

@@ -14,7 +14,7 @@ from identification.estimation.plain_search.problem import Problem, plant_of, po
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.progress import Progress
+from identification.progress import Halt, Progress
 from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP
 
 SEARCH_POPULATION = 64
@@ -26,15 +26,15 @@ WORTH_A_SEARCH = 300.0  # chi-square over windows up to which a fit is worth a c
 
 def searched_plant(
     logs: Sequence[Log], rng: np.random.Generator, *, rig: Rig, drive: Drive, report: Progress,
-    attempt: int = 0,
+    attempt: int = 0, halt: Halt | None = None,
 ) -> Plant:  # fmt: skip
     """The plant of one global search for the nine parameters, without intervals.
 
     drive: "command" (of a motor too) or "force"; attempt: how many have failed before, perhaps
-    around a bad first estimate. Raises NotIdentifiable where nothing moves, BadLog
-    where a signal is missing.
+    around a bad first estimate; halt: asked before each run. Raises NotIdentifiable where nothing
+    moves, BadLog where a signal is missing.
     """
-    problem = pose(logs, rig, drive)
+    problem = pose(logs, rig, drive, halt)
     found = (
         climb(opened(problem), rng, report)
         if problem.hold

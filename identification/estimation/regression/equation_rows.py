@@ -8,7 +8,7 @@ Each row is divided by what the sensors' noise makes of it, so a complete model 
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,6 +17,7 @@ from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import BadLog
 from identification.log import Log
 from identification.model.karnopp import Karnopp
+from identification.progress import Halt
 from identification.signals.differentiate import Motion, differentiate, resolution
 from identification.signals.force_walk import corrected_share, force_walk
 from identification.signals.intersample import kinks
@@ -60,7 +61,8 @@ class MotionLog:
     reference: friction with which a run walks at most under the noise of the measured force; a
     plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
     leads the body along a path. walk: by how much a sample more may take the force away from what
-    the command makes of it [N], one sigma (0: the command is exact, or there is none).
+    the command makes of it [N], one sigma (0: the command is exact, or there is none). halt:
+    asked before every run along the log.
     """
 
     log: Log
@@ -78,6 +80,7 @@ class MotionLog:
     imposed: bool = False
     reference: Karnopp | None = None
     walk: float = 0.0
+    halt: Halt = field(default_factory=Halt)
 
     @property
     def gain(self) -> float:
@@ -87,9 +90,10 @@ class MotionLog:
     def again(self, log: Log) -> "MotionLog":
         """The same of another log of this machine."""
         by_command = self.whole is not None
-        return motion_log(
+        other = motion_log(
             log, held=self.held, by_command=by_command, rotary=self.rotary, imposed=self.imposed
         )
+        return replace(other, halt=self.halt)
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:

@@ -49,6 +49,7 @@ from identification.estimation.windowed_run.refinement import (
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
+from identification.progress import Halted
 from identification.thresholds import ADEQUATE, COMPLETE
 
 TAU = 0.1  # s, in which a nudged body takes on the log's velocity
@@ -161,24 +162,30 @@ def closest(
     short = [shortened(one, SHORT_SECONDS) for one in logs]
     best, poor = done, 0
     around = replace(CLOSE_RANGE, known=limits.known)
-    for i, plant in enumerate([*begins[: int(limits.told)], *begins]):
-        if limits.told and i == 0:
-            banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
-            near = nudged_search(banded, short, drive, rng, ((0.0, TOLD_RANGE), (0.0, CLOSE_RANGE)))
-        else:
-            stages = ((1.0, replace(FAR_RANGE, known=limits.known)), (0.0, around))
-            near = nudged_search(plant, short, drive, rng, stages)
-        begun = refit(near, short, drive, prior=even(near), effort="quick")
-        if best is not None and begun.misfit > limits.vain:
-            break
-        hopes = not plant.effects or begun.misfit <= PROMISING_MISFIT
-        worth = limits.most if hopes else min(limits.most, 1)
-        found = _on_whole(begun, logs, drive, rng, worth, around, best)
-        twice = agree(best, found)
-        best = found if best is None or found.misfit < best.misfit else best
-        poor += not hopes
-        if best.misfit <= (ADEQUATE if plant.effects else COMPLETE) or twice or poor == POOR:
-            break
+    try:
+        for i, plant in enumerate([*begins[: int(limits.told)], *begins]):
+            if limits.told and i == 0:
+                banded = start_band(plant, short, drive, DOUBLE * plant.friction.dv_p)
+                near = nudged_search(
+                    banded, short, drive, rng, ((0.0, TOLD_RANGE), (0.0, CLOSE_RANGE))
+                )
+            else:
+                stages = ((1.0, replace(FAR_RANGE, known=limits.known)), (0.0, around))
+                near = nudged_search(plant, short, drive, rng, stages)
+            begun = refit(near, short, drive, prior=even(near), effort="quick")
+            if best is not None and begun.misfit > limits.vain:
+                break
+            hopes = not plant.effects or begun.misfit <= PROMISING_MISFIT
+            worth = limits.most if hopes else min(limits.most, 1)
+            found = _on_whole(begun, logs, drive, rng, worth, around, best)
+            twice = agree(best, found)
+            best = found if best is None or found.misfit < best.misfit else best
+            poor += not hopes
+            if best.misfit <= (ADEQUATE if plant.effects else COMPLETE) or twice or poor == POOR:
+                break
+    except Halted:
+        if best is None:
+            raise
     assert best is not None
     return best
 
@@ -220,21 +227,25 @@ def closer(
     slow = on_bristle(plant)
     enough = ADEQUATE if slow else COMPLETE
     best = None if slow else onward(plant, logs, drive)
-    for _ in range(searches):
-        if best is not None and (best.misfit <= enough or best.misfit > hopeless):
-            break
-        if agree(done, best):
-            break
-        plant = plant if best is None else best.plant
-        near = nudged_search(plant, part, drive, rng, ((0.0, around),))
-        if slow:
-            found = refit(near, logs, drive, prior=even(near), effort="near")
-        else:
-            found = onward(near, logs, drive)
-        gained = best is None or found.misfit < SEARCH_GAIN * best.misfit
-        best = found if best is None or found.misfit < best.misfit else best
-        if not gained:
-            break
+    try:
+        for _ in range(searches):
+            if best is not None and (best.misfit <= enough or best.misfit > hopeless):
+                break
+            if agree(done, best):
+                break
+            plant = plant if best is None else best.plant
+            near = nudged_search(plant, part, drive, rng, ((0.0, around),))
+            if slow:
+                found = refit(near, logs, drive, prior=even(near), effort="near")
+            else:
+                found = onward(near, logs, drive)
+            gained = best is None or found.misfit < SEARCH_GAIN * best.misfit
+            best = found if best is None or found.misfit < best.misfit else best
+            if not gained:
+                break
+    except Halted:
+        if best is None:
+            raise
     assert best is not None
     return best
 

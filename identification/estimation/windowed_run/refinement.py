@@ -7,7 +7,7 @@ drives) in windows, with the regression's estimates as a prior. No global search
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from typing import Literal
@@ -32,6 +32,7 @@ from identification.estimation.windowed_run.windows import (
 from identification.model.estimates import Drive
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.progress import Halted
 from identification.simulation.effect_table import LONGEST_BRISTLE
 from identification.thresholds import COMPLETE, FOLLOWED, NEARLY_FOLLOWED
 
@@ -168,6 +169,14 @@ def even(plant: Plant) -> dict[str, float]:
     }
 
 
+class HaltedRefit(Halted):
+    """A refinement that was halted, at the plant that it had come to."""
+
+    def __init__(self, plant: Plant) -> None:
+        super().__init__()
+        self.plant = plant
+
+
 Effort = Literal["quick", "near", "far", "rough", "whole"]
 Judge = Callable[[Plant], Array]
 
@@ -247,7 +256,7 @@ class _Unknowns:
 
     names, x0, unit (k,): all of them; at (d,): those that are free; trust (k,): the regression's
     deviations; steps: at most, of one minimum; little: share of the cost below which a step is the
-    last.
+    last; reached: the last minimum (d,), if any.
     """
 
     plant: Plant
@@ -260,6 +269,7 @@ class _Unknowns:
     trust: Array
     steps: int
     little: float
+    reached: list[Array] = field(default_factory=list)
 
     @classmethod
     def of(
@@ -314,7 +324,9 @@ class _Unknowns:
             return np.concatenate([r, pull]) if tie else np.asarray(r)
 
         last = self.little if little is None else little
-        return gauss_newton(bent, x, self.steps, reach=reach, little=last)
+        found = gauss_newton(bent, x, self.steps, reach=reach, little=last)
+        self.reached[:] = [found.x]
+        return found
 
 
 def refit(
@@ -338,6 +350,34 @@ def refit(
     steps = min(steps, BRISTLE_STEPS) if slow else steps
     passing = PASSING if effort == "rough" else 0.0
     unknowns = _Unknowns.of(plant, logs, drive, prior, steps, passing)
+    try:
+        at, found = _minimum(unknowns, effort, rescues)
+    except Halted:
+        if not unknowns.reached:
+            raise
+        raise HaltedRefit(unknowns.plant_at(unknowns.reached[0])) from None
+    free, unit = unknowns.at, unknowns.unit
+
+    def spread() -> Array:
+        # Where what is left is no noise, a window counts as one sample.
+        factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
+        scale = np.outer(unit[free], unit[free])
+        if not any(walks(one, drive) for one in logs):
+            return factor * at.covariance() * scale
+        if found <= COMPLETE:
+            noise = _noise(unknowns.plant_at(at.x), logs, drive)
+            if noise is not None:
+                return at.covariance_by(noise) * scale
+        return factor * at.covariance(_windows(logs, drive)) * scale
+
+    names = tuple(unknowns.names[i] for i in free)
+    return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread)
+
+
+def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum, float]:
+    """The minimum that a refinement of this effort ends in, and its misfit."""
+    plant, logs, drive = unknowns.plant, unknowns.logs, unknowns.drive
+    quick, slow = effort == "quick", on_bristle(plant)
     at = _approached(unknowns, effort)
     # Free of the regression, and over a whole run, in which no window's start errs: where the model
     # follows. Elsewhere what it lacks would bend what the equations tell.
@@ -359,22 +399,7 @@ def refit(
         left_by = unknowns.misfit(trial.x, LONGEST_BRISTLE)
         if left_by < found:
             at, found = trial, left_by
-    free, unit = unknowns.at, unknowns.unit
-
-    def spread() -> Array:
-        # Where what is left is no noise, a window counts as one sample.
-        factor = RUN_WINDOW / logs[0].log.h if found > FOLLOWED else 1.0
-        scale = np.outer(unit[free], unit[free])
-        if not any(walks(one, drive) for one in logs):
-            return factor * at.covariance() * scale
-        if found <= COMPLETE:
-            noise = _noise(unknowns.plant_at(at.x), logs, drive)
-            if noise is not None:
-                return at.covariance_by(noise) * scale
-        return factor * at.covariance(_windows(logs, drive)) * scale
-
-    names = tuple(unknowns.names[i] for i in free)
-    return Refit(unknowns.plant_at(at.x), found, names, dict(prior), spread)
+    return at, found
 
 
 def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:
@@ -435,7 +460,12 @@ def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
     best: Refit | None = None
     left_by = misfit(plant, logs, drive)
     for _ in range(ONWARD_ROUNDS):
-        found = briefly(plant, logs, drive)
+        try:
+            found = briefly(plant, logs, drive)
+        except Halted:
+            if best is None:
+                raise
+            break
         gained = found.misfit < ONWARD_GAIN * left_by
         best = found if best is None or found.misfit < best.misfit else best
         if not gained or not COMPLETE < best.misfit < REACHED:

@@ -105,8 +105,10 @@ def window_run(
 ) -> FreeRun | None:  # fmt: skip
     """Free run in windows; None where the model cannot be followed.
 
-    shift: (3, k) on y, v, F; log: driven by this one in place of its own.
+    shift: (3, k) on y, v, F; log: driven by this one in place of its own. Raises Halted where the
+    log's `halt` says so: all refinements and searches in windows come by here.
     """
+    one.halt.ask()
     driven = driven_by(one, drive) if log is None else log
     more = np.zeros((3, len(begun.at))) if shift is None else shift
     y, v, F = begun.y + more[0], begun.v + more[1], begun.F + more[2]

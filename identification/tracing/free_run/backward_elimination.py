@@ -31,6 +31,7 @@ from identification.log import Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.progress import Halt
 from identification.thresholds import (
     ADEQUATE,
     ASTRAY,
@@ -76,7 +77,12 @@ class Setting:
     @property
     def recorded(self) -> RecordedLogs:
         """The logs as the estimator takes them."""
-        return RecordedLogs(tuple(self.logs), self.rig, self.drive)
+        return RecordedLogs(tuple(self.logs), self.rig, self.drive, halt=self.halt)
+
+    @property
+    def halt(self) -> Halt:
+        """Whether trials are to go on."""
+        return self.logs[0].halt
 
 
 def enough(setting: Setting, steps: Sequence[Step]) -> float:
@@ -115,7 +121,16 @@ def _model(choice: Choice, setting: Setting) -> FittedStructure:
         choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
         vain=vain(setting),
     )  # fmt: skip
-    found = None if model.imposed else insisted(model.plant, model.misfit, setting)
+    if model.imposed:
+        return model
+    keys = ", ".join(step.candidate.effect.key for step in choice.steps)
+    if setting.halt.reached():
+        setting.halt.left_out(f"the refinement of {keys} on the free run, to its end")
+        return model
+    found = setting.halt.tried(
+        f"a closer search with {keys}",
+        lambda: insisted(model.plant, model.misfit, setting), None,
+    )  # fmt: skip
     if found is None:
         return model
     return replace(model, plant=found.plant, sd=found.sd, misfit=found.misfit)
@@ -148,7 +163,7 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
 
     Where it is not with any, the fewest beside which no more leave clearly less; but where nothing
     brings the run back to the log and its band is unknown (unsure), the one without effects of slow
-    and micro-motion, and none where they help nothing.
+    and micro-motion, and none where they help nothing. Halted, they are those tried so far.
     """
     free = loose(setting.plain.plant, setting.drive)
     unsure = unsure and free
@@ -165,6 +180,12 @@ def fewest(choice: Choice, setting: Setting, unsure: bool) -> tuple[Choice, Fitt
             return part, model
         if best is None or model.misfit < earned(best[1].misfit):
             best = part, model
+        if setting.halt.reached():
+            for step in choice.steps[n:]:
+                setting.halt.left_out(
+                    f"{step.candidate.effect.key}, called for by the equations, on the free run"
+                )
+            return best
     if free and best is not None and best[1].misfit > vain(setting):
         return only(choice, (), [step.candidate for step in choice.steps]), setting.plain
     if best is not None and (not unsure or best[1].misfit <= ASTRAY):

@@ -100,6 +100,7 @@ AHEAD = 4  # first of those begun, tried where two effects are there already: ea
 FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
 BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
+RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
 Report = Callable[[str, float], None]
 
 
@@ -136,14 +137,34 @@ def judged_forward(
         return choice, model
     called_for = choice.steps
     if model.misfit > enough(setting, choice.steps) and hidden(choice, free):
-        short = cut_short(choice, model, setting)
-        found = contest(choice, model, replace(setting, short=short), report)
+        found = setting.halt.tried(
+            RUN_ALONE, lambda: _contested(choice, model, setting, report), None
+        )
         if found is not None:
             choice, model = found
-    choice, model = pruned(choice, model, setting)
+    choice, model = _pruned(choice, model, setting)
     if called_for and not choice.steps:  # the equations were wrong: what the run lacks is open
         return judged_forward(choice, model, setting, report)
     return choice, model
+
+
+def _contested(
+    choice: Choice, model: FittedStructure, setting: Setting, report: Report
+) -> tuple[Choice, FittedStructure] | None:
+    """The choice and its model with what a contest on short logs adds or exchanges, if anything."""
+    short = cut_short(choice, model, setting)
+    return contest(choice, model, replace(setting, short=short), report)
+
+
+def _pruned(
+    choice: Choice, model: FittedStructure, setting: Setting
+) -> tuple[Choice, FittedStructure]:
+    """The choice and its model without what the run does as well without, as far as is tried."""
+    if not choice.steps:
+        return choice, model
+    keys = ", ".join(step.candidate.effect.key for step in choice.steps)
+    what = f"whether the run does as well without {keys}"
+    return setting.halt.tried(what, lambda: pruned(choice, model, setting), (choice, model))
 
 
 def at_once(
@@ -154,8 +175,10 @@ def at_once(
     free = loose(model.plant, setting.drive)
     if model.imposed or (on_bristle(model.plant) and free):
         return None
-    short = cut_short(choice, model, setting)
-    found = contest(choice, model, replace(setting, short=short), report, quickly=True)
+    found = contest(
+        choice, model, replace(setting, short=cut_short(choice, model, setting)), report,
+        quickly=True,
+    )  # fmt: skip
     return found if found is not None and found[1].misfit <= COMPLETE else None
 
 

@@ -32,8 +32,15 @@ def told_apart(choice: Choice, after: FittedStructure, setting: Setting) -> Choi
 
     def short(step: Step) -> Iterator[str]:
         for rival in equal_rivals(step):
+            key = step.candidate.effect.key
+            if setting.halt.reached():
+                setting.halt.left_out(f"rivals of {key} on the free run")
+                return
             stay = tuple(replace(x, candidate=rival) if x is step else x for x in choice.steps)
             run = fitted(only(choice, stay), setting)
+            if setting.halt.reached():  # its run falls short of its end
+                setting.halt.left_out(f"rivals of {key} on the free run")
+                return
             lost = seconds(setting) * (run.misfit - after.misfit)
             if not run.imposed and run.misfit > COMPLETE and lost > LUCK_IN_GAIN:
                 yield rival.effect.key

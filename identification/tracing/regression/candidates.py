@@ -47,6 +47,7 @@ def trial(
     stage: EffectRows, effect: Effect, shape: Values, told_in: Sequence[str]
 ) -> tuple[float, dict[str, RowFit]]:
     """Criterion over the equations `told_in` with the effect at this shape, and their outcomes."""
+    stage.logs[0].halt.ask()
     found = {}
     for equation in told_in:
         parts = [

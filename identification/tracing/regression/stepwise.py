@@ -32,7 +32,7 @@ from identification.estimation.regression.signals_behind_effects import (
     reached,
     shown_to_true,
 )
-from identification.progress import Progress
+from identification.progress import Halted, Progress
 from identification.thresholds import (
     CARRIES,
     ELASTIC,
@@ -50,6 +50,9 @@ MOST_EFFECTS = 4  # effects in one machine
 SHIFT = 1.0  # of the position's noise
 REFUSED = 3  # candidates tried in turn
 HARDLY = 1.2  # times the sensors' noise squared, up to which another is not even looked for
+# What a halted choice leaves out
+EFFECTS = "the effects of the library"
+FURTHER_EFFECT = "a further effect beside the first"
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,22 +97,24 @@ def choose(
     """Effects that the logs call for, one after the other, each judged beside those before.
 
     start, first: the plain model and what it leaves, as `first_stage` gives them; begun: a choice
-    to go on from; most: effects at most.
+    to go on from; most: effects at most. Halted, it is the choice so far.
     """
     stage, base, steps = start, first, list[Step]()
     tried: Sequence[EffectCandidate] = ()
     if begun is not None:
         stage, base, steps, tried = begun.end, begun.base, list(begun.steps), begun.tried
-    for turn in range(len(steps), most):
-        done = partial(_report, report, turn)
-        tried = all_candidates(stage, base, library, done)
-        found = accepted(tried, stage, base, rng)
-        if found is None:
-            break
-        step, stage, base = found
-        steps.append(step)
-        if len(stage.chosen) > 1:
-            stage, base, steps = polished(stage, base, steps)
+    try:
+        for turn in range(len(steps), most):
+            tried = all_candidates(stage, base, library, partial(_report, report, turn))
+            found = accepted(tried, stage, base, rng)
+            if found is None:
+                break
+            step, stage, base = found
+            steps = [*steps, step]
+            if len(stage.chosen) > 1:
+                stage, base, steps = polished(stage, base, steps)
+    except Halted:
+        start.logs[0].halt.left_out(FURTHER_EFFECT if steps else EFFECTS)
     if steps and rough(base):
         stage, base, steps = trusted(start, steps)
     return Choice(start, first, tuple(steps), stage, base, tuple(tried))

@@ -44,7 +44,9 @@ CONTRACT = {
     "schema", "verdict", "before", "after", "noise_floor", "effects", "rivals", "unknown", "drift",
     "next_experiment",
 }  # fmt: skip
-BESIDE = {"complete", "left", "remarks", "parameters", "card", "log", "test_log", "versions"}
+BESIDE = {
+    "complete", "left", "not_tried", "remarks", "parameters", "card", "log", "test_log", "versions",
+}  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
 
@@ -129,7 +131,7 @@ def test_other_machines_and_motors_without_a_constant_are_refused() -> None:
 def test_the_trace_gets_logs_seed_and_library(monkeypatch: pytest.MonkeyPatch) -> None:
     given = []
 
-    def trace(train, test, rig, library, rng, *, on_progress):  # type: ignore[no-untyped-def]
+    def trace(train, test, rig, library, rng, *, on_progress, keep_going):  # type: ignore[no-untyped-def]
         given.append((len(train), len(test), rig.kind, sorted(library), rng.integers(1000)))
         return trace_of()
 

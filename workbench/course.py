@@ -1,0 +1,171 @@
+"""A long computation as whoever waits for it sees it: a bar that keeps moving, and a way to end it.
+
+The numeric floors know neither clock nor keys: they tell stages and ask whether to go on. Here is
+where a budget of seconds and Ctrl-C become an answer.
+"""
+
+import math
+import signal
+import threading
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from types import FrameType
+
+import click
+
+Clock = Callable[[], float]  # s
+Stages = Mapping[str, tuple[float, float]]
+
+BEAT = 1.0  # s between two looks at the clock, whatever the computation does
+FIRST_GUESS = 30.0  # s, of a computation of which nothing is known yet
+AT_LEAST = 0.3  # of what is left of the bar, for a stage that begins late
+ALL_BUT = 0.99  # of the bar, that only the end itself fills
+COMPILING = "compiling (once after an installation)"
+ENDS_SOON = "Ctrl-C: ending with the best so far (once more aborts)"
+
+
+@dataclass
+class Course:
+    """How far a computation has come, by its stages and by the clock, and whether it is to go on.
+
+    advance: takes steps of the bar, which add up to 1; stages: the part of the bar of each; budget
+    [s]: after which it is to end; told: what goes on, in words. A stage begins where the last one
+    has come to, if that is further on: some are left out, and others take their place.
+    """
+
+    advance: Callable[[float], None]
+    stages: Stages
+    clock: Clock
+    budget: float = math.inf
+    told: Callable[[str], None] = lambda _words: None
+    shown: float = 0.0
+    _begun: float = field(init=False)
+    _stage: str = field(init=False, default="")
+    _low: float = field(init=False, default=0.0)
+    _here: float = field(init=False, default=0.0)
+    _from: float = field(init=False, default=0.0)
+    _since: float = field(init=False)
+    _stopped: bool = field(init=False, default=False)
+    _moving: threading.Lock = field(init=False, default_factory=threading.Lock)
+
+    def __post_init__(self) -> None:
+        self._begun = self._since = self.clock()
+
+    def report(self, stage: str, share: float) -> None:
+        """A share of a stage is done; a stage that is not known counts as the last known one."""
+        if stage in self.stages and stage != self._stage:
+            self._stage, self._low = stage, max(self.stages[stage][0], self.shown)
+            self.told(stage)
+        place = self._low + (self._high - self._low) * min(max(share, 0.0), 1.0)
+        if place > self._here:
+            self._here, self._since = place, self.clock()
+            self._from = max(place, self.shown)
+        self.beat()
+
+    def keep_going(self) -> bool:
+        """Whether the computation is to go on: within its budget, and not told to end."""
+        return not self._stopped and self.clock() - self._begun < self.budget
+
+    def stop(self) -> None:
+        """From now on it is to end."""
+        self._stopped = True
+
+    @property
+    def stopped(self) -> bool:
+        """Whether it was told to end, before its budget."""
+        return self._stopped
+
+    def beat(self) -> None:
+        """Move the bar to where the computation should be by now."""
+        with self._moving:
+            place = min(self.expected(), ALL_BUT)
+            if place > self.shown:
+                self.advance(place - self.shown)
+                self.shown = place
+
+    def compiling(self, begins: bool) -> None:
+        """Kernels are being compiled, or no longer: nothing else goes on meanwhile."""
+        self.told(COMPILING if begins else self._stage)
+
+    def done(self) -> None:
+        """Fill the bar."""
+        with self._moving:
+            self.advance(1.0 - self.shown)
+            self.shown = 1.0
+
+    def expected(self) -> float:
+        """Share of the whole that should be done by now.
+
+        From the last place that was told (or shown by then), at the pace so far, ever more slowly
+        towards the end of the stage, which is not passed unseen; or the share of the budget, where
+        that is more.
+        """
+        now = self.clock()
+        passed = self._since - self._begun
+        pace = self._here / passed if self._here > 0.0 and passed > 0.0 else 1.0 / FIRST_GUESS
+        room = self._high - self._from
+        due = (now - self._since) * pace
+        more = room * due / (room + due) if room > 0.0 else 0.0
+        return max(self._from + more, (now - self._begun) / self.budget)
+
+    @property
+    def _high(self) -> float:
+        low, high = self.stages.get(self._stage, (0.0, 1.0))
+        late = self._low + AT_LEAST * (1.0 - self._low)
+        return max(high, late) if self._low > low else high
+
+
+@contextmanager
+def watched(course: Course) -> Iterator[None]:
+    """Within the block the bar moves by itself, and the first Ctrl-C ends with the best so far.
+
+    A second one aborts, as does one where somebody else handles it.
+    """
+    with moving(course), _first_ctrl_c(course):
+        yield
+
+
+@contextmanager
+def moving(course: Course) -> Iterator[None]:
+    """Within the block the bar moves by itself, also while kernels compile; then it is full."""
+    from identification.compiled import while_compiling
+
+    over = threading.Event()
+
+    def beats() -> None:
+        said = False
+        while not over.wait(BEAT):
+            course.beat()
+            if course.stopped and not said:  # a signal's handler is no place to write from
+                said = True
+                click.echo(ENDS_SOON, err=True)
+
+    beating = threading.Thread(target=beats, daemon=True)
+    beating.start()
+    try:
+        with while_compiling(course.compiling):
+            yield
+    finally:
+        over.set()
+        beating.join()
+    course.done()
+
+
+@contextmanager
+def _first_ctrl_c(course: Course) -> Iterator[None]:
+    usual = signal.getsignal(signal.SIGINT)
+    mine = threading.current_thread() is threading.main_thread()
+    if not mine or usual is not signal.default_int_handler:
+        yield
+        return
+
+    def end(_number: int, _frame: FrameType | None) -> None:
+        signal.signal(signal.SIGINT, usual)
+        course.stop()
+
+    signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, usual)
