@@ -73,8 +73,8 @@ def cases(given: argparse.Namespace) -> Iterator[Case]:
 
 def child(case: Case, given: argparse.Namespace, asked: str, keys: Sequence[str]) -> dict[str, Any]:
     """The answer of a process of its own, which is ended when it takes too long."""
-    command = [sys.executable, "-m", "benchmarks.drives_child", case.family,
-               "+".join(case.effects), str(case.seed), str(given.strength), asked, *keys]  # fmt: skip
+    what = [case.family, "+".join(case.effects), str(case.seed), str(given.strength), asked]
+    command = [sys.executable, "-m", "benchmarks.drives_child", *what, *keys]
     paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     threads = {f"{k}_NUM_THREADS": "1" for k in ("OMP", "OPENBLAS", "MKL")}
     try:

@@ -7,7 +7,7 @@ that is 0.1 % off, which is more than the intervals that are to be judged.
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.compiled import compiled, compiled_inline
 
 RATE = 64000  # steps a second
@@ -35,7 +35,7 @@ Y, V, FORCE, BRISTLES, HELD, PLACE, SPEED, SLOWED = range(8)
 @compiled_inline
 def applied(x: State, u: float, act: Array) -> float:
     """Force of the actuator [N]; act: kind, k_a or k1, k2, lag."""
-    return act[1] * u if act[0] == ALGEBRAIC else x[FORCE]
+    return float(act[1] * u if act[0] == ALGEBRAIC else x[FORCE])
 
 
 @compiled_inline
@@ -50,7 +50,7 @@ def driving(x: State, u: float, t: float, act: Array, e: Array) -> float:
     force -= e[K] * y + e[CABLE] * y * y + x[HELD]
     if e[SECOND_MASS] > 0.0:
         force += e[SECOND_K] * (x[PLACE] - y) + e[SECOND_C] * (x[SPEED] - x[V])
-    return force
+    return float(force)
 
 
 @compiled_inline
@@ -87,7 +87,9 @@ def slopes(x: State, u: float, t: float, turned: float, mode: int, act: Array, p
             if e[DIP] != 0.0:
                 level += e[DIP] * np.exp(-((v / e[DIP_SPEED]) ** 2))
             friction = way * level
-            if mode == BRISTLE:
+            if mode == BRISTLE:  # LuGre: the stick limit at rest, the band as Stribeck's velocity
+                band, stick = (p[5], p[7]) if way > 0.0 else (p[6], -p[8])
+                level += (stick - (p[1] if way > 0.0 else p[2])) * np.exp(-((v / band) ** 2))
                 dz = v - abs(v) * e[SIGMA_0] * x[BRISTLES] / level
                 friction = e[SIGMA_0] * x[BRISTLES] + e[SIGMA_1] * dz
             friction += (p[3] if way > 0.0 else p[4]) * v
@@ -138,11 +140,9 @@ def excess(x: State, u: float, t: float, turned: float, act: Array, p: Array,
            e: Array) -> float:  # fmt: skip
     """How far the driving force is beyond the stick limit [N], with its sign; 0 within."""
     drive = driving(x, u, t, act, e)
-    if drive > p[7] + raised(x, u, t, turned, 1.0, act, p, e):
-        return drive - p[7] - raised(x, u, t, turned, 1.0, act, p, e)
-    if drive < p[8] - raised(x, u, t, turned, -1.0, act, p, e):
-        return drive - p[8] + raised(x, u, t, turned, -1.0, act, p, e)
-    return 0.0
+    above = drive - p[7] - raised(x, u, t, turned, 1.0, act, p, e)
+    below = drive - p[8] + raised(x, u, t, turned, -1.0, act, p, e)
+    return float(max(above, 0.0) + min(below, 0.0))
 
 
 @compiled_inline
@@ -228,13 +228,13 @@ def through(x: State, u: float, t: float, turned: float, mode: int, act: Array, 
 
 @compiled
 def run(p: Array, act: Array, e: Array, loop: Array, r: Array, dr: Array, noise: Array,
-        tick: int, at: Array, share: Array, every: int) -> Array:  # fmt: skip
+        tick: int, at: IntArray, share: Array, every: int) -> Array:  # fmt: skip
     """Position shown, speed, force and command (4, n) at every sample, from rest.
 
     loop: gain of position and speed, their integrals, speed filter's share, limit, force loop's
-    bandwidth, encoder's count, largest force. r, dr, noise (2, ticks): reference, its rate and the controller's
-    own sensors, every `tick` steps. at, share: step and part of it at which y and F are read;
-    every: steps between samples, whose commands are those in force.
+    bandwidth, encoder's count, largest force. r, dr, noise (2, ticks): reference, its rate and the
+    controller's own sensors, every `tick` steps. at, share: step and part of it at which y and F
+    are read; every: steps between samples, whose commands are those in force.
     """
     n = len(at)
     out = np.zeros((4, n))

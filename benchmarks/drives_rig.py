@@ -359,9 +359,9 @@ def make(family: str, effects: tuple[str, ...], seed: int, s: float) -> Made:
     e: dict[str, float] = {}
     for effect in effects:
         e |= sizes(one, effect, s, plain)
-    if "sigma_0" in e:  # damped as a bristle of the body's mass, but by a tenth
-        e["sigma_1"] = 0.2 * float(np.sqrt(e["sigma_0"] * one.nine.m))
-    if "stribeck" in effects:  # the dip ends where the stick limit begins
+    if "sigma_0" in e:  # LuGre's micro-damping: half of critical for the body on its bristles
+        e["sigma_1"] = float(np.sqrt(e["sigma_0"] * one.nine.m))
+    elif "stribeck" in effects:  # the dip ends where the stick limit begins
         more = e["dip"] * np.exp(-((one.nine.dv_p / e["dip_speed"]) ** 2))
         p = one.nine
         one = replace(one, nine=replace(p, F_sp=p.F_sp + more, F_sn=p.F_sn - more))
