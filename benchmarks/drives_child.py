@@ -1,4 +1,5 @@
-"""The process that identifies and traces one machine of `drives`; it answers in one line of JSON.
+"""The process that identifies and traces one machine of `drives`; it answers in
+lines of JSON, each of which holds the one before.
 
     python -m benchmarks.drives_child FAMILY EFFECT[+EFFECT] SEED STRENGTH fit|trace|both [KEY ...]
 
@@ -76,8 +77,9 @@ def main() -> None:
         "truth": truth(made), "sizes": dict(made.effects), "words": made.machine.words,
     }  # fmt: skip
     for what in ("fit", "trace") if asked == "both" else (asked,):
+        print(json.dumps(out), flush=True)  # what is known should the time be over
         out[what] = tried(what, made, keys)
-    print(json.dumps(out))
+    print(json.dumps(out), flush=True)
 
 
 if __name__ == "__main__":

@@ -54,18 +54,17 @@ def driving(x: State, u: float, t: float, act: Array, e: Array) -> float:
 
 
 @compiled_inline
-def raised(x: State, u: float, t: float, turned: float, way: float, act: Array, p: Array,
+def raised(x: State, u: float, t: float, turned: float, level: float, act: Array, p: Array,
            e: Array) -> float:  # fmt: skip
-    """What effects add to friction in this direction, sliding or stuck [N]."""
-    coulomb = p[1] if way > 0.0 else p[2]
+    """What effects add to this level of friction, sliding or stuck [N]."""
     more = e[SLOPE] * x[Y] + e[MU] * abs(applied(x, u, act))
     if e[WARM] != 0.0:
-        more += coulomb * e[WARM] * (1.0 - np.exp(-t / e[WARM_TAU]))
+        more += level * e[WARM] * (1.0 - np.exp(-t / e[WARM_TAU]))
     if e[BY_ACCELERATION] != 0.0:
-        more += coulomb * e[BY_ACCELERATION] * abs(x[V] - x[SLOWED]) / ACCELERATION_LAG
+        more += level * e[BY_ACCELERATION] * abs(x[V] - x[SLOWED]) / ACCELERATION_LAG
     if e[SINCE_REVERSAL] != 0.0:
         more += e[SINCE_REVERSAL] * np.sqrt(min(t - turned, LONGEST_MEMORY))
-    return more
+    return float(more)
 
 
 @compiled_inline
@@ -78,12 +77,12 @@ def slopes(x: State, u: float, t: float, turned: float, mode: int, act: Array, p
     if mode == BRISTLE:
         way = 1.0 if v >= 0.0 else -1.0
     if mode != STUCK:
-        more = raised(x, u, t, turned, way, act, p, e)
+        in_band = mode in (BAND_P, BAND_N)
+        level = (p[7] if way > 0.0 else -p[8]) if in_band else (p[1] if way > 0.0 else p[2])
+        level += raised(x, u, t, turned, level, act, p, e)
         drive = driving(x, u, t, act, e)
-        if mode in (BAND_P, BAND_N):
-            friction = (p[7] + more) if way > 0.0 else (p[8] - more)
-        else:
-            level = (p[1] if way > 0.0 else p[2]) + more
+        friction = way * level
+        if not in_band:
             if e[DIP] != 0.0:
                 level += e[DIP] * np.exp(-((v / e[DIP_SPEED]) ** 2))
             friction = way * level
@@ -140,8 +139,8 @@ def excess(x: State, u: float, t: float, turned: float, act: Array, p: Array,
            e: Array) -> float:  # fmt: skip
     """How far the driving force is beyond the stick limit [N], with its sign; 0 within."""
     drive = driving(x, u, t, act, e)
-    above = drive - p[7] - raised(x, u, t, turned, 1.0, act, p, e)
-    below = drive - p[8] + raised(x, u, t, turned, -1.0, act, p, e)
+    above = drive - p[7] - raised(x, u, t, turned, p[7], act, p, e)
+    below = drive - p[8] + raised(x, u, t, turned, -p[8], act, p, e)
     return float(max(above, 0.0) + min(below, 0.0))
 
 

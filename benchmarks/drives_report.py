@@ -70,9 +70,7 @@ def of_truth(found: Found) -> float:
 
 def line(found: Found) -> str:
     """One machine in one line."""
-    head = (
-        f"{found['part']:8}{found['family']:10}{'+'.join(found['effects']):20}{found['seed']:5d} "
-    )
+    head = f"{found['part']:8}{found['family']:10}{effects_of(found):20}{found['seed']:5d} "
     out = [trouble(found, "fit", "trace")]
     if "nine" in found.get("fit", {}):
         z = errors(found)
@@ -131,7 +129,7 @@ def verdicts(founds: Sequence[Found], title: str) -> None:
     print(
         f"{'':22}{'right':>24}{'named first':>24}{'named at all':>24}  F/noise  F/true  s  verdicts"
     )
-    rows = grouped(founds, lambda one: "+".join(one["effects"]))
+    rows = grouped(founds, effects_of)
     for name, some in [*rows.items(), ("all", list(founds))]:
         said = [one.get("trace", {}) for one in some]
         words = grouped(said, lambda one: str(one.get("verdict", "no answer")))
@@ -153,12 +151,23 @@ def median(values: Sequence[float]) -> float:
     return float(np.median(finite)) if finite else float("nan")
 
 
+def family_of(found: Found) -> str:
+    """Family of a case's machine."""
+    return str(found["family"])
+
+
+def effects_of(found: Found) -> str:
+    """Effects of a case, as its line shows them."""
+    return "+".join(found["effects"])
+
+
 def print_report(founds: Sequence[Found]) -> None:
     """Tables of every part that was run."""
     for part, some in grouped(founds, lambda one: str(one["part"])).items():
         if part in ("clean", "lacking"):
-            for family, few in grouped(some, lambda one: str(one["family"])).items():
-                coverage(few, f"{part}, {family}")
+            rows = grouped(some, family_of if part == "clean" else effects_of)
+            for name, few in rows.items():
+                coverage(few, f"{part}, {name}")
             coverage(some, f"{part}, all")
         if part != "lacking":
             verdicts(some, part)

@@ -91,7 +91,7 @@ def test_the_packages_run_of_the_truth_is_the_log(family: str) -> None:
         ("stribeck", {"F_s": "dip", "v_s": "dip_speed"}),
         ("cogging", {"a": "cog", "period": "cog_period"}),
         ("spring", {"k": "k"}),
-        ("position", {"c1": "slope"}),
+        ("position", {"c1": "slope", "period": "length"}),
         ("load", {"mu": "mu"}),
         ("warmup", {"a": "warm", "tau": "warm_tau"}),
         ("backlash", {"width": "play"}),
@@ -105,13 +105,19 @@ def test_effects_are_those_of_the_library(effect: str, values: dict[str, str]) -
     e = sizes(one, effect, 0.2, plain)
     if effect == "delay":
         e["late"] = round(e["late"] * 4000) / 4000  # a whole number of the loop's ticks
-    log, _ = simulated(one, 0, "train", e)
+    e["length"] = 0.05
+    log, (y, v, _, _) = simulated(one, 0, "train", e)
     acting = built_in()[EFFECTS[effect]].acting({key: e[name] for key, name in values.items()})
-    start = (0.0, 0.0, 0.0)
-    run = free_run(Plant(one.nine, Motor(one.actuator[0]), (acting,)), log, start, "command")
-    without = free_run(Plant(one.nine, Motor(one.actuator[0])), log, start, "command")
-    seen = float(np.sqrt(np.mean((without.shown - log["y"]) ** 2)))
-    assert np.sqrt(np.mean((run.shown - log["y"]) ** 2)) < 0.02 * seen
+    at = np.arange(0, len(log), len(log) // 50)
+    begun = None if effect in ("backlash", "delay", "dead_zone") else (at, y[at], v[at])
+    start, motor = (0.0, 0.0, 0.0), Motor(one.actuator[0])
+    shown_by = [
+        free_run(Plant(one.nine, motor, effects), log, start, "command", restarts=begun).shown
+        for effects in ((acting,), ())
+    ]
+    # The median: a window in which cogging decides by a hair where the body stops may go apart.
+    with_it, without = (float(np.median(np.abs(x - log["y"]))) for x in shown_by)
+    assert with_it < 0.01 * without
 
 
 def test_a_clock_that_jitters_reads_another_instant() -> None:
@@ -149,7 +155,7 @@ def test_a_bristle_has_no_band_of_its_own() -> None:
 def test_a_seed_is_always_the_same_machine() -> None:
     first, second = (make("force", ("none",), 0, 0.2) for _ in range(2))
     assert np.array_equal(first.train["F"], second.train["F"])
-    assert not np.array_equal(first.train["y"][:100], first.test["y"][:100])
+    assert not np.array_equal(first.train["y"], first.test["y"])
 
 
 def test_lines_and_tables(capsys: pytest.CaptureFixture[str]) -> None:
