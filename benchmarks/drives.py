@@ -7,13 +7,14 @@
 
 Machines with P-PI and PID loops at 1 to 8 kHz follow trapezoids, S-curves, sweeps and multisines;
 they are logged at 250 Hz to 4 kHz for 20 to 120 s, with the count of an encoder, the noise of a
-force sensor, a command of so many bits, and a clock that jitters. They are simulated by a program
-of its own (`drives_kernel`), and each is judged in a process of its own with a time limit, by
-`fit_plant` and `trace` without the command line.
+force sensor, a command of so many bits, and a clock that jitters. A program of its own simulates
+them (`drives_kernel`), and each is judged in a process of its own with a limit of processor time,
+by `fit_plant` and `trace` without the command line.
 
 `clean`: the nine of `identify` (error over half the 95 % interval, within 1 where it holds), and
-the verdict of `trace`, which should be "none". `effects`, `pairs`: whether `trace` names what is there, first and alone,
-and its held-out error over that of noise (`--truth`: and over that of the true structure).
+the verdict of `trace`, which should be "none". `effects`, `pairs`: whether `trace` names what is
+there, first and alone, and its held-out error over that of noise (`--truth`: and over that of the
+true structure).
 `strange`: effects that no library has, where "unknown" is right. `lacking`: the intervals of the
 nine from a log with an effect that the model lacks. Seeds below 500 serve to choose, the others to
 judge. Exit status 0 in any case.
@@ -22,6 +23,7 @@ judge. Exit status 0 in any case.
 import argparse
 import json
 import os
+import signal
 import subprocess
 import sys
 import time
@@ -91,23 +93,22 @@ def cases(given: argparse.Namespace) -> Iterator[Case]:
 
 
 def child(case: Case, given: argparse.Namespace, asked: str, keys: Sequence[str]) -> dict[str, Any]:
-    """The answer of a process of its own, which is ended when it takes too long."""
-    what = [case.family, "+".join(case.effects), str(case.seed), str(given.strength), asked]
+    """The answer of a process of its own, which the system ends when it takes too long."""
+    what = [case.family, "+".join(case.effects), str(case.seed), str(given.strength)]
+    what += [str(given.limit), asked]
     command = [sys.executable, "-m", "benchmarks.drives_child", *what, *keys]
     paths = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])
     threads = {f"{k}_NUM_THREADS": "1" for k in ("OMP", "OPENBLAS", "MKL")}
-    try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, check=False, timeout=given.limit, cwd=ROOT,
-            env={**os.environ, **threads, "PYTHONPATH": paths},
-        )  # fmt: skip
-    except subprocess.TimeoutExpired as late:
-        lines = (late.stdout or b"").splitlines()
-        so_far = json.loads(lines[-1]) if lines else {}
-        return {**so_far, "failed": f"over {given.limit:g} s"}
-    if done.returncode != 0:
-        return {"failed": done.stderr.strip()[-300:]}
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    done = subprocess.run(
+        command, capture_output=True, text=True, check=False, cwd=ROOT,
+        env={**os.environ, **threads, "PYTHONPATH": paths},
+    )  # fmt: skip
+    lines = done.stdout.splitlines()
+    found: dict[str, Any] = json.loads(lines[-1]) if lines else {}
+    if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
+        found["failed"] = f"over {given.limit:g} s"
+    elif done.returncode != 0:
+        found["failed"] = done.stderr.strip()[-300:]
     return found
 
 
@@ -137,7 +138,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument(
         "--truth", action="store_true", help="trace with the true effects alone too"
     )
-    parser.add_argument("--limit", type=float, default=300.0, help="seconds a process")
+    parser.add_argument("--limit", type=float, default=300.0, help="processor seconds a process")
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument(
         "--out", type=Path, help="lines of JSON are added to it, what it holds is not run again"
