@@ -4,7 +4,8 @@ holds the one before.
     python -m benchmarks.drives_child FAMILY EFFECT[+EFFECT] SEED STRENGTH LIMIT
         fit|trace|both [KEY ...]
 
-LIMIT: processor time [s], after which the system ends the process. KEY: the library cut down to these effects, which gives the held-out error of the true structure.
+LIMIT: processor time [s], after which the system ends the process. KEY: the library cut down to
+these effects, which gives the held-out error of the true structure.
 The simulation is made here too, but estimator and tracer get the logs and the card's rig alone.
 """
 
