@@ -24,7 +24,7 @@ NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
-SHARPEST = 1e-9  # deviation over the value, below which it is rounding and no interval
+LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "held at its default: the logs call for no other value"
 SILENT = "no interval: nothing that these logs show changes with it"
 EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
@@ -72,7 +72,7 @@ def told_estimate(
     distance from a bound that counts as there; beside: of a term of a sum, the size that matters.
     An interval of no width, one wider than the value itself or a value at a bound is not told.
     """
-    if sd is None or not np.isfinite(sd) or not sd > SHARPEST * abs(value):
+    if sd is None or not np.isfinite(sd) or not sd > LEAST_SD * abs(value):
         return Estimate(None, unit, reason=SILENT, assumed=value)
     low, high = interval or (value - NORMAL_95 * sd, value + NORMAL_95 * sd)
     wrong = _beyond(value, bounds)
@@ -204,6 +204,6 @@ def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
         return Estimate(value, p.unit, reason=HELD)
     share = p.name == "asymmetry" or p.name in AT_REST  # of the effect itself
     return told_estimate(
-        value, p.unit, sd, bounds=(p.low, p.high), at_bound=SHARPEST * abs(p.typical or 1.0),
+        value, p.unit, sd, bounds=(p.low, p.high), at_bound=LEAST_SD * abs(p.typical or 1.0),
         beside=1.0 if share else 0.0,
     )  # fmt: skip

@@ -18,7 +18,7 @@ from identification.simulation.free_run import FreeRun, free_run
 from workbench.documents.model import Model
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
-SLIDING = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
+RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
 PREDICTION_COLUMNS = (
     "t",
@@ -115,7 +115,7 @@ def why_no_run(model: Model, drive: Drive) -> str | None:
 
     It needs the mass, the friction of sliding, and by command the actuator: told by the logs.
     """
-    needed = {name: model.friction[name] for name in SLIDING}
+    needed = {name: model.friction[name] for name in RUN_NEEDS}
     if drive == "command":
         needed |= model.actuator or {}
     untold = {name: one for name, one in needed.items() if not one.known}
