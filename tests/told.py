@@ -10,8 +10,11 @@ from identification.model.estimates import Estimate
 AS_ZERO = 1.1e-9  # a plant's smallest parameter
 
 
-def broken(one: Estimate, bounds: tuple[float, float] = (0.0, 0.0)) -> str | None:
-    """What breaks the rule in an estimate, None where nothing does; bounds: where it is at one."""
+def broken(one: Estimate, bounds: tuple[float, float] | None = None) -> str | None:
+    """What breaks the rule in an estimate, None where nothing does.
+
+    bounds: at which it is at one, by default where a plant keeps what comes out 0.
+    """
     return _broken(asdict(one), bounds)
 
 
@@ -19,7 +22,7 @@ def broken_in(document: object, path: str = "") -> Iterator[str]:
     """What breaks the rule in a result: every parameter below, with its path."""
     if isinstance(document, Mapping):
         if {"value", "unit", "sd", "low", "high"} <= set(document):
-            said = _broken(document, (0.0, 0.0))
+            said = _broken(document, None)
             if said:
                 yield f"{path}: {said} ({dict(document)})"
             return
@@ -32,7 +35,7 @@ def broken_in(document: object, path: str = "") -> Iterator[str]:
             yield from broken_in(entry, f"{path}[{number}]")
 
 
-def _broken(one: Mapping[str, Any], bounds: tuple[float, float]) -> str | None:
+def _broken(one: Mapping[str, Any], bounds: tuple[float, float] | None) -> str | None:
     value, low, high = one["value"], one["low"], one["high"]
     if value is None:
         reasoned = one.get("reason") and one.get("assumed") is not None
@@ -45,6 +48,6 @@ def _broken(one: Mapping[str, Any], bounds: tuple[float, float]) -> str | None:
         return "an interval beside its value"
     if high - low > abs(value):
         return "an interval wider than the value"
-    if abs(value) <= AS_ZERO or value in bounds:
+    if abs(value) <= AS_ZERO if bounds is None else value in bounds:
         return "a value at its bound"
     return None
