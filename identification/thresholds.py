@@ -62,7 +62,7 @@ DRIFT_LEAST = 0.01  # of its value, that it changes
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
-WIDEST_SD = 0.3  # deviation over the value, beyond which the value says nothing
+WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain

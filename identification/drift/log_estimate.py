@@ -67,6 +67,6 @@ def allowed_misfit(in_force: float) -> float:
 
 def _of_fit(found: KarnoppFit, allowed: float) -> LogEstimate:
     plant = Plant(found.friction, found.actuator, found.effects)
-    untold = {name: e.reason or "" for name, e in found.estimates.items() if e.value is None}
+    untold = {name: e.reason or "" for name, e in found.estimates.items() if not e.known}
     values = values_of(plant, found.free)
     return LogEstimate(found.free, values, found.covariance, untold, found.chi_square, allowed)

@@ -88,7 +88,7 @@ class InForce:
 
 def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> InForce:
     """The model of a fit as the one in force; fastest [m/s]: speed in its logs, 0 if unknown."""
-    untold = {n: e.reason or "" for n, e in fit.estimates.items() if e.value is None}
+    untold = {n: e.reason or "" for n, e in fit.estimates.items() if not e.known}
     friction = fit.friction
     every = {name: float(getattr(friction, name)) for name in fit.free if hasattr(friction, name)}
     if isinstance(fit.actuator, Actuator):

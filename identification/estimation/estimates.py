@@ -1,7 +1,8 @@
 """What a log can tell of each parameter: events and speeds before, interval widths after.
 
 A number that the log does not support is not given: a parameter without the events that carry it,
-or with an interval as wide as itself, is reported as None with the reason.
+without an interval, with one wider than itself, or at a bound is reported as None with the reason.
+`told_estimate` is that rule, for every command and file: friction, actuator and effects alike.
 """
 
 from collections.abc import Mapping, Sequence
@@ -11,7 +12,7 @@ import numpy as np
 from scipy.stats import norm
 
 from identification.arrays import Array, IntArray
-from identification.effects._base import Acting, Param
+from identification.effects._base import AT_REST, Acting, Param
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
@@ -20,8 +21,13 @@ from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
 
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
-UNTOLD = 1e3  # times a parameter's size, of a deviation from which nothing is known of it
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
+NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
+AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
+LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
+HELD = "held at its default: the logs call for no other value"
+SILENT = "no interval: nothing that these logs show changes with it"
+EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 
 
 @dataclass(frozen=True)
@@ -56,6 +62,55 @@ def events_of(modes: Sequence[IntArray], speeds: Sequence[Array]) -> Events:
     return Events((s0, s1), (c0, c1), (n0, n1), (v0, v1))
 
 
+def told_estimate(
+    value: float, unit: str, sd: float | None, *, interval: tuple[float, float] | None = None,
+    bounds: tuple[float, float] = (-np.inf, np.inf), at_bound: float = AT_ZERO, beside: float = 0.0,
+) -> Estimate:  # fmt: skip
+    """An estimate by the one rule of what is told: a value with its interval, or None and why.
+
+    value, sd, 95 % `interval` (by default a normal spread's) and bounds in `unit`; at_bound:
+    distance from a bound that counts as there; beside: of a term of a sum, the size that matters.
+    An interval of no width, one wider than the value itself or a value at a bound is not told.
+    """
+    if sd is None or not np.isfinite(sd) or not sd > LEAST_SD * abs(value):
+        return Estimate(None, unit, reason=SILENT, assumed=value)
+    low, high = interval or (value - NORMAL_95 * sd, value + NORMAL_95 * sd)
+    wrong = _beyond(value, bounds)
+    where = _bound_of(value, bounds, at_bound)
+    wide = not high - low <= 2.0 * NORMAL_95 * WIDEST_SD * abs(value)
+    if wrong is None and (where == 0.0 or wide) and sd <= SMALL_TERM * beside:
+        most = max(abs(low), abs(high))
+        reason = f"at most {most:.2g}, which is small beside the rest: not told from 0"
+        return Estimate(None, unit, sd, reason=reason, assumed=value, at_most=most)
+    if wrong is None and where is not None:
+        wrong = (
+            "at its bound: the logs cannot tell it from 0"
+            if where == 0.0
+            else f"at its bound {where:.4g}: the logs only say that it lies there or beyond"
+        )
+    if wrong is None and wide:
+        wrong = (
+            f"found {value:.3g}, but the interval {low:.2g} to {high:.2g} is wider than the value:"
+            f" the logs do not tell it; {EXCITE}"
+        )
+    if wrong is not None:
+        return Estimate(None, unit, reason=wrong, assumed=value)
+    return Estimate(value, unit, sd, max(low, bounds[0]), min(high, bounds[1]))
+
+
+def _beyond(value: float, bounds: tuple[float, float]) -> str | None:
+    """Reason where a value lies beyond its bounds, which for most is a matter of sign."""
+    if bounds[0] <= value <= bounds[1]:
+        return None
+    said = "of the wrong sign" if 0.0 in bounds else "which it cannot be"
+    return f"found {value:.3g}, {said}: something else is in this force; see residual"
+
+
+def _bound_of(value: float, bounds: tuple[float, float], reach: float) -> float | None:
+    """The bound at which a value lies, None where it lies at none."""
+    return next((bound for bound in bounds if abs(value - bound) <= reach), None)
+
+
 def estimates(
     names: Sequence[str],
     center: Array,
@@ -73,14 +128,17 @@ def estimates(
         value = float(center[column])
         sd = float(np.std(drawn))
         # The spread of finite samples is itself uncertain: never narrower than 1.96 sd.
-        low = min(float(np.quantile(drawn, 0.025)), value - 1.96 * sd)
-        high = max(float(np.quantile(drawn, 0.975)), value + 1.96 * sd)
-        reason = _missing(name, events, log) or _too_wide(name, value, sd, value_of, events)
+        low = min(float(np.quantile(drawn, 0.025)), value - NORMAL_95 * sd)
+        high = max(float(np.quantile(drawn, 0.975)), value + NORMAL_95 * sd)
+        reason = _missing(name, events, log)
         if reason:
             found[name] = Estimate(None, units[name], reason=reason, assumed=value)
         else:
-            low, high = _signed(name, low, high)
-            found[name] = Estimate(value, units[name], sd, low, high)
+            bounds = (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf)
+            beside = _beside(name, value_of, events)
+            found[name] = told_estimate(
+                value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside
+            )
     return found
 
 
@@ -88,13 +146,6 @@ def normal_samples(values: Array, sd: Array) -> Array:
     """Sets (k, d) of a normal spread about the values (d,), each parameter by itself."""
     quantiles = norm.ppf((np.arange(NORMAL_SETS) + 0.5) / NORMAL_SETS)
     return np.asarray(values + sd * quantiles[:, np.newaxis])
-
-
-def _signed(name: str, low: float, high: float) -> tuple[float, float]:
-    """An interval cut where the model's sign ends."""
-    if name in ("dv_n", "F_sn"):
-        return low, min(high, 0.0)
-    return max(low, 0.0), high
 
 
 def _missing(name: str, events: Events, log: str) -> str | None:
@@ -121,29 +172,16 @@ def _missing(name: str, events: Events, log: str) -> str | None:
     return None
 
 
-def _too_wide(
-    name: str, value: float, sd: float, value_of: Mapping[str, float], events: Events
-) -> str | None:
-    """Reason where the sign is wrong, or the spread as large as what the parameter could mean."""
-    if value * (-1.0 if name in NEGATIVE else 1.0) < 0.0:
-        return (
-            f"found {value:.3g}, of the wrong sign: something else is in this force; see residual"
-        )
-    scale = 0.0
+def _beside(name: str, value_of: Mapping[str, float], events: Events) -> float:
+    """Size at which a term of sliding friction would be as large as the term beside it, 0 where
+    there is none: a viscous term is known where it is surely small beside the Coulomb force."""
     side = 1 if name.endswith("n") else 0
-    coulomb = abs(value_of.get(("F_cp", "F_cn")[side], 0.0))
-    if name.startswith("F_v") and events.fastest[side] > 0:
-        # A viscous term near zero is known when it is small beside the Coulomb force.
-        scale = coulomb / events.fastest[side]
+    fastest = events.fastest[side]
+    if name.startswith("F_v") and fastest > 0:
+        return abs(value_of.get(("F_cp", "F_cn")[side], 0.0)) / fastest
     if name in ("F_cp", "F_cn"):
-        other = abs(value_of.get(("F_vp", "F_vn")[side], 0.0)) * events.fastest[side]
-        scale = other
-    if sd <= max(WIDEST_SD * abs(value), SMALL_TERM * scale):
-        return None
-    return (
-        f"found {value:.3g} with a standard deviation of {sd:.2g}: the log does not tell it;"
-        " excite it more (speeds, reversals, rests) or log for longer"
-    )
+        return abs(value_of.get(("F_vp", "F_vn")[side], 0.0)) * fastest
+    return 0.0
 
 
 def effect_estimates(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, Estimate]:
@@ -157,19 +195,15 @@ def effect_estimates(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict
 
 
 def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
-    """Estimate of an effect's parameter; None where its deviation says that the logs do not."""
-    if untold(sd, value, p.typical):
-        return Estimate(None, p.unit, reason="these logs say nothing of it", assumed=value)
-    return normal(value, p.unit, sd)
+    """Estimate of an effect's parameter from its value and deviation [p.unit].
 
-
-def normal(value: float, unit: str, sd: float | None) -> Estimate:
-    """Estimate with the interval of a normal spread; without a deviation the value was held."""
-    if sd is None:
-        return Estimate(value, unit, reason="held")
-    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
-
-
-def untold(sd: float | None, value: float, typical: float) -> bool:
-    """Whether a deviation is so far beyond its parameter that the logs say nothing of it."""
-    return sd is not None and not sd < UNTOLD * max(abs(value), abs(typical))
+    A part of the law's form that no log has moved from its default is given as that, without an
+    interval: it belongs to the equation.
+    """
+    if p.held(value) and not sd:
+        return Estimate(value, p.unit, reason=HELD)
+    share = p.name == "asymmetry" or p.name in AT_REST  # of the effect itself
+    return told_estimate(
+        value, p.unit, sd, bounds=(p.low, p.high), at_bound=LEAST_SD * abs(p.typical or 1.0),
+        beside=1.0 if share else 0.0,
+    )  # fmt: skip

@@ -38,7 +38,7 @@ ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settl
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
 WHY_NOT = {
-    "m": "inertia explains {share:.1%} of the force, so it is not told apart; log faster motion",
+    "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
     "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
     " add runs at other speeds",
     "stick": "no free run was fitted (see the remarks), and the force equation does not hold it;"
@@ -200,20 +200,23 @@ def _estimates(
 
 
 def imposed_estimates(
-    plant: Plant, sd: Mapping[str, float], recorded: RecordedLogs
+    plant: Plant, theta: Array, sd: Mapping[str, float], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
     """The nine of a plant with effects whose motion is imposed; sd: of the five of sliding.
 
+    theta (5,): these as the equations have them, before a plant takes what is negative as 0.
     The same rules as of a fit along an imposed motion say which of them the logs tell.
     """
     names = [name for name in FIVE if name in sd]
-    values = np.array([float(getattr(plant.friction, name)) for name in names])
+    raw = dict(zip(FIVE, theta.tolist(), strict=True))
+    kept = {name: float(getattr(plant.friction, name)) for name in names}
+    values = np.array([kept[name] if raw[name] > 0.0 else raw[name] for name in names])
     samples = normal_samples(values, np.array([sd[name] for name in names]))
     up = np.concatenate([one.up for one in recorded.logs])
     sliding = (int(np.count_nonzero(up)), int(np.count_nonzero(~up)))
     fastest = float(max(np.max(one.speed, initial=0.0) for one in recorded.logs))
     told = _of_sliding(names, values, samples, sliding, fastest, recorded)
-    return _reasoned(told, plant.friction.array, 0.0, recorded)
+    return _reasoned(told, plant.friction.array, None, recorded)
 
 
 def _of_sliding(
@@ -227,9 +230,11 @@ def _of_sliding(
 
 
 def _reasoned(
-    told: Mapping[str, Estimate], nine: Array, share: float, recorded: RecordedLogs
+    told: Mapping[str, Estimate], nine: Array, share: float | None, recorded: RecordedLogs
 ) -> dict[str, Estimate]:
-    """All nine: those that are told, and why the others are not; share: of the force, inertia's."""
+    """All nine: those that are told, and why the others are not; share: of the force, inertia's,
+    where it is known."""
+    explained = "next to nothing" if share is None else f"{share:.1%}"
     units = ROTARY_UNITS if recorded.rig.motion == "rotary" else UNITS
     out: dict[str, Estimate] = {}
     for key, value in zip(NAMES, nine, strict=True):
@@ -238,6 +243,6 @@ def _reasoned(
             out[key] = one if one.value is not None else replace(one, assumed=float(value))
             continue
         kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
-        reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=share)
+        reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)
         out[key] = Estimate(None, units[key], reason=reason, assumed=float(value))
     return out

@@ -13,6 +13,7 @@ from identification.estimation.plain_search.local_search import pack, refine
 from identification.estimation.plain_search.problem import pose
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
+from identification.model.plant import Actuator
 from identification.simulation.karnopp_step import K2, kernel_parameters
 
 POSTERIOR_WALKERS = 64
@@ -62,7 +63,8 @@ def sample_posterior(
     problem = pose(logs, rig, fit.drive)
     k1, k2 = 0.0, float(problem.row[K2])
     if problem.drive == "command":
-        k1, k2 = (float(fit.estimates[name].value or 0.0) for name in ("k1", "k2"))
+        assert isinstance(fit.actuator, Actuator)
+        k1, k2 = fit.actuator.k1, fit.actuator.k2
     row = kernel_parameters(fit.friction.array, k1, k2)
     optimum = refine(problem.long_runs, row, problem.free)
     runs = optimum.runs(problem.long_runs)

@@ -8,7 +8,6 @@ import numpy as np
 from identification.arrays import Array
 from identification.effects._base import AT_REST, Acting, Effect
 from identification.errors import UserError
-from identification.estimation.estimates import untold
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
@@ -61,6 +60,7 @@ OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 WIDEST_BAND = 0.4  # of the median speed of sliding, that the band can be at most
 EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
+LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
 QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
@@ -260,9 +260,14 @@ def _of_effect(
         elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
             unheard.append(f"{effect.key}.{p.name}")
             values[p.name] = float(np.clip(0.0, p.low, p.high))
-        elif untold(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
+        elif lost(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
             values[p.name] = float(np.clip(0.0, p.low, p.high))
     return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unheard
+
+
+def lost(sd: float | None, value: float, typical: float) -> bool:
+    """Whether a deviation is so far beyond its parameter that no search should begin from it."""
+    return sd is not None and not sd < LOST * max(abs(value), abs(typical))
 
 
 def _limit(coulomb: float, held: float) -> float:

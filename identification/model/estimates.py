@@ -19,7 +19,9 @@ class Estimate:
     """One parameter: value, unit, standard deviation, 95 % interval [low, high].
 
     `value` is None where the log does not identify it: `reason` then says why, and `assumed` is
-    the value that simulations use in its place.
+    the value that simulations use in its place. at_most: where all that the log tells is that the
+    parameter is small, the size that it leaves to it. A value without an interval is no estimate
+    but given, as `reason` says.
     """
 
     value: float | None
@@ -29,6 +31,12 @@ class Estimate:
     high: float | None = None
     reason: str | None = None
     assumed: float | None = None
+    at_most: float | None = None
+
+    @property
+    def known(self) -> bool:
+        """Whether it is told: its value, or that it is too small to matter."""
+        return self.value is not None or self.at_most is not None
 
 
 @dataclass(frozen=True)

@@ -156,7 +156,7 @@ def parameters_of(model: FittedStructure, recorded: RecordedLogs) -> dict[str, E
     if model.fit is not None:
         return {k: e for k, e in model.fit.estimates.items() if "." not in k}
     if model.imposed:
-        return imposed_estimates(model.plant, model.sd, recorded)
+        return imposed_estimates(model.plant, model.stage.theta, model.sd, recorded)
     return structure_estimates(model.plant, model.sd, recorded)
 
 

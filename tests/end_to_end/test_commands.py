@@ -97,6 +97,7 @@ def test_predict_writes_the_columns_of_the_contract(
     model, out = str(shop / "id/model.json"), str(tmp_path / "p")
     found = as_json(capsys, ["predict", model, log, "--card", card, "--out", out])
     assert found["position_rms"] < 5e-4
+    assert found["run_refused"] is None
     with (tmp_path / "p/prediction.csv").open(encoding="utf-8") as file:
         rows = list(csv.reader(file))
     assert rows[0] == [
@@ -110,6 +111,34 @@ def test_predict_writes_the_columns_of_the_contract(
     assert len(rows) == 3002
     by_force = ["predict", model, log, "--card", card, "--drive", "force", "--window", "0.5"]
     assert as_json(capsys, [*by_force, "--out", out])["drive"] == "force"
+
+
+def test_predict_by_a_model_without_a_mass_gives_the_force_and_refuses_the_run(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Status 0: a run by an assumed mass may end kilometres off, but the force is predicted."""
+    card, log = str(shop / "card.toml"), str(shop / "log/short.csv")
+    model = json.loads((shop / "id/model.json").read_text(encoding="utf-8"))
+    blank = {"value": None, "unit": "kg", "reason": "log faster motion", "assumed": 1e-9}
+    model["friction"]["m"] = blank
+    (tmp_path / "model.json").write_text(json.dumps(model), encoding="utf-8")
+    command = ["predict", str(tmp_path / "model.json"), log, "--card", card]
+    for drive in ([], ["--drive", "force"], ["--drive", "command", "--window", "0.5"]):
+        found = as_json(capsys, [*command, *drive, "--out", str(tmp_path / "p")])
+        assert found["run_refused"].startswith("no free run: the model does not tell m, which a")
+        assert "(m: log faster motion)" in found["run_refused"]
+        assert found["position_rms"] is None and found["force_simulated_rms"] is None
+        assert found["force_predicted_rms"] > 0
+        assert "force by assumed values of what no log told: m" in found["remarks"]
+    with (tmp_path / "p/prediction.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 3001
+    assert {row["position_simulated"] for row in rows} == {""}
+    assert all(row["force_predicted"] for row in rows)
+    assert main([*command, "--out", str(tmp_path / "p")]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("position: no free run: the model does not tell m")
+    assert "force, inverse model:" in shown
 
 
 def test_effects_go_from_the_recipe_to_the_log_and_from_the_model_to_the_prediction(

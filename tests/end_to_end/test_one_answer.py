@@ -12,6 +12,7 @@ from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.tracing.trace import trace
+from tests.told import broken
 from workbench.cards.card import load_card
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import read_sources
@@ -44,6 +45,7 @@ def test_of_a_recipe_without_effects(name: str, signals: tuple[str, ...]) -> Non
     seen = Log(name, {key: log[key] for key in signals})
     told, traced = both([seen], Rig("force"), built_in())
     assert told == traced
+    assert [said for one in told.values() if (said := broken(one))] == []
     assert any(one.value is not None for one in told.values())
 
 
@@ -62,4 +64,4 @@ def test_of_a_measured_set(
         logs = [log.with_signals(F=log["u"]) for log in logs]
     told, traced = both(logs, rig, {})
     assert told == traced
-    assert all(one.value is not None or one.reason for one in told.values())
+    assert [said for one in told.values() if (said := broken(one))] == []

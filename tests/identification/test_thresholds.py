@@ -471,9 +471,9 @@ def test_events_needed(name: str) -> None:
 
 
 def test_widest_sd() -> None:
-    """A value as unsure as this is not given."""
-    assert told("F_sp", 0.24, 9)
-    assert not told("F_sp", 0.375, 9)
+    """A value with an interval wider than itself is not given."""
+    assert told("F_sp", 0.204, 9)
+    assert not told("F_sp", 0.319, 9)
 
 
 def test_speeds_apart() -> None:

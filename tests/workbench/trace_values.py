@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 from identification.effects._library import built_in
+from identification.estimation.estimates import of_effect
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
@@ -52,7 +53,9 @@ def estimate(value: float, unit: str) -> Estimate:
 
 def found_effect(key: str) -> FoundEffect:
     effect = built_in()[key]
-    params = {p.name: estimate(VALUES[key][p.name], p.unit) for p in effect.params}
+    values = VALUES[key]
+    sd = {name: 0.01 * abs(value) for name, value in values.items()}
+    params = {p.name: of_effect(p, values[p.name], sd[p.name]) for p in effect.params}
     return FoundEffect(effect, params, 0.987, 0.005)
 
 

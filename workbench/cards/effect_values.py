@@ -76,7 +76,9 @@ def estimates_in_si(
 
     def value(name: str) -> float:
         found = estimates.get(name)
-        return 1.0 if found is None or found.value is None else found.value
+        if found is None or found.value is None:
+            return 1.0 if found is None or found.assumed is None else found.assumed
+        return found.value
 
     out: dict[str, Estimate] = {}
     for name, found in estimates.items():

@@ -63,6 +63,7 @@ def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:
         low=si(estimate.low),
         high=si(estimate.high),
         assumed=si(estimate.assumed),
+        at_most=None if estimate.at_most is None else found.factor * estimate.at_most,
     )
 
 

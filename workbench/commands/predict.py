@@ -41,7 +41,9 @@ def command(
     """Predict force and position of a log by a model and its effects; nothing is fitted on it.
 
     Writes prediction.csv: t, force_applied, force_predicted (inverse model), force_simulated
-    (actuator driven by the command), position_measured, position_simulated (free run).
+    (actuator driven by the command), position_measured, position_simulated (free run). The force
+    is predicted also where the model does not tell what a free run needs (mass, friction of
+    sliding, by command the actuator); then `run_refused` says so.
     """
     from identification.errors import BadModel
     from workbench.cards.own_effects import library
@@ -60,12 +62,16 @@ def command(
         with progress("predicting", as_json=as_json):
             found = [predict(model, s.log, drive=drive, window=window) for s in sources.runs]
         folder.write_text("prediction.csv", prediction_csv(found))
-    remarks = (*model.read, *sources.remarks, *_other_card(model.card, sources.card.name))
+    of_runs = dict.fromkeys(line for one in found for line in one.remarks)
+    other_card = _other_card(model.card, sources.card.name)
+    remarks = (*model.read, *sources.remarks, *other_card, *of_runs)
+    refused = dict.fromkeys(one.refused for one in found if one.refused is not None)
     summary = {
         "drive": found[0].drive,
         "window": window,
         "samples": sum(len(one.t) for one in found),
         **_errors(found),
+        "run_refused": "; ".join(refused) or None,
         "remarks": remarks,
         "out": folder.final,
     }
@@ -100,7 +106,12 @@ def _lines(summary: Mapping[str, object], rotary: bool, remarks: tuple[str, ...]
     by = "the command" if summary["drive"] == "command" else "the applied force"
     window = summary["window"]
     start = "free run" if window is None else f"restarted every {window} s"
-    lines = [f"position ({start}, driven by {by}): {summary['position_rms']:.4g} {length} rms"]
+    lines = []
+    if summary["position_rms"] is not None:
+        rms = f"{summary['position_rms']:.4g} {length} rms"
+        lines.append(f"position ({start}, driven by {by}): {rms}")
+    if summary["run_refused"] is not None:
+        lines.append(f"position: {summary['run_refused']}")
     if summary["force_predicted_rms"] is not None:
         rms = f"{summary['force_predicted_rms']:.4g} {force} rms"
         lines.append(f"force, inverse model: {rms} while sliding, outside the stick band")

@@ -212,7 +212,7 @@ class Model(ModelFile):
     @property
     def assumed(self) -> tuple[str, ...]:
         """Names of the nine that no log told."""
-        return tuple(name for name in NAMES if self.friction[name].value is None)
+        return tuple(name for name in NAMES if not self.friction[name].known)
 
     @property
     def travel(self) -> tuple[float, float]:
@@ -281,12 +281,12 @@ def _fields_of(model: ModelFile) -> dict[str, Any]:
 
 
 def as_number(estimate: Estimate) -> dict[str, Any]:
-    """One parameter as results carry it; `reason` and `assumed` only where they say something."""
+    """One parameter as results carry it; beside value and interval only what says something."""
     number = asdict(estimate)
     return {
         key: value
         for key, value in number.items()
-        if value is not None or key not in ("reason", "assumed")
+        if value is not None or key not in ("reason", "assumed", "at_most")
     }
 
 
@@ -359,12 +359,8 @@ def _posterior_in_si(
     for name, one in _intervals(posterior).items():
         if name not in units:
             raise BadModel(f"[posterior.parameters] unknown parameter {name!r}")
-        found[name] = asdict(in_unit(one, units[name], f"[posterior.parameters.{name}]"))
-    kept = ("value", "unit", "sd", "low", "high")
-    return {
-        **posterior,
-        "parameters": {name: {key: one[key] for key in kept} for name, one in found.items()},
-    }
+        found[name] = as_number(in_unit(one, units[name], f"[posterior.parameters.{name}]"))
+    return {**posterior, "parameters": found}
 
 
 def _intervals(posterior: Mapping[str, Any] | None) -> dict[str, Estimate]:

@@ -10,7 +10,7 @@ from scipy.stats import norm
 from identification.drift.reference_model import FORCES
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.logs.sources import Sources
 from workbench.steps.identify import identify
 
@@ -91,13 +91,14 @@ def drift_by_refit(
 def _change(name: str, model: Model, now: Estimate) -> Moved | None:
     """The change of one parameter; None where one side does not tell it."""
     before = model.friction[name]
-    if before.value is None or now.value is None or now.sd is None:
+    if not (before.known and now.known) or now.sd is None:
         return None
-    scale = abs(before.value)
+    was, found = used(before), used(now)
+    scale = abs(was)
     if name in FORCES:
         largest = max(abs(getattr(model.karnopp, force)) for force in FORCES)
         scale = max(scale, 0.1 * largest)
-    beyond = abs(now.value - before.value) - PRACTICAL_MARGIN * scale
+    beyond = abs(found - was) - PRACTICAL_MARGIN * scale
     sd = float(np.hypot(now.sd, before.sd or 0.0))
     p_value = 1.0 if beyond <= 0 else float(2.0 * norm.sf(beyond / sd)) if sd > 0 else 0.0
-    return Moved(name, before.unit, before.value, now.value, p_value)
+    return Moved(name, before.unit, was, found, p_value)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from identification.drift.drift_test import Shift, Statistic
+from identification.estimation.estimates import told_estimate
 from workbench.output import Row, table, written
 from workbench.steps.drift import Drifted, Tested
 
@@ -80,7 +81,9 @@ def shift_rows(one: Tested) -> list[Row]:
 
 def _shift_row(shift: Shift) -> Row:
     interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
-    before, after = f"{shift.before:.4g}", f"{shift.after:.4g}"
+    pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
+    told = [told_estimate(value, shift.unit, sd).value for value, sd in pairs]
+    before, after = ("-" if value is None else f"{value:.4g}" for value in told)
     return (shift.name, before, after, shift.unit, signed_percent(shift.change), interval)
 
 

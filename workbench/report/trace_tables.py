@@ -26,7 +26,6 @@ DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
 MOST = 1000.0  # change shown [%]
 FLOOR = 1.0 / (DRAWS + 1)  # least chance that draws can show
-COUNTS_AS_ZERO = 1.1e-9  # value that a plant keeps of a parameter that comes out 0
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
@@ -233,8 +232,6 @@ def effect_rows(found: Trace, motion: Motion) -> list[Row]:
         estimates = effect_estimates(e, motion)
         for p in e.effect.params:
             value, interval = _value_cells(estimates[p.name])
-            if estimates[p.name].value in (p.low, p.high):
-                interval = "at its bound"
             unit = "" if p.unit == "1" else estimates[p.name].unit
             out.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
     return out
@@ -244,10 +241,8 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
     """Value and interval, with the digits that mean something."""
     if estimate.value is None:
         return "-", estimate.reason or "not identified"
-    if 0.0 < abs(estimate.value) <= COUNTS_AS_ZERO:
-        return "0", "at its bound"
-    if estimate.low is None or estimate.high is None or not estimate.sd:
-        return f"{estimate.value:.4g}", estimate.reason or "held"
+    if estimate.low is None or estimate.high is None:
+        return f"{estimate.value:.4g}", estimate.reason or "no interval"
     numbers = (estimate.value, estimate.low, estimate.high)
     value, low, high = in_digits(numbers, estimate.value, estimate.sd)
     return value, f"{low} to {high}"

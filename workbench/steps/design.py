@@ -11,6 +11,7 @@ from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
+from identification.estimation.estimates import told_estimate
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
 from workbench.cards.parameter_units import Shown, shown
@@ -27,7 +28,6 @@ from workbench.documents.model import Model, used, versions
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.steps.identify import check_period
 
-NORMAL_95 = 1.96  # standard deviations to either side that hold 95 %
 DEFAULT_PERIOD = 10e-3  # s, the paper's rig
 FINEST = 20  # times faster than its logs that a controller may be designed
 N_C = 2.0  # the paper's, in simulation and on the rig
@@ -173,14 +173,14 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
         known = f"the mass is identified, {' and '.join(names)} assumed"
     inside = "with the force as its input"
     if force:
-        told = all(e.value is not None for e in (model.actuator or {}).values())
+        told = all(e.known for e in (model.actuator or {}).values())
         actuator = "the actuator" if told else "an actuator of assumed k1 and k2"
         inside = f"with {actuator} and its force loop"
     return f"{known}: sliding body, {inside}, sampled exactly"
 
 
 def _unknown_viscous(model: Model) -> list[str]:
-    return [name for name in ("F_vp", "F_vn") if model.friction[name].value is None]
+    return [name for name in ("F_vp", "F_vn") if not model.friction[name].known]
 
 
 def linear_plant_of(machine: Model, found: Design) -> Linear:
@@ -230,10 +230,9 @@ def _viscous(model: Model) -> Estimate:
     if unknown := _unknown_viscous(model):
         reason = f"{' and '.join(unknown)} not identified"
         return Estimate(None, one.unit, reason=reason, assumed=mean)
-    sd = None if one.sd is None or other.sd is None else 0.5 * math.hypot(one.sd, other.sd)
-    spread = None if sd is None else NORMAL_95 * sd
-    low, high = (None, None) if spread is None else (mean - spread, mean + spread)
-    return Estimate(mean, one.unit, sd, low, high)
+    if one.sd is None or other.sd is None:
+        return Estimate(mean, one.unit)
+    return told_estimate(mean, one.unit, 0.5 * math.hypot(one.sd, other.sd))
 
 
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
@@ -319,12 +318,21 @@ def corners(
     if plant.source == "arx":
         return ()
     m, viscous = model.friction["m"], (model.friction["F_vp"], model.friction["F_vn"])
-    masses = [used(m) if limit is None else limit for limit in (m.low, m.high)]
-    least = min(used(v) if v.low is None else v.low for v in viscous)
-    most = max(used(v) if v.high is None else v.high for v in viscous)
+    ends = [_ends(v) for v in viscous]
+    least, most = min(low for low, _ in ends), max(high for _, high in ends)
     return tuple(
-        _physical(mass, f, plant.h, model, force) for mass in masses for f in (max(least, 0), most)
+        _physical(mass, f, plant.h, model, force)
+        for mass in _ends(m)
+        for f in (max(least, 0), most)
     )
+
+
+def _ends(found: Estimate) -> tuple[float, float]:
+    """Interval of a parameter; that of its assumed value where there is none."""
+    if found.at_most is not None:
+        return 0.0, found.at_most
+    low, high = (used(found) if end is None else end for end in (found.low, found.high))
+    return low, high
 
 
 def _compensator(model: Model) -> CompensatorValues:

@@ -20,6 +20,7 @@ from identification.drift.drift_test import (
 from identification.drift.mewma import DriftState
 from identification.drift.reference_model import InForce
 from identification.errors import BadModel
+from identification.estimation.estimates import told_estimate
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
@@ -94,7 +95,7 @@ def model_in_force(model: Model, key: str) -> InForce:
         every |= model.actuator or {}
     for effect, found in model.effects.items():
         every |= {f"{effect}.{name}": estimate for name, estimate in found.items()}
-    told = {n: e for n, e in every.items() if e.value is not None and e.sd is not None}
+    told = {n: e for n, e in every.items() if e.known and e.sd is not None}
     why = "it gives no standard deviation"
     untold = {n: e.reason or why for n, e in every.items() if n not in told}
     return InForce(
@@ -246,7 +247,7 @@ def _number(shift: Shift) -> dict[str, Any]:
 
 
 def _estimate(value: float, sd: float, unit: str) -> Estimate:
-    return Estimate(value, unit, sd, value - 1.96 * sd, value + 1.96 * sd)
+    return told_estimate(value, unit, sd)
 
 
 def _statistic(found: Statistic | None) -> dict[str, Any] | None:

@@ -5,8 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from identification.estimation.estimates import told_estimate
 from identification.model.estimates import KarnoppFit
-from workbench.documents.model import Model
+from identification.model.karnopp import NEGATIVE
+from workbench.documents.model import Model, as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
@@ -63,8 +65,14 @@ def _posterior(
         rig=sources.rig,
         on_progress=lambda share: report("posterior", share),
     )
-    spread = np.std(found.samples, axis=0)
-    intervals = found.interval()
+    spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
+    told = {
+        name: told_estimate(
+            median, fit.estimates[name].unit, spread[name], interval=(low, high),
+            bounds=(-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf),
+        )
+        for name, (low, median, high) in found.interval().items()
+    }  # fmt: skip
     return {
         "converged": found.converged,
         "verdict": found.verdict,
@@ -72,14 +80,5 @@ def _posterior(
         "acceptance": found.acceptance,
         "walkers": found.walkers,
         "steps": found.steps,
-        "parameters": {
-            name: {
-                "value": intervals[name][1],
-                "unit": fit.estimates[name].unit,
-                "sd": float(sd),
-                "low": intervals[name][0],
-                "high": intervals[name][2],
-            }
-            for name, sd in zip(found.names, spread, strict=True)
-        },
+        "parameters": {name: as_number(one) for name, one in told.items()},
     }

@@ -18,6 +18,7 @@ from identification.simulation.free_run import FreeRun, free_run
 from workbench.documents.model import Model
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
+RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
 PREDICTION_COLUMNS = (
     "t",
@@ -35,7 +36,8 @@ class Prediction:
 
     sliding: True outside the stick band, where the inverse model predicts the force; inside it
     repeats the applied one. drive: what drove the position; the errors are root mean squares [N],
-    [m], None where empty.
+    [m], None where empty. refused: why there is no free run, so that position_simulated is NaN;
+    None where there is one. remarks: a line each on what the numbers rest on.
     """
 
     t: Array
@@ -46,10 +48,14 @@ class Prediction:
     position_simulated: Array
     sliding: NDArray[np.bool_]
     drive: Drive
+    refused: str | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
-    def position_rms(self) -> float:
-        """Root mean square of measured less simulated position."""
+    def position_rms(self) -> float | None:
+        """Root mean square of measured less simulated position; None without a run."""
+        if self.refused is not None:
+            return None
         return _rms(self.position_measured - self.position_simulated)
 
     @property
@@ -69,7 +75,8 @@ def predict(
     """What the model says of a log on an even clock, effects included; nothing is fitted on it.
 
     drive: by default the command where the model has an identified actuator and the log a command.
-    window [s]: the run starts anew from the measured state after each. Raises BadModel, BadLog.
+    window [s]: the run starts anew from the measured state after each. The force is predicted also
+    where the model cannot be run (`why_no_run`). Raises BadModel, BadLog.
     """
     if window is not None and not window >= 20 * log.h:
         raise BadModel(f"window {window:g} s, at least 20 samples ({20 * log.h:g} s) needed")
@@ -84,17 +91,65 @@ def predict(
     how = Smoothing(held=model.rig.kind == "motor")
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
-    run = free_run(plant, log, measured_start(body), chosen, restarts=restarts)
+    run, refused = _run(model, log, body, chosen, restarts)
+    simulated, other = (run, None) if chosen == "command" else _commanded(model, body, restarts)
     return Prediction(
         t=log["t"],
         force_applied=applied,
         force_predicted=force_needed(body, plant, how),
-        force_simulated=run.F if chosen == "command" else _commanded(model, body, restarts, blank),
+        force_simulated=blank if simulated is None else simulated.F,
         position_measured=log["y"],
-        position_simulated=run.shown,
+        position_simulated=blank if run is None else run.shown,
         sliding=_sliding(body, model, how),
         drive=chosen,
+        refused=refused,
+        remarks=(
+            *_assumed(model, ran=run is not None),
+            *([] if other is None else [f"force, simulated: {other}"]),
+        ),
     )
+
+
+def why_no_run(model: Model, drive: Drive) -> str | None:
+    """Why a free run by this drive would say nothing of the machine, None where it would.
+
+    It needs the mass, the friction of sliding, and by command the actuator: told by the logs.
+    """
+    needed = {name: model.friction[name] for name in RUN_NEEDS}
+    if drive == "command":
+        needed |= model.actuator or {}
+    untold = {name: one for name, one in needed.items() if not one.known}
+    if not untold:
+        return None
+    name, first = next(iter(untold.items()))
+    by = "the command" if drive == "command" else "the force"
+    return (
+        f"no free run: the model does not tell {', '.join(untold)}, which a run by {by} needs"
+        f" ({name}: {first.reason})"
+    )
+
+
+def _run(
+    model: Model, log: Log, body: Log, drive: Drive, restarts: tuple[IntArray, Array, Array] | None
+) -> tuple[FreeRun | None, str | None]:
+    """The free run of the log from the measured state of its body, or None and why not."""
+    refused = why_no_run(model, drive)
+    if refused is not None:
+        return None, refused
+    try:
+        run = free_run(model.simulated, log, measured_start(body), drive, restarts=restarts)
+    except BadModel as error:  # the force is predicted all the same
+        return None, f"no free run: {error}"
+    return run, None
+
+
+def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
+    """A line where the numbers rest on values that no log told."""
+    names = [*model.assumed]
+    for key, found in model.effects.items():
+        names += [f"{key}.{name}" for name, one in found.items() if not one.known]
+    what = "force and run" if ran else "force"
+    return (f"{what} by assumed values of what no log told: {', '.join(names)}",) if names else ()
 
 
 def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
@@ -105,7 +160,7 @@ def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
 
 def default_drive(model: Model, log: Log) -> Drive:
     """The command where the actuator is known and the command logged, else the force."""
-    known = model.actuator is not None and all(e.value is not None for e in model.actuator.values())
+    known = model.actuator is not None and all(e.known for e in model.actuator.values())
     return "command" if known and "u" in log else "force"
 
 
@@ -141,12 +196,12 @@ def _with_force(log: Log, model: Model) -> Log:
 
 
 def _commanded(
-    model: Model, log: Log, restarts: tuple[IntArray, Array, Array] | None, blank: Array
-) -> Array:
-    """Force of the actuator driven by the command, where there are both."""
-    if model.actuator is None or "u" not in log:
-        return blank
-    return free_run(model.simulated, log, measured_start(log), "command", restarts=restarts).F
+    model: Model, body: Log, restarts: tuple[IntArray, Array, Array] | None
+) -> tuple[FreeRun | None, str | None]:
+    """The run by the command beside that by force, where there are actuator and command."""
+    if model.actuator is None or "u" not in body:
+        return None, None
+    return _run(model, body, body, "command", restarts)
 
 
 def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:

@@ -67,13 +67,16 @@ def test_a_wide_interval_silences_a_parameter() -> None:
     assert found["dv_p"].assumed == table(1).dv_p
 
 
-def test_a_viscous_term_that_is_surely_small_is_an_answer() -> None:
+def test_of_a_viscous_term_that_is_surely_small_its_largest_size_is_told() -> None:
     center, samples = table(1).array.copy(), spread(0.001)
     center[3] = 0.1
     samples[:, 3] = np.abs(0.1 + 0.1 * np.random.default_rng(3).standard_normal(len(samples)))
     found = estimates(NAMES, center, samples, PLENTY, False, "log")
-    assert found["F_vp"].value == 0.1
-    assert found["F_vp"].low == 0.0
+    small = found["F_vp"]
+    assert small.value is None and small.known
+    assert small.assumed == 0.1
+    assert small.at_most == pytest.approx(0.1 + 1.96 * 0.1, rel=0.3)
+    assert small.reason is not None and "small" in small.reason
 
 
 def test_rotary_units() -> None:

@@ -207,7 +207,8 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     log = record("other", recipe, seed=99)
     found = predict(identified().model, log)
     assert found.drive == "command"
-    assert found.position_rms < 2e-4
+    assert found.refused is None and found.remarks == ()
+    assert found.position_rms is not None and found.position_rms < 2e-4
     assert found.force_simulated_rms is not None and found.force_simulated_rms < 0.03
     header, first, *_ = prediction_csv([found]).splitlines()
     assert header == ",".join(PREDICTION_COLUMNS)
@@ -221,6 +222,7 @@ def test_a_prediction_by_force_drifts_less_in_windows() -> None:
     free = predict(model, log, drive="force")
     windows = predict(model, log, drive="force", window=0.5)
     assert free.drive == "force"
+    assert windows.position_rms is not None and free.position_rms is not None
     assert windows.position_rms < free.position_rms
     with pytest.raises(BadModel, match="window"):
         predict(model, log, window=1e-3)
@@ -235,6 +237,49 @@ def test_a_prediction_without_a_command_leaves_its_column_empty() -> None:
     assert prediction_csv([found]).splitlines()[1].split(",")[3] == ""
     with pytest.raises(BadLog, match="no command u"):
         predict(identified().model, bare, drive="command")
+
+
+@pytest.mark.parametrize("name", ["m", "F_cp", "F_vn"])
+def test_without_what_a_run_needs_the_force_alone_is_predicted(name: str) -> None:
+    model, log = identified().model, identified().sources[0].log
+    one = model.friction[name]
+    blank = Estimate(None, one.unit, reason="too slow", assumed=one.value)
+    found = predict(replace(model, friction={**model.friction, name: blank}), log)
+    assert found.refused is not None
+    assert f"does not tell {name}, which a run by the command needs" in found.refused
+    assert f"({name}: too slow)" in found.refused
+    assert found.position_rms is None and found.force_simulated_rms is None
+    assert found.force_predicted_rms == predict(model, log).force_predicted_rms
+    assert found.remarks == (f"force by assumed values of what no log told: {name}",)
+    assert prediction_csv([found]).splitlines()[1].endswith(",")
+
+
+def test_a_friction_that_is_surely_small_keeps_no_run_back() -> None:
+    model, log = identified().model, identified().sources[0].log
+    small = Estimate(None, "N s/m", 1.0, reason="small", assumed=200.0, at_most=202.0)
+    found = predict(replace(model, friction={**model.friction, "F_vn": small}), log)
+    assert found.refused is None and found.position_rms is not None
+
+
+def test_without_an_actuator_that_is_told_the_force_drives() -> None:
+    model, log = identified().model, identified().sources[0].log
+    blank = Estimate(None, "N/(V s)", reason="no linear actuator", assumed=ACTUATOR.k1)
+    vague = replace(model, actuator={**(model.actuator or {}), "k1": blank})
+    found = predict(vague, log)
+    assert found.drive == "force" and found.refused is None
+    assert found.force_simulated_rms is None
+    assert "force, simulated: no free run: the model does not tell k1" in found.remarks[0]
+    refused = predict(vague, log, drive="command").refused
+    assert refused is not None and "k1: no linear actuator" in refused
+
+
+def test_a_run_that_is_lost_leaves_the_force() -> None:
+    """A stiff body on a long sample: its run comes to no number."""
+    model, log = identified().model, identified().sources[0].log
+    light = replace(model.friction["m"], value=1e-12, low=1e-13, high=1e-11)
+    found = predict(replace(model, friction={**model.friction, "m": light}), log, drive="force")
+    assert found.refused is not None and found.refused.startswith("no free run: short: the simul")
+    assert found.force_predicted_rms is not None
 
 
 def test_a_prediction_does_not_change_the_log() -> None:

@@ -10,6 +10,7 @@ import pytest
 from identification.errors import BadModel
 from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
+from tests.told import broken_in
 from workbench.cli import main
 from workbench.documents.model import ParameterCorrelation, model_document, read_model
 from workbench.output import dumps
@@ -47,6 +48,7 @@ def test_no_drift_is_status_0_and_a_report(shop: Path, tmp_path: Path) -> None:
     after = log["parameters"]["F_cp"]["after"]
     assert after["low"] < 12.0 < after["high"]
     assert set(after) == {"value", "unit", "sd", "low", "high"}
+    assert list(broken_in(found)) == []
     report = (tmp_path / "d/report.html").read_text(encoding="utf-8")
     assert "<svg" in report and "No drift" in report
 

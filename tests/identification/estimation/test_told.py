@@ -1,0 +1,128 @@
+"""One rule of what is told: no value without an interval, with one too wide, or at a bound."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from identification.effects._base import Acting, Param
+from identification.effects._library import built_in
+from identification.estimation.estimates import (
+    HELD,
+    Events,
+    effect_estimates,
+    estimates,
+    normal_samples,
+    of_effect,
+    told_estimate,
+)
+from identification.model.karnopp import NAMES, NEGATIVE
+from tests.conftest import ROOT
+from tests.told import broken
+
+PLENTY = Events((10, 10), (10, 10), (1000, 1000), (0.5, 0.5))
+RULE = "identification/estimation/estimates.py"
+DIFFERENCES = {"workbench/steps/drift.py"}  # a change holds 0 in its interval where nothing moved
+PARAMS = [(key, p) for key, effect in sorted(built_in().items()) for p in effect.params]
+
+sizes = st.one_of(st.sampled_from([0.0, 1e-9, 1e-3, 1.0]), st.floats(0.0, 1e7))
+deviations = st.one_of(st.none(), st.sampled_from([0.0, np.inf, np.nan]), st.floats(0.0, 1e8))
+
+
+@given(
+    sizes, deviations, st.booleans(), st.floats(0.0, 1e5), st.floats(0.1, 3.0), st.floats(0.1, 3.0)
+)
+@example(1e-9, 2.35, False, 0.0, 1.0, 1.0)  # as a mass came out: 1e-9, -4.6 to 4.6
+@example(1e-9, 0.0, False, 0.0, 1.0, 1.0)  # as a stick limit: 1e-9 to 1e-9
+@example(2.5, 9.9, False, 0.0, 1.0, 1.0)  # -17 to 22
+@example(0.1, 0.1, False, 2.4, 1.0, 1.0)
+def test_no_estimate_breaks_the_rule(
+    size: float, sd: float | None, negative: bool, beside: float, below: float, above: float
+) -> None:
+    value = -size if negative else size
+    bounds = (-np.inf, 0.0) if negative else (0.0, np.inf)
+    one = told_estimate(value, "N", sd, bounds=bounds, beside=beside)
+    assert broken(one) is None
+    if sd is not None and np.isfinite(sd):
+        skewed = (value - below * 1.96 * sd, value + above * 1.96 * sd)
+        one = told_estimate(value, "N", sd, interval=skewed, bounds=bounds, beside=beside)
+        assert broken(one) is None
+    assert one.at_most is None or one.value is None
+    assert one.known or one.reason
+
+
+@given(st.lists(st.tuples(sizes, st.floats(0.0, 1e4)), min_size=9, max_size=9))
+def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> None:
+    sign = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
+    center = sign * np.array([size for size, _ in drawn])
+    samples = normal_samples(center, np.array([sd for _, sd in drawn]))
+    for one in estimates(NAMES, center, samples, PLENTY, False, "log").values():
+        assert broken(one) is None
+
+
+@pytest.mark.parametrize(("key", "p"), PARAMS, ids=[f"{key}.{p.name}" for key, p in PARAMS])
+@given(share=st.floats(0.0, 1.0), wide=st.floats(1e-6, 10.0))
+def test_no_estimate_of_an_effect_breaks_it(key: str, p: Param, share: float, wide: float) -> None:
+    drawn = p.low + share * (min(p.high, 100.0 * abs(p.typical) + 1.0) - p.low)
+    for value in (p.low, p.high, p.typical, float(np.clip(0.0, p.low, p.high)), drawn):
+        for sd in (None, 0.0, np.inf, wide * max(abs(value), abs(p.typical))):
+            one = of_effect(p, value, sd)
+            assert broken(one, (p.low, p.high)) is None, key
+            if one.value is not None and one.low is None:
+                assert p.held(value) and one.reason == HELD
+
+
+def test_what_no_log_moves_from_its_default_is_given_with_the_law() -> None:
+    stribeck = built_in()["stribeck"]
+    plain = Acting(stribeck, (3.0, 0.03, 0.0, 2.0))
+    found = effect_estimates([plain], {"stribeck.F_s": 0.1, "stribeck.v_s": 0.002})
+    told = {name.removeprefix("stribeck."): one for name, one in found.items()}
+    assert (told["F_s"].value, told["v_s"].value) == (3.0, 0.03)
+    assert (told["delta"].value, told["delta"].reason) == (2.0, HELD)
+    assert (told["asymmetry"].value, told["asymmetry"].sd) == (0.0, None)
+
+
+@pytest.mark.parametrize(
+    ("value", "sd", "said"),
+    [
+        (1e-9, 2.35, "at its bound: the logs cannot tell it from 0"),
+        (50.0, 1.0, "at its bound 50: the logs only say that it lies there or beyond"),
+        (2.5, 9.9, "the interval -17 to 22 is wider than the value"),
+        (2.5, 0.0, "no interval: nothing that these logs show changes with it"),
+        (2.5, None, "no interval: nothing that these logs show changes with it"),
+        (-3.0, 0.1, "found -3, of the wrong sign"),
+    ],
+)
+def test_the_reason_is_said_in_words(value: float, sd: float | None, said: str) -> None:
+    one = told_estimate(value, "kg", sd, bounds=(0.0, 50.0))
+    assert one.value is None and one.assumed == value and not one.known
+    assert one.reason is not None and said in one.reason
+
+
+def test_an_interval_ends_where_the_parameter_does() -> None:
+    one = told_estimate(49.0, "1", 1.0, bounds=(0.0, 50.0))
+    assert one.low == pytest.approx(47.04)
+    assert one.high == 50.0
+
+
+def with_intervals(path: Path) -> Iterator[int]:
+    """Lines at which a file makes an estimate with an interval of its own."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Estimate":
+            named = {one.arg for one in node.keywords}
+            if len(node.args) > 2 or named & {"sd", "low", "high"}:
+                yield node.lineno
+
+
+def test_every_interval_is_made_by_the_rule() -> None:
+    found = {
+        str(path.relative_to(ROOT))
+        for folder in ("identification", "design", "workbench")
+        for path in (ROOT / folder).rglob("*.py")
+        if any(with_intervals(path))
+    }
+    assert found == {RULE, *DIFFERENCES}
