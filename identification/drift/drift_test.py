@@ -36,7 +36,8 @@ from identification.drift.reference_model import COULOMB, InForce
 from identification.drift.single_log import LogChange, seen_alone, seen_together
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
-from identification.thresholds import SEEN, SEEN_MARGINS
+from identification.model.karnopp import NAMES
+from identification.thresholds import SEEN, SEEN_MARGINS, VANISHED
 
 DriftVerdict = Literal["none", "drift", "structure", "not_judged"]
 FoundBy = Literal["log", "mean"]
@@ -188,14 +189,15 @@ def judged_estimate(
     own = misfit.of_log(own, found.chi_square)
     in_force = misfit.of_model(model.covariance / np.outer(model.scales, model.scales))
     varied = variation(state, settings.variation)
-    reasons = _not_judged(model, found, log, own + in_force + np.diag(varied), settings)
+    measured = own + in_force
+    reasons = _not_judged(model, found, log, (change, measured + np.diag(varied)), settings)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
         why = f"{log}: it tells none of the model's parameters; " + next(iter(reasons.values()), "")
         return _silent(log, "not_judged", why, reasons, found, state)
     at = np.flatnonzero(told)
     here = LogChange(
-        tuple(int(i) for i in at), change[at], (own + in_force)[np.ix_(at, at)], varied[at],
+        tuple(int(i) for i in at), change[at], measured[np.ix_(at, at)], varied[at],
         settings.margin,
     )  # fmt: skip
     after = taken_in(state, change, own, told, settings.smoothing, varied)
@@ -275,6 +277,11 @@ def _tests(here: LogChange, over: Mean, settings: DriftSettings) -> _Tests:
     return _Tests(here, over, _statistic(here.nearer, float(chi2.isf(quarter, d))), alone, mean)
 
 
+def at_bound(change: float) -> bool:
+    """Whether a friction parameter or a mass has vanished by its fit, which none does."""
+    return change <= -VANISHED
+
+
 def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: DriftSettings) -> str:
     """Why "none" cannot be said of a log without an alarm; "" where it can.
 
@@ -300,9 +307,12 @@ def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: Dr
 
 
 def _not_judged(
-    model: InForce, found: LogEstimate, log: str, covariance: Array, settings: DriftSettings
-) -> dict[str, str]:
-    """Parameters that this log cannot be judged by, with the reason."""
+    model: InForce, found: LogEstimate, log: str, seen: tuple[Array, Array],
+    settings: DriftSettings,
+) -> dict[str, str]:  # fmt: skip
+    """Parameters that this log cannot be judged by, with the reason; seen: the change (d,) and its
+    covariance (d, d)."""
+    change, covariance = seen
     out: dict[str, str] = {}
     for i, name in enumerate(model.names):
         sd = float(np.sqrt(covariance[i, i]))
@@ -312,6 +322,8 @@ def _not_judged(
             out[name] = found.untold.get(name, f"{log}: not among what this log tells")
         elif name in found.untold:
             out[name] = found.untold[name]
+        elif name in NAMES and at_bound(float(change[i])):
+            out[name] = f"{log}: found next to 0, where a fit's deviation says nothing of it"
         elif not sd <= settings.widest:
             out[name] = (
                 f"{log}: a change of it is known to {100 * sd:.2g} % only, at most"

@@ -59,7 +59,8 @@ class InForce:
     its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is judged, 0 where
     it is not known. own_logs: how far its own logs lie from it, None where a single one leaves
-    noise alone, or that is not known. key: names the model in a `DriftState`. Raises BadModel where sizes differ.
+    noise alone, or that is not known. key: names the model in a `DriftState`. Raises BadModel where
+    sizes differ.
     """
 
     plant: Plant

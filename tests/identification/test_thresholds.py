@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from identification import thresholds
 from identification.arrays import Array
-from identification.drift.drift_test import DriftSettings, too_coarse
+from identification.drift.drift_test import DriftSettings, at_bound, too_coarse
 from identification.drift.log_estimate import LogEstimate, allowed_misfit
 from identification.drift.mewma import Mean
 from identification.drift.practical_margin import moved
@@ -464,6 +464,12 @@ def test_seen_margins() -> None:
     """The same where so much more than 5 % does not matter."""
     assert says_none(0.16, DriftSettings(margin=0.08))
     assert not says_none(0.25, DriftSettings(margin=0.08))
+
+
+def test_vanished() -> None:
+    """A parameter that is all but gone by its fit is not judged; one that lost most of it is."""
+    assert not at_bound(-0.8)
+    assert at_bound(-0.995)
 
 
 def test_power() -> None:

@@ -18,7 +18,7 @@ from workbench.jobs.drift_verdict import Drift, Moved
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
 from workbench.report.drift_tables import seen_sentence
-from workbench.steps.drift import Drifted, Stream, drift_of, model_key
+from workbench.steps.drift import Drifted, Stream, drift_of, model_key, seen_sizes
 
 
 def drift_by_chart(
@@ -39,6 +39,8 @@ def drift_by_chart(
         moved=tuple(_moved(one) for one in worst.moved),
         p_value=min((one.p_value for one in statistics), default=None),
         state=_plain(found),
+        unsure=worst.unsure,
+        could_have_seen=seen_sizes(worst),
     )
 
 

@@ -251,15 +251,18 @@ def _of_run(one: Tested) -> dict[str, Any]:
         "unsure": list(test.unsure),
         "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
         "not_judged": dict(test.not_judged),
-        "could_have_seen": {
-            name: size if np.isfinite(size) else None for name, size in test.could_have_seen.items()
-        },
+        "could_have_seen": seen_sizes(test),
         "single": _statistic(test.single),
         "alone": _statistic(test.alone),
         "mean": _statistic(test.mean),
         "chi_square": test.chi_square,
         "chi_square_allowed": test.allowed,
     }
+
+
+def seen_sizes(test: DriftTest) -> dict[str, float | None]:
+    """Smallest change of each parameter that a test could have seen, None where it sees none."""
+    return {n: x if np.isfinite(x) else None for n, x in test.could_have_seen.items()}
 
 
 def _number(shift: Shift) -> dict[str, Any]:

@@ -20,10 +20,12 @@ from workbench.output import dumps
 from workbench.steps.drift import (
     Drifted,
     Stream,
-    Tested as OneRun,
     model_in_force,
     model_key,
     read_stream,
+)
+from workbench.steps.drift import (
+    Tested as OneRun,
 )
 
 
