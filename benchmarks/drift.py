@@ -85,7 +85,8 @@ def put_in_force(one: Machine, seed: int) -> InForce:
     log = simulated(one, (), seed, "model", MODEL).log
     fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
     fastest = float(np.quantile(np.abs(np.gradient(log["y"], log.h)), 0.99))
-    return in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
+    model = in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
+    return with_own_logs(model, [log], np.random.default_rng(seed))
 
 
 def varied(nine: Karnopp, rng: np.random.Generator, share: float) -> Karnopp:

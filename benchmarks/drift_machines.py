@@ -39,7 +39,9 @@ def stage(seed: int, number: int, worn: float = 1.0, seconds: float = 12.0) -> L
     noise = UNDER_IT * rng.standard_normal(len(r))
     effect = _sizes(slow=DIP, slow_speed=DIP_SPEED)
     y, u, F = run(nine, gains, K_A, 0.0, 10.0, True, effect, r, noise, h, COUNT)
-    return Log(f"stage{number}", {"t": np.arange(len(r)) * h, "y": y, "u": u, "F": F})
+    return Log(
+        f"stage{number}", {"t": h * np.arange(len(r), dtype=np.float64), "y": y, "u": u, "F": F}
+    )
 
 
 def turned(seed: int, number: int, drifted: float = 1.0, seconds: float = 4.0) -> Log:
@@ -53,4 +55,6 @@ def turned(seed: int, number: int, drifted: float = 1.0, seconds: float = 4.0) -
     y, u, F = run(
         nine, np.array(TURNED_GAINS), TORQUE, 0.0, 10.0, True, _sizes(), r, noise, h, LINES
     )
-    return Log(f"turned{number}", {"t": np.arange(len(r)) * h, "y": y, "u": u, "F": F})
+    return Log(
+        f"turned{number}", {"t": h * np.arange(len(r), dtype=np.float64), "y": y, "u": u, "F": F}
+    )

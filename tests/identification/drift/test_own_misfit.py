@@ -11,8 +11,9 @@ from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.own_logs import own_logs_of, with_own_logs
 from identification.drift.own_misfit import own_misfit
-from identification.drift.reference_model import InForce, OwnLogs
+from identification.drift.reference_model import InForce, OwnLogs, in_force
 from identification.errors import BadModel
+from identification.estimation.fit import fit_plant
 from identification.log import Rig
 from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
@@ -98,6 +99,29 @@ def test_a_parameter_is_never_surer_than_the_models_own_logs_were_of_it() -> Non
     wide = misfit.of_log(1e-12 * np.eye(9), LEFT)
     assert np.sqrt(np.diag(wide)) == pytest.approx(np.sqrt(misfit.scatter))
     assert np.all(np.diag(misfit.of_log(np.eye(9), LEFT)) == misfit.factor)
+
+
+def test_logs_that_a_model_follows_lie_as_far_from_it_as_their_errors_say() -> None:
+    logs = [made_log(NINE, seed=k, seconds=8.0) for k in (1, 2)]
+    rig = Rig("force")
+    fit = fit_plant(logs, np.random.default_rng(1), rig=rig)
+    known = with_own_logs(in_force(fit, rig), logs, np.random.default_rng(2))
+    assert known.own_logs is not None and not known.own_logs.parts
+    assert known.own_logs.left == pytest.approx((1.0, 1.0), abs=0.3)
+    assert max(known.own_logs.apart) < 5.0
+    scatter = dict(zip(known.own_logs.names, known.own_logs.scatter, strict=True))
+    assert (scatter["F_cp"] or 0.0) < 0.01
+
+
+def test_a_single_log_of_which_more_is_left_is_cut_up() -> None:
+    known = model(np.random.default_rng(1))
+    rig = Rig("force")
+    log = made_log(NINE, seed=1)
+    fit = fit_plant([log], np.random.default_rng(1), rig=rig)
+    worse = replace(in_force(fit, rig), chi_square=known.chi_square)
+    found = with_own_logs(worse, [log], np.random.default_rng(2))
+    assert found.own_logs is not None and found.own_logs.parts
+    assert len(found.own_logs.left) == 3
 
 
 def test_a_single_log_of_which_noise_is_left_is_not_cut_up() -> None:
