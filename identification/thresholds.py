@@ -61,6 +61,7 @@ DRIFT_LEAST = 0.01  # of its value, that it changes
 SEEN = 0.05  # of a Coulomb level, the change that it sees
 SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
 POWER = 0.9  # chance with which it would have alarmed
+LOST = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
 VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).

@@ -186,6 +186,13 @@ def judged_estimate(
     """The verdict on a log whose parameters have been estimated."""
     change, own, _ = relative_change(model, found)
     misfit = own_misfit(model)
+    if misfit.has_lost_its_way(found.chi_square):
+        why = (
+            f"{log}: its fit leaves {found.chi_square:.3g}, fits of the model's own logs at most"
+            f" {misfit.left:.3g}: it has lost its way, and says nothing of the parameters; log"
+            " another run, or trace this one"
+        )
+        return _silent(log, "not_judged", why, {}, found, state)
     own = misfit.of_log(own, found.chi_square)
     in_force = misfit.of_model(model.covariance / np.outer(model.scales, model.scales))
     varied = variation(state, settings.variation)

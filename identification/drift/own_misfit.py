@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from identification.arrays import Array
 from identification.drift.reference_model import InForce
-from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE
+from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE, LOST
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,11 +24,16 @@ class OwnMisfit:
     logs: int
     left: float
 
+    def has_lost_its_way(self, misfit: float) -> bool:
+        """Whether a log's fit leaves so much beside those of the model's own logs that it says
+        nothing of the parameters."""
+        return misfit > LOST * self.left
+
     def of_log(self, own: Array, misfit: float) -> Array:
         """Covariance (d, d) of a log's errors, by that of its fit and the misfit this leaves.
 
-        A fit that leaves far more than those of the model's own logs has lost its way, or the log
-        has something more in it: it says as much less of the parameters.
+        A fit that leaves more than those of the model's own logs is near to losing its way, or the
+        log has something more in it: it says as much less of the parameters.
         """
         lost = max(1.0, misfit / (LIKE * self.left))
         return lost * _at_least(self.factor * own, self.scatter)
@@ -55,7 +60,7 @@ def own_misfit(model: InForce) -> OwnMisfit:
         return OwnMisfit(1.0, np.zeros(d), 1, float("inf"))
     n, known = len(found.left), dict(zip(found.names, found.scatter, strict=True))
     left_out = (n + 1.0) / (n - 1.0)
-    freedom = 0.5 * (n - 1.0) * max(1, sum(x is not None for x in found.scatter))
+    freedom = (n - 1.0) * max(1, sum(x is not None for x in found.scatter))
     caution = freedom / float(chi2.ppf(CHANCE_LEVEL, freedom))
     apart = float(np.mean(found.apart))
     factor = left_out * apart * caution

@@ -17,6 +17,7 @@ from identification.arrays import Array
 from identification.drift.drift_test import DriftSettings, at_bound, too_coarse
 from identification.drift.log_estimate import LogEstimate, allowed_misfit
 from identification.drift.mewma import Mean
+from identification.drift.own_misfit import OwnMisfit
 from identification.drift.practical_margin import moved
 from identification.drift.reference_model import InForce
 from identification.drift.single_log import seen_together
@@ -464,6 +465,13 @@ def test_seen_margins() -> None:
     """The same where so much more than 5 % does not matter."""
     assert says_none(0.16, DriftSettings(margin=0.08))
     assert not says_none(0.25, DriftSettings(margin=0.08))
+
+
+def test_lost() -> None:
+    """A fit that leaves so much more than those of the model's own logs has lost its way."""
+    misfit = OwnMisfit(1.0, np.zeros(1), 3, 20.0)
+    assert not misfit.has_lost_its_way(80.0 * 20.0)
+    assert misfit.has_lost_its_way(125.0 * 20.0)
 
 
 def test_vanished() -> None:

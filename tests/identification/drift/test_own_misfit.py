@@ -79,7 +79,10 @@ def test_a_fit_that_has_lost_its_way_judges_nothing() -> None:
     rng = np.random.default_rng(1)
     known = model(rng)
     found = verdict(known, estimate(rng, 1.5 * np.ones(9), left=1e4 * LEFT))
-    assert found.verdict == "not_judged"
+    assert found.verdict == "not_judged" and not found.tested
+    assert "has lost its way" in found.reason
+    near = verdict(known, estimate(rng, 1.5 * np.ones(9), left=50.0 * LEFT))
+    assert near.tested
 
 
 def test_a_fit_of_which_its_logs_are_surer_than_it_says_counts_as_they_do() -> None:
