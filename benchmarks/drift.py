@@ -1,7 +1,7 @@
 """Drift test: run length without drift, what it finds, and after how many logs.
 
-    python benchmarks/drift.py [stable] [jump] [slow] [structure] [length] [--first 9000]
-        [--streams 60] [--logs 25] [--machines table2,motor] [--jobs 1] [--verbose]
+    python benchmarks/drift.py [stable] [jump] [slow] [structure] [length] [lacking] [unseen]
+        [--first 9000] [--streams 60] [--logs 25] [--machines table2,motor] [--jobs 1] [--verbose]
 
 Machines and loops are those of the blind benchmark (benchmarks/blind_machines.py): the paper's
 three tables, a motor, a machine that logs no command, and random ones. Every stream identifies a
@@ -13,7 +13,10 @@ stable: logs without drift; the mean run length up to an alarm (any verdict but 
 95 % interval (Poisson). jump: one log after a change of table, or
 of the friction by 20 and 50 %. slow: 2 % a log of a parameter.
 structure: an effect of 20 % of the Coulomb level joins. length: the same change in logs of 20, 60
-and 200 s.
+and 200 s. lacking: a motor stage with a Stribeck dip under a model of three logs that has none; six
+logs of it as it was, six with friction 20 % up. unseen: a rotary motor whose Coulomb friction grows
+by 5 % over ten logs that hardly tell it. Both by other machines (benchmarks/drift_machines.py), at
+most LONG streams of them.
 """
 
 import argparse
@@ -29,8 +32,10 @@ from scipy.stats import chi2
 
 from benchmarks.blind_effects import SIZES, acting, place_of, shows
 from benchmarks.blind_machines import MACHINES, Machine, drifted, machine, simulated, stream
+from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, stage, turned
 from identification.drift.drift_test import DriftTest, drift_test
-from identification.drift.reference_model import InForce, in_force
+from identification.drift.own_logs import with_own_logs
+from identification.drift.reference_model import COULOMB, InForce, in_force
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
@@ -38,7 +43,10 @@ from identification.estimation.fit import fit_plant
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 
-PARTS = ("stable", "jump", "slow", "structure", "length")
+PARTS = ("stable", "jump", "slow", "structure", "length", "lacking", "unseen")
+OWN_MACHINES = {"lacking": "stage", "unseen": "rotary"}
+LONG = 3  # streams of those, of minutes each
+WORN, CREPT = 1.2, 1.05
 LENGTHS = (10.0, 20.0, 40.0)  # s
 MODEL = 40.0  # s
 VARIATION = 0.01
@@ -69,6 +77,7 @@ class Outcome:
     chi_square: float | None
     seconds: float
     judged: int = 0
+    seen: float = np.inf  # smallest change of both Coulomb levels that could have been seen
 
 
 def put_in_force(one: Machine, seed: int) -> InForce:
@@ -76,7 +85,8 @@ def put_in_force(one: Machine, seed: int) -> InForce:
     log = simulated(one, (), seed, "model", MODEL).log
     fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
     fastest = float(np.quantile(np.abs(np.gradient(log["y"], log.h)), 0.99))
-    return in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
+    model = in_force(fit, one.rig, key=f"{one.name}{seed}", fastest=fastest)
+    return with_own_logs(model, [log], np.random.default_rng(seed))
 
 
 def varied(nine: Karnopp, rng: np.random.Generator, share: float) -> Karnopp:
@@ -93,7 +103,7 @@ def scaled(nine: Karnopp, names: Sequence[str], factor: float) -> Karnopp:
 
 def tested(
     model: InForce,
-    one: Machine,
+    one: str,
     log: Log,
     seed: int,
     what: str,
@@ -107,8 +117,9 @@ def tested(
     seconds = time.perf_counter() - begin
     names = tuple(sorted(shift.name for shift in found.moved))
     outcome = Outcome(
-        one.name, seed, what, number, found.verdict, names, found.found_by, found.chi_square,
+        one, seed, what, number, found.verdict, names, found.found_by, found.chi_square,
         seconds, len(found.shifts),
+        max(found.could_have_seen.get(name, np.inf) for name in COULOMB),
     )  # fmt: skip
     return outcome, found
 
@@ -125,7 +136,7 @@ def stable(name: str, seed: int, logs: int) -> list[Outcome]:
         seconds = float(rng.choice(LENGTHS))
         friction = varied(one.friction, rng, share)
         log = simulated(one, (), seed, f"log{k}", seconds, friction).log
-        outcome, found = tested(model, one, log, seed, f"{share:g}", k, last)
+        outcome, found = tested(model, one.name, log, seed, f"{share:g}", k, last)
         out.append(outcome)
         last = None if found.verdict == "drift" else found
     return out
@@ -142,7 +153,7 @@ def jump(name: str, seed: int) -> list[Outcome]:
     out = []
     for what, friction in after.items():
         log = simulated(one, (), seed, "jump", MODEL, friction).log
-        out.append(tested(model, one, log, seed, what, 1, None)[0])
+        out.append(tested(model, one.name, log, seed, what, 1, None)[0])
     return out
 
 
@@ -158,7 +169,7 @@ def slow(name: str, seed: int) -> list[Outcome]:
         for k in range(1, MOST + 1):
             day = scaled(varied(one.friction, rng, share), names, 1.0 + RATE * k)
             log = simulated(one, (), seed, f"{what}{k}", 20.0, day).log
-            outcome, last = tested(model, one, log, seed, what, k, last)
+            outcome, last = tested(model, one.name, log, seed, what, k, last)
             if last.verdict != "none":
                 break
         out.append(outcome)
@@ -179,7 +190,7 @@ def structure(name: str, seed: int) -> list[Outcome]:
                 log = simulated(one, (effect,), seed, key, MODEL).log
             except BadModel:
                 continue  # the loop does not bear it
-            out.append(tested(model, one, log, seed, key, 1, None)[0])
+            out.append(tested(model, one.name, log, seed, key, 1, None)[0])
     return out
 
 
@@ -193,8 +204,46 @@ def length(name: str, seed: int) -> list[Outcome]:
         for seconds in (20.0, 60.0, 200.0):
             log = simulated(one, (), seed, f"length{share}", seconds, changed).log
             what = f"{100 * share:.0f} % in {seconds:.0f} s"
-            out.append(tested(model, one, log, seed, what, 1, None)[0])
+            out.append(tested(model, one.name, log, seed, what, 1, None)[0])
     return out
+
+
+def lacking(seed: int) -> list[Outcome]:
+    """Logs of a stage as it was and worn, under a model that lacks its Stribeck dip."""
+    logs = [stage(seed, k) for k in range(3)]
+    fit = fit_plant(logs, np.random.default_rng(seed), rig=STAGE_RIG)
+    model = in_force(fit, STAGE_RIG, key=f"stage{seed}", fastest=speed_of(logs))
+    model = with_own_logs(model, logs, np.random.default_rng(seed))
+    told = sum(one.value is not None for one in fit.estimates.values())
+    print(f"  stage {seed}: {told} of 9 identified, chi-square {fit.chi_square:.3g}")
+    out = []
+    for what, factor, first in (("as it was", 1.0, 3), ("worn", WORN, 30)):
+        last: DriftTest | None = None
+        for k in range(first, first + 6):
+            log = stage(seed, k, factor)
+            outcome, last = tested(model, "stage", log, seed, what, k, last)
+            out.append(outcome)
+    return out
+
+
+def unseen(seed: int) -> list[Outcome]:
+    """Ten logs of a rotary motor whose Coulomb friction creeps up by 5 %."""
+    logs = [turned(seed, k, seconds=12.0) for k in range(3)]
+    fit = fit_plant(logs, np.random.default_rng(seed), rig=TURNED_RIG)
+    model = in_force(fit, TURNED_RIG, key=f"rotary{seed}", fastest=speed_of(logs))
+    model = with_own_logs(model, logs, np.random.default_rng(seed))
+    out = []
+    last: DriftTest | None = None
+    for k in range(1, 11):
+        log = turned(seed, 10 + k, 1.0 + (CREPT - 1.0) * k / 10)
+        outcome, last = tested(model, "rotary", log, seed, "5 % over ten logs", k, last)
+        out.append(outcome)
+    return out
+
+
+def speed_of(logs: Sequence[Log]) -> float:
+    """Speed that 1 % of the logs' exceed."""
+    return max(float(np.quantile(np.abs(np.gradient(log["y"], log.h)), 0.99)) for log in logs)
 
 
 def report(part: str, found: Sequence[Outcome], verbose: bool) -> None:
@@ -211,6 +260,9 @@ def report(part: str, found: Sequence[Outcome], verbose: bool) -> None:
                 logs = [o.log if o.verdict == "drift" else MOST + 1 for o in rows]
                 line += f"; logs: median {np.median(logs):.0f}, worst {max(logs)}"
                 line += f"; moved: {Counter(' '.join(o.moved) for o in rows).most_common(3)}"
+            elif part in OWN_MACHINES:
+                line += f"; seen from {100 * np.median([o.seen for o in rows]):.3g} % on (median)"
+                line += f"; moved: {Counter(n for o in rows for n in o.moved).most_common()}"
             elif part == "jump":
                 line += f"; moved: {Counter(' '.join(o.moved) for o in rows).most_common(2)}"
             print(line)
@@ -257,6 +309,8 @@ def run(job: tuple[str, str, int, int]) -> list[Outcome]:
         "length": length,
     }
     try:
+        if part in OWN_MACHINES:
+            return lacking(seed) if part == "lacking" else unseen(seed)
         return parts[part](name, seed)
     except UserError as error:
         print(f"  {part} {name} {seed}: {error}")
@@ -275,9 +329,10 @@ def main() -> None:
     asked = parser.parse_args()
     names = asked.machines.split(",")
     for part in asked.parts:
+        own = OWN_MACHINES.get(part)
+        of, count = ([own], min(asked.streams, LONG)) if own else (names, asked.streams)
         jobs = [
-            (part, names[i % len(names)], asked.first + i // len(names), asked.logs)
-            for i in range(asked.streams)
+            (part, of[i % len(of)], asked.first + i // len(of), asked.logs) for i in range(count)
         ]
         if asked.jobs == 1:
             found = [o for job in jobs for o in run(job)]

@@ -60,6 +60,13 @@ DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
 DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
 DRIFT_LEAST = 0.01  # of its value, that it changes
 
+# What a test of a new log must be able to see, or it does not judge (drift.py: coarse).
+SEEN = 0.05  # of a Coulomb level, the change that it sees
+SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
+POWER = 0.9  # chance with which it would have alarmed
+LOST = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
+VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
+
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value

@@ -1,22 +1,26 @@
 """Drift test of one new log against the model in force: has the machine changed, and in what?
 
 The log's own parameters come from its fit, begun from the model in force (`log_estimate`). Their
-change counts by how far it lies beyond a practical margin, in the covariance of everything that is
-unsure: the log's fit, the model's fit, and how much the machine varies from log to log anyhow. A
-second statistic over the logs since the model was put in force (`mewma`) finds what changes slowly.
+change counts by how far it lies beyond a practical margin, and beyond how much the machine varies
+from log to log anyhow, in the covariance of everything that is unsure: the log's fit and the
+model's (`single_log`). How sure both are is judged by the model's own logs where it left more than
+noise of them (`own_misfit`): a machine that it never followed has not changed for that. A second
+statistic over the logs since the model was put in force (`mewma`) finds what changes slowly.
+
 A log that no parameters bring the model to follow is said to have another structure; that is no
-drift.
+drift. "None" is said only where the test could have seen a change that matters of the Coulomb
+levels; else the log is not judged.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array
-from identification.drift.log_estimate import LogEstimate, estimate_log
+from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
 from identification.drift.mewma import (
     DriftState,
     Mean,
@@ -26,10 +30,14 @@ from identification.drift.mewma import (
     taken_in,
     variation,
 )
-from identification.drift.practical_margin import explained_change, moved
-from identification.drift.reference_model import InForce
+from identification.drift.own_misfit import own_misfit
+from identification.drift.practical_margin import explained_change, moved, told_apart
+from identification.drift.reference_model import COULOMB, InForce
+from identification.drift.single_log import LogChange, seen_alone, seen_together
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
+from identification.model.karnopp import NAMES
+from identification.thresholds import SEEN, SEEN_MARGINS, VANISHED
 
 DriftVerdict = Literal["none", "drift", "structure", "not_judged"]
 FoundBy = Literal["log", "mean"]
@@ -63,6 +71,11 @@ class DriftSettings:
             raise BadSpecification(f"smoothing = {self.smoothing:g}, must lie from 0.01 to 1")
         if not self.widest > 0.0:
             raise BadSpecification(f"widest = {self.widest:g}, must be > 0")
+
+    @property
+    def to_be_seen(self) -> float:
+        """Relative change that a log must be able to show, or it does not judge the parameter."""
+        return max(SEEN, SEEN_MARGINS * self.margin)
 
 
 @dataclass(frozen=True)
@@ -104,11 +117,15 @@ class Statistic:
 class DriftTest:
     """The verdict on one log.
 
-    verdict: "none", "drift" (`moved` names the fewest parameters that explain it), "structure"
-    (no parameters of the model's structure follow the log), "not_judged" (`reason` says why).
-    shifts: every judged parameter on this log; not_judged: the others, with the reason; single,
-    mean: the statistic of this log and of the mean over logs, None where nothing is judged;
-    found_by: which of them alarmed. chi_square: what the log's own refit leaves; allowed: up to
+    verdict: "none", "drift", "structure" (no parameters of the model's structure follow the log),
+    "not_judged" (`reason` says why: nothing is told, or a change of the Coulomb levels could not
+    have been seen). moved: of the fewest parameters that explain a drift, those that surely have a
+    part in it; unsure: names of the others, and of those that explain it as well. shifts: every
+    tested parameter on this log; not_judged: the others, with the reason; could_have_seen:
+    smallest relative change of each tested one that would have been found on this log or, if it
+    lasts, by the mean. single, alone, mean: the statistic of all parameters of this log, of the
+    largest one, and of the mean over logs, None where nothing is tested; found_by: which of them
+    alarmed ("log": the first two). chi_square: what the log's own refit leaves; allowed: up to
     which the structure fits. state: to be given with the next log.
     """
 
@@ -124,6 +141,14 @@ class DriftTest:
     allowed: float | None
     reason: str
     state: DriftState
+    alone: Statistic | None = None
+    unsure: tuple[str, ...] = ()
+    could_have_seen: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def tested(self) -> bool:
+        """Whether the log was tested at all, whatever it could have shown."""
+        return self.single is not None
 
 
 def drift_test(
@@ -159,67 +184,142 @@ def judged_estimate(
     model: InForce, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""
-    change, own = _relative(model, found)
-    in_force = model.covariance / np.outer(model.scales, model.scales)
+    change, own, _ = relative_change(model, found)
+    misfit = own_misfit(model)
+    if misfit.has_lost_its_way(found.chi_square):
+        why = (
+            f"{log}: its fit leaves {found.chi_square:.3g}, fits of the model's own logs at most"
+            f" {misfit.left:.3g}: it has lost its way, and says nothing of the parameters; log"
+            " another run, or trace this one"
+        )
+        return _silent(log, "not_judged", why, {}, found, state)
+    own = misfit.of_log(own, found.chi_square)
+    in_force = misfit.of_model(model.covariance / np.outer(model.scales, model.scales))
     varied = variation(state, settings.variation)
-    covariance = own + in_force + np.diag(varied)
-    reasons = _not_judged(model, found, log, covariance, settings)
+    measured = own + in_force
+    reasons = _not_judged(model, found, log, (change, measured + np.diag(varied)), settings)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
         why = f"{log}: it tells none of the model's parameters; " + next(iter(reasons.values()), "")
         return _silent(log, "not_judged", why, reasons, found, state)
     at = np.flatnonzero(told)
-    here = Mean(
-        tuple(int(i) for i in at), change[at], covariance[np.ix_(at, at)],
-        np.full(len(at), settings.margin),
+    here = LogChange(
+        tuple(int(i) for i in at), change[at], measured[np.ix_(at, at)], varied[at],
+        settings.margin,
     )  # fmt: skip
-    single = _statistic(here, float(chi2.isf(0.5 / settings.run_length, len(at))))
     after = taken_in(state, change, own, told, settings.smoothing, varied)
     over = mean_change(after, in_force, settings.margin)
-    mean = _statistic(
-        over, chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
-    )
-    by: FoundBy | None = "log" if single.alarm else ("mean" if mean.alarm else None)
-    which = _moved(model, over if by == "mean" else here, here) if by else ()
+    tests = _tests(here, over, settings)
+    by = tests.found_by
+    which, unsure = _moved(model, over if by == "mean" else here.nearer, here) if by else ((), ())
+    seen = tests.could_have_seen(model.names)
+    coarse = "" if by else too_coarse(model, seen, log, settings)
     return DriftTest(
         log=log,
-        verdict="drift" if by else "none",
+        verdict="drift" if by else ("not_judged" if coarse else "none"),
         moved=which,
-        shifts=_shifts(model, here),
+        shifts=_shifts(model, here.beyond_usual),
         not_judged=reasons,
-        single=single,
-        mean=mean,
+        single=tests.single,
+        mean=tests.mean,
         found_by=by,
         chi_square=found.chi_square,
         allowed=found.allowed,
-        reason="",
+        reason=coarse,
         # A jump would stay in the mean long after it has been repaired.
-        state=state if single.alarm else after,
+        state=state if by == "log" else after,
+        alone=tests.alone,
+        unsure=unsure,
+        could_have_seen=seen,
     )
 
 
-def _relative(model: InForce, found: LogEstimate) -> tuple[Array, Array]:
-    """Change (d,) of the model's parameters in their scales, positive where the size grows, and
-    its covariance (d, d); parameters that the log lacks are without a bound."""
-    sign = np.where(model.values < 0, -1.0, 1.0)
-    factor = sign / model.scales
-    place = {name: i for i, name in enumerate(found.names)}
-    d = len(model.names)
-    change, covariance = np.zeros(d), np.zeros((d, d))
-    at = [(i, place[name]) for i, name in enumerate(model.names) if name in place]
-    rows, columns = [i for i, _ in at], [k for _, k in at]
-    change[rows] = (found.values[columns] - model.values[rows]) * factor[rows]
-    outer = np.outer(factor, factor)
-    covariance[np.ix_(rows, rows)] = (
-        found.covariance[np.ix_(columns, columns)] * outer[np.ix_(rows, rows)]
+@dataclass(frozen=True, eq=False)
+class _Tests:
+    """The three statistics of a log: of all parameters, of the largest one, of the mean."""
+
+    here: LogChange
+    over: Mean
+    single: Statistic
+    alone: Statistic
+    mean: Statistic
+
+    @property
+    def found_by(self) -> FoundBy | None:
+        """What alarms, the log itself first."""
+        if self.single.alarm or self.alone.alarm:
+            return "log"
+        return "mean" if self.mean.alarm else None
+
+    def could_have_seen(self, names: Sequence[str]) -> dict[str, float]:
+        """Smallest change of each parameter of the log that one of the three sees."""
+        here, over = self.here, self.over
+        of_log = np.min(
+            [
+                seen_alone(here, self.alone.threshold),
+                np.maximum(
+                    seen_together(here.beyond_margin, self.single.threshold),
+                    seen_together(here.beyond_usual, self.single.threshold),
+                ),
+            ],
+            axis=0,
+        )
+        lasting = dict(zip(over.at, seen_together(over, self.mean.threshold), strict=True))
+        return {
+            names[i]: float(min(size, lasting.get(i, np.inf)))
+            for i, size in zip(here.at, of_log, strict=True)
+        }
+
+
+def _tests(here: LogChange, over: Mean, settings: DriftSettings) -> _Tests:
+    """The statistics: half of the false alarms are the mean's, a quarter each of the others'."""
+    d, quarter = len(here.at), 0.25 / settings.run_length
+    largest = float(np.max(here.alone) ** 2)
+    alone = Statistic(
+        largest, float(chi2.isf(quarter / d, 1)), min(1.0, d * float(chi2.sf(largest, 1))), d
     )
-    return change, covariance
+    mean = _statistic(
+        over, chart_limit(len(over.at), settings.smoothing, 2.0 * settings.run_length)
+    )
+    return _Tests(here, over, _statistic(here.nearer, float(chi2.isf(quarter, d))), alone, mean)
+
+
+def at_bound(change: float) -> bool:
+    """Whether a friction parameter or a mass has vanished by its fit, which none does."""
+    return change <= -VANISHED
+
+
+def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: DriftSettings) -> str:
+    """Why "none" cannot be said of a log without an alarm; "" where it can.
+
+    Friction that changes shows in the Coulomb levels first: every one that the model tells has to
+    be seen, or of a model that tells neither at least one parameter.
+    """
+    limit = settings.to_be_seen
+    asked = [name for name in COULOMB if name in model.names and name not in model.untold]
+    sizes = [seen.get(name, float("inf")) for name in asked]
+    if asked and max(sizes) <= limit:
+        return ""
+    if not asked and min(seen.values()) <= limit:
+        return ""
+    names = asked or list(seen)
+    said = ", ".join(
+        f"{name} from {100 * seen[name]:.2g} % on" if name in seen else f"{name} not at all"
+        for name in names
+    )
+    return (
+        f"{log}: no alarm, but a change of {100 * limit:.3g} % could not have been seen ({said});"
+        " log for longer, with more strokes both ways, or judge by the mean over more logs"
+    )
 
 
 def _not_judged(
-    model: InForce, found: LogEstimate, log: str, covariance: Array, settings: DriftSettings
-) -> dict[str, str]:
-    """Parameters that this log cannot be judged by, with the reason."""
+    model: InForce, found: LogEstimate, log: str, seen: tuple[Array, Array],
+    settings: DriftSettings,
+) -> dict[str, str]:  # fmt: skip
+    """Parameters that this log cannot be judged by, with the reason; seen: the change (d,) and its
+    covariance (d, d)."""
+    change, covariance = seen
     out: dict[str, str] = {}
     for i, name in enumerate(model.names):
         sd = float(np.sqrt(covariance[i, i]))
@@ -229,6 +329,8 @@ def _not_judged(
             out[name] = found.untold.get(name, f"{log}: not among what this log tells")
         elif name in found.untold:
             out[name] = found.untold[name]
+        elif name in NAMES and at_bound(float(change[i])):
+            out[name] = f"{log}: found next to 0, where a fit's deviation says nothing of it"
         elif not sd <= settings.widest:
             out[name] = (
                 f"{log}: a change of it is known to {100 * sd:.2g} % only, at most"
@@ -242,23 +344,32 @@ def _statistic(found: Mean, threshold: float) -> Statistic:
     return Statistic(square, threshold, float(chi2.sf(square, len(found.at))), len(found.at))
 
 
-def _moved(model: InForce, found: Mean, here: Mean) -> tuple[Shift, ...]:
-    """The fewest parameters that explain the change, largest first, by how much on this log.
+def _moved(
+    model: InForce, found: Mean, log: LogChange
+) -> tuple[tuple[Shift, ...], tuple[str, ...]]:
+    """Parameters that surely changed, largest first, by how much on this log; and the names of
+    those that may have.
 
     The mean over the logs, where that found it, lags behind what drifts: it names the parameters,
     and sizes them only where this log does not judge them or shows less.
     """
-    names = {found.at[k] for k in moved(found.change, found.covariance, found.margin)}
+    here = log.nearer
+    chosen = moved(found.change, found.covariance, found.margin)
+    sure, unsure = told_apart(found.change, found.covariance, found.margin, chosen)
+    names = {found.at[k] for k in sure}
     size_here = dict(zip(here.at, np.abs(here.change).tolist(), strict=True))
     size_mean = dict(zip(found.at, np.abs(found.change).tolist(), strict=True))
     sized = here if all(size_here.get(i, 0.0) >= size_mean[i] for i in names) else found
-    chosen = tuple(k for k, i in enumerate(sized.at) if i in names)
-    size, covariance = explained_change(sized.change, sized.covariance, sized.margin, chosen)
+    all_moved = {found.at[k] for k in chosen}
+    explain = tuple(k for k, i in enumerate(sized.at) if i in all_moved)
+    size, covariance = explained_change(sized.change, sized.covariance, sized.margin, explain)
     out = [
         _shift(model, sized.at[k], float(size[n]), float(np.sqrt(covariance[n, n])))
-        for n, k in enumerate(chosen)
+        for n, k in enumerate(explain)
+        if sized.at[k] in names
     ]
-    return tuple(sorted(out, key=lambda one: -abs(one.change)))
+    shifts = tuple(sorted(out, key=lambda one: -abs(one.change)))
+    return shifts, tuple(model.names[found.at[k]] for k in unsure)
 
 
 def _shifts(model: InForce, found: Mean) -> dict[str, Shift]:

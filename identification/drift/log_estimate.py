@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.drift.reference_model import InForce
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
@@ -58,6 +58,27 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
     # Of a body that is not led, the force equation alone says that its run is not followed.
     return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
+
+
+def relative_change(model: InForce, found: LogEstimate) -> tuple[Array, Array, BoolArray]:
+    """Change (d,) of the model's parameters in their scales, positive where the size grows, its
+    covariance (d, d) without the model's own error, and which of them (d,) the log tells."""
+    sign = np.where(model.values < 0, -1.0, 1.0)
+    factor = sign / model.scales
+    place = {name: i for i, name in enumerate(found.names)}
+    d = len(model.names)
+    change, covariance, told = np.zeros(d), np.zeros((d, d)), np.zeros(d, dtype=np.bool_)
+    at = [(i, place[name]) for i, name in enumerate(model.names) if name in place]
+    rows, columns = [i for i, _ in at], [k for _, k in at]
+    change[rows] = (found.values[columns] - model.values[rows]) * factor[rows]
+    outer = np.outer(factor, factor)
+    covariance[np.ix_(rows, rows)] = (
+        found.covariance[np.ix_(columns, columns)] * outer[np.ix_(rows, rows)]
+    )
+    told[rows] = [
+        found.names[k] not in found.untold and model.names[i] not in model.untold for i, k in at
+    ]
+    return change, covariance, told
 
 
 def allowed_misfit(in_force: float) -> float:

@@ -6,6 +6,7 @@ makes no trifle significant, and a poor log none of its accidents.
 """
 
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -33,8 +34,9 @@ def beyond_margin(
     """
     if not len(change):
         return Distance(0.0, np.zeros(0))
-    root = np.linalg.cholesky(covariance)
-    A = np.linalg.inv(root)
+    A = np.linalg.inv(np.linalg.cholesky(covariance))
+    if not np.any(margin) and not free:
+        return Distance(float(np.sum((A @ change) ** 2)), np.zeros(len(change)))
     bound = margin.astype(np.float64).copy()
     bound[list(free)] = np.inf
     inside = np.clip(change, -bound, bound)
@@ -74,6 +76,29 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
             chosen.remove(i)
             left = beyond_margin(change, covariance, margin, without).square
     return tuple(chosen)
+
+
+def told_apart(
+    change: Array, covariance: Array, margin: Array, chosen: tuple[int, ...]
+) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Those of `chosen` that surely moved, and the group of which others may have in their place.
+
+    Surely: beyond the margin by its own deviation, in which what goes together with the others is.
+    Of the rest nobody can say: with them go the parameters that would explain the change as well.
+    """
+    d = len(change)
+    square = float(chi2.isf(CHANCE_LEVEL / max(d, 1), 1))
+    beyond = np.maximum(np.abs(change) - margin, 0.0) ** 2 / np.diag(covariance)
+    sure = tuple(i for i in chosen if beyond[i] >= square)
+    unsure = [i for i in chosen if i not in sure]
+    left = beyond_margin(change, covariance, margin, chosen).square
+    group = {*unsure, *(i for i in range(d) if unsure and beyond[i] >= square and i not in sure)}
+    for i, j in product(unsure, range(d)):
+        if j not in chosen:
+            other = (*(k for k in chosen if k != i), j)
+            if beyond_margin(change, covariance, margin, other).square - left < square:
+                group.add(j)
+    return sure, tuple(sorted(group))
 
 
 def explained_change(

@@ -12,9 +12,42 @@ from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant, units_of
 
 VISCOUS = ("F_vp", "F_vn")
+COULOMB = ("F_cp", "F_cn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
 LEAST_EFFECT = 0.1  # of an effect's typical parameter, below which one is small
 LEAST_FORCE = 0.1  # of the largest friction force, below which a force is small
+
+
+@dataclass(frozen=True)
+class OwnLogs:
+    """How far the logs of a model lie from it, each estimated alone as a new one is.
+
+    names (d,): parameters; scatter (d,): root mean square over the logs of the change from the
+    model, relative to `InForce.scales`, None where no log tells the parameter. apart (n,): square
+    distance of each log from the model in the covariance of both fits, over the number of
+    parameters; left (n,): misfit of its own fit. parts: they are stretches of one log. Raises
+    BadModel where sizes differ.
+    """
+
+    names: tuple[str, ...]
+    scatter: tuple[float | None, ...]
+    apart: tuple[float, ...]
+    left: tuple[float, ...]
+    parts: bool = False
+
+    def __post_init__(self) -> None:
+        if len(self.scatter) != len(self.names):
+            raise BadModel(
+                f"[own_logs] {len(self.names)} names, {len(self.scatter)} values of scatter; one a"
+                " name needed"
+            )
+        if len(self.apart) != len(self.left) or len(self.left) < 2:
+            raise BadModel(
+                f"[own_logs] {len(self.apart)} values of apart, {len(self.left)} of left; as many"
+                " of each needed, of two logs at least"
+            )
+        if not all(x is None or x >= 0 for x in (*self.scatter, *self.apart, *self.left)):
+            raise BadModel("[own_logs] holds a value below 0; run 'workbench identify' again")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +58,9 @@ class InForce:
     key.name; untold: those that the model does not tell, with the reason. drive: what drove
     its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
     the force equation was fitted; fastest [m/s]: speed at which a viscous force is judged, 0 where
-    it is not known. key: names the model in a `DriftState`. Raises BadModel where sizes differ.
+    it is not known. own_logs: how far its own logs lie from it, None where a single one leaves
+    noise alone, or that is not known. key: names the model in a `DriftState`. Raises BadModel where
+    sizes differ.
     """
 
     plant: Plant
@@ -39,6 +74,7 @@ class InForce:
     untold: Mapping[str, str] = field(default_factory=dict)
     key: str = ""
     fastest: float = 0.0
+    own_logs: OwnLogs | None = None
 
     def __post_init__(self) -> None:
         d = len(self.names)

@@ -10,11 +10,17 @@ from functools import cache
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from identification import thresholds
 from identification.arrays import Array
+from identification.drift.drift_test import DriftSettings, at_bound, too_coarse
 from identification.drift.log_estimate import LogEstimate, allowed_misfit
+from identification.drift.mewma import Mean
+from identification.drift.own_misfit import OwnMisfit
 from identification.drift.practical_margin import moved
+from identification.drift.reference_model import InForce
+from identification.drift.single_log import seen_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.estimation.estimates import Events, estimates
@@ -36,6 +42,8 @@ from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
 from identification.signals.force_walk import shows
 from identification.tracing.dependence import dependence
 from identification.tracing.free_run.backward_elimination import (
@@ -461,6 +469,47 @@ def told(name: str, relative: float, events: int) -> bool:
     happened = Events((events, 9), (events, 9), (900, 900), (1.0, 1.0))
     found = estimates((name,), np.array([10.0]), samples, happened, False, "log")
     return found[name].value is not None
+
+
+def says_none(size: float, settings: DriftSettings) -> bool:
+    """Whether a log without an alarm is said to show no drift, that sees so much of F_cp."""
+    nine = Karnopp(2.0, 10.0, 10.0, 100.0, 100.0, 0.01, -0.01, 15.0, -15.0)
+    known = InForce(Plant(nine), ("F_cp",), np.array([10.0]), np.eye(1), Rig("force"), "force")
+    return not too_coarse(known, {"F_cp": size}, "log", settings)
+
+
+def test_seen() -> None:
+    """A log that would have shown so small a change of the Coulomb level shows that there is none.
+
+    One that would not judges nothing.
+    """
+    assert says_none(0.04, DriftSettings())
+    assert not says_none(0.0625, DriftSettings())
+
+
+def test_seen_margins() -> None:
+    """The same where so much more than 5 % does not matter."""
+    assert says_none(0.16, DriftSettings(margin=0.08))
+    assert not says_none(0.25, DriftSettings(margin=0.08))
+
+
+def test_lost() -> None:
+    """A fit that leaves so much more than those of the model's own logs has lost its way."""
+    misfit = OwnMisfit(1.0, np.zeros(1), 3, 20.0)
+    assert not misfit.has_lost_its_way(80.0 * 20.0)
+    assert misfit.has_lost_its_way(125.0 * 20.0)
+
+
+def test_vanished() -> None:
+    """A parameter that is all but gone by its fit is not judged; one that lost most of it is."""
+    assert not at_bound(-0.8)
+    assert at_bound(-0.995)
+
+
+def test_power() -> None:
+    """Of the smallest change that a test sees, nine in ten are found."""
+    size = float(seen_together(Mean((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
+    assert norm.sf(3.0 - size) == pytest.approx(0.9, abs=0.005)
 
 
 @pytest.mark.parametrize("name", ["F_sp", "dv_p"])

@@ -62,8 +62,9 @@ def command(
     """Test new logs against the model in force: has the machine changed, and in which parameters?
 
     Every log is judged alone and, with those before it, by their mean, which finds what changes
-    slowly. Writes drift.json and report.html. Exit status 0: no drift; 1: drift, a changed
-    structure, or no log that could be judged.
+    slowly. Writes drift.json and report.html. Exit status 0: no drift, or NOT JUDGED, where no test
+    alarmed but a change that matters could not have been seen (the first line says so); 1: drift, a
+    changed structure, or no log that tells anything.
     """
     from identification.drift.drift_test import DriftSettings
     from workbench.cards.own_effects import library
@@ -89,4 +90,4 @@ def command(
     if state_file:
         write_stream(state_file, found.stream)
     emit({**document, "out": folder.final}, as_json, lambda: drift_view(found, folder.final))
-    return 0 if found.verdict == "none" else 1
+    return 0 if found.verdict == "none" or (found.verdict == "not_judged" and found.tested) else 1

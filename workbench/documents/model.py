@@ -6,6 +6,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
 
+from identification.drift.reference_model import OwnLogs
 from identification.effects._base import Acting
 from identification.effects._library import Library, built_in
 from identification.errors import BadModel
@@ -154,6 +155,7 @@ class ModelFile:
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     posterior: Mapping[str, Any] | None = None
     correlation: ParameterCorrelation | None = None
+    own_logs: OwnLogs | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -179,8 +181,9 @@ class Model(ModelFile):
 
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
-    posterior: what `--posterior` found; correlation: of the parameters' errors. library: where
-    the effects' equations are. read: what to say of its file, a line for each value in another
+    posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
+    the logs lie from the model, each alone. library: where the effects'
+    equations are. read: what to say of its file, a line for each value in another
     unit than ours.
     """
 

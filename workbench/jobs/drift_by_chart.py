@@ -17,7 +17,8 @@ from workbench.documents.model import Model
 from workbench.jobs.drift_verdict import Drift, Moved
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
-from workbench.steps.drift import Drifted, Stream, drift_of, model_key
+from workbench.report.drift_tables import seen_sentence
+from workbench.steps.drift import Drifted, Stream, drift_of, model_key, seen_sizes
 
 
 def drift_by_chart(
@@ -30,23 +31,32 @@ def drift_by_chart(
     stream = Stream(_state(state), ()) if state else None
     seed = int(rng.integers(2**31))
     found = drift_of(model, model_key(model), sources, stream=stream, seed=seed)
-    worst = next(one.test for one in found.tests if one.test.verdict == found.verdict)
+    worst = [one.test for one in found.tests if one.test.verdict == found.verdict][-1]
     statistics = [one for one in (worst.single, worst.mean) if one is not None]
     return Drift(
         verdict=found.verdict,
-        reason=worst.reason or _said(worst),
+        reason="; ".join(filter(None, (worst.reason or _said(worst), _seen(worst, found)))),
         moved=tuple(_moved(one) for one in worst.moved),
         p_value=min((one.p_value for one in statistics), default=None),
         state=_plain(found),
+        unsure=worst.unsure,
+        could_have_seen=seen_sizes(worst),
     )
 
 
 def _said(test: DriftTest) -> str:
-    if not test.moved:
+    if not test.found_by:
         return "no parameter has moved"
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = (f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved)
+    moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
+    if test.unsure:
+        moved.append(f"something that it cannot tell apart, of {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
+
+
+def _seen(test: DriftTest, found: Drifted) -> str:
+    """Without an alarm, what could have been seen."""
+    return "" if test.found_by else seen_sentence(test, found.settings.to_be_seen)
 
 
 def _state(state: Mapping[str, Any]) -> DriftState:

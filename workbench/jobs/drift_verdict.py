@@ -34,8 +34,10 @@ class Moved:
 class Drift:
     """Verdict of a test: which parameters moved, and why.
 
-    p_value: of the smallest kind, over all parameters. state: what the same test wants to be given
-    with the next log; plain JSON.
+    p_value: of the smallest kind, over all parameters. unsure: parameters of which some have
+    changed, and nobody can say which; could_have_seen: smallest relative change of each that would
+    have been found, None where none would. state: what the same test wants to be given with the
+    next log; plain JSON.
     """
 
     verdict: JudgedDrift
@@ -43,6 +45,8 @@ class Drift:
     moved: tuple[Moved, ...] = ()
     p_value: float | None = None
     state: Mapping[str, Any] = field(default_factory=dict)
+    unsure: tuple[str, ...] = ()
+    could_have_seen: Mapping[str, float | None] = field(default_factory=dict)
 
 
 class DriftJudge(Protocol):

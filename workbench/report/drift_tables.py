@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.drift.drift_test import Shift, Statistic
+from identification.drift.drift_test import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
 from workbench.output import Row, table, written
 from workbench.steps.drift import Drifted, Tested
@@ -26,13 +26,44 @@ def drift_sentence(found: Drifted) -> str:
         )
     if found.verdict == "drift":
         last = [test for test in tests if test.verdict == "drift"][-1]
-        changes = ", ".join(_changed(shift) for shift in last.moved)
-        return f"Drift in {_files(found, 'drift')}: {changes}; the structure holds."
+        return f"Drift in {_files(found, 'drift')}: {_what_changed(last)}; the structure holds."
     if found.verdict == "not_judged":
-        return f"Not judged: {tests[0].reason}"
+        newest = [test for test in tests if test.tested] or tests
+        return f"NOT JUDGED, which is no all-clear: {newest[-1].reason}"
     known = sum(test.verdict == "none" for test in tests)
     margin = f"{100 * found.settings.margin:.3g} %"
-    return f"No drift in {known} of {len(tests)} log(s): no change surely beyond {margin}."
+    said = f"No drift in {known} of {len(tests)} log(s): no change surely beyond {margin}."
+    coarse = sum(test.verdict == "not_judged" for test in tests)
+    return said + (f" {coarse} NOT JUDGED: see the notes." if coarse else "")
+
+
+def _what_changed(test: DriftTest) -> str:
+    """The parameters that changed, and those of which nobody can say it."""
+    parts = [", ".join(_changed(shift) for shift in test.moved)] if test.moved else []
+    if test.unsure:
+        names = ", ".join(test.unsure)
+        first = "something changed" if not parts else "something more"
+        parts.append(f"{first}, this log cannot say which of: {names}")
+    return "; ".join(parts)
+
+
+def seen_sentence(test: DriftTest, limit: float) -> str:
+    """Which changes a test could have seen, and which parameters it does not judge by that.
+
+    limit: relative change that it must be able to see. "" where nothing was tested.
+    """
+    sizes = test.could_have_seen
+    if not sizes:
+        return ""
+    seen = [f"{n} {_percent(x)}" for n, x in sizes.items() if x <= limit]
+    coarse = [f"{n} ({_percent(x)})" for n, x in sizes.items() if x > limit]
+    coarse += [f"{n} (not told)" for n in test.not_judged]
+    said = f"could have seen: {', '.join(seen) or 'nothing'}"
+    return said + (f"; not judged: {', '.join(coarse)}" if coarse else "")
+
+
+def _percent(value: float) -> str:
+    return f"{100 * value:.2g} %" if value < 1.0 else "more than 100 %"
 
 
 def _files(found: Drifted, verdict: str) -> str:
@@ -64,7 +95,7 @@ def _run_row(one: Tested) -> Row:
         _over(test.single),
         _over(test.mean),
         chi,
-        ", ".join(shift.name for shift in test.moved) or "-",
+        ", ".join([*(shift.name for shift in test.moved), *(f"{n}?" for n in test.unsure)]) or "-",
     )
 
 
@@ -97,6 +128,9 @@ def notes(found: Drifted) -> list[str]:
         f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
     ]
     for one in found.tests:
+        said = seen_sentence(one.test, setting.to_be_seen)
+        if said:
+            out.append(f"{one.source.file}: {said}")
         if one.test.reason:
             out.append(one.test.reason)
         if one.test.found_by == "mean":
@@ -109,6 +143,9 @@ def drift_view(found: Drifted, folder: Path) -> "Group":
     from rich.console import Group, RenderableType
 
     parts: list[RenderableType] = [drift_sentence(found), table(RUN_HEAD, run_rows(found))]
+    said = seen_sentence(found.tests[-1].test, found.settings.to_be_seen)
+    if said:
+        parts.insert(1, f"{found.tests[-1].source.file}: {said}.")
     rows = shift_rows(found.tests[-1])
     if rows:
         parts.append(table(SHIFT_HEAD, rows))

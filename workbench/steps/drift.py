@@ -24,6 +24,7 @@ from identification.estimation.estimates import told_estimate
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
+from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, as_number, model_document, used, versions
 from workbench.documents.reading import read_result
 from workbench.logs.sources import Source, Sources
@@ -74,15 +75,30 @@ class Drifted:
 
     @property
     def verdict(self) -> DriftVerdict:
-        """The worst of the runs' verdicts; "not_judged" only where none could be judged."""
-        found = {one.test.verdict for one in self.tests}
-        order: tuple[DriftVerdict, ...] = ("structure", "drift", "none", "not_judged")
-        return next(verdict for verdict in order if verdict in found)
+        """The worst of the runs' verdicts, or else that of the newest run that was tested at all.
+
+        What an older log has shown says nothing of a change since.
+        """
+        found = [one.test.verdict for one in self.tests]
+        alarms: tuple[DriftVerdict, ...] = ("structure", "drift")
+        for verdict in alarms:
+            if verdict in found:
+                return verdict
+        tested = [one.test.verdict for one in self.tests if one.test.tested]
+        return tested[-1] if tested else "not_judged"
+
+    @property
+    def tested(self) -> bool:
+        """Whether any run was tested, whatever it could have shown."""
+        return any(one.test.tested for one in self.tests)
 
 
 def model_key(model: Model) -> str:
     """What names a model in a stored state: sha256 of what model.json says of it."""
-    return hashlib.sha256(dumps(model_document(model)).encode()).hexdigest()
+    document = model_document(model)
+    if model.own_logs is None:  # as a model was named before it could hold them
+        del document["own_logs"]
+    return hashlib.sha256(dumps(document).encode()).hexdigest()
 
 
 def model_in_force(model: Model, key: str) -> InForce:
@@ -110,6 +126,7 @@ def model_in_force(model: Model, key: str) -> InForce:
         untold=untold,
         key=key,
         fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),
+        own_logs=model.own_logs,
     )
 
 
@@ -141,6 +158,11 @@ def drift_of(
     remarks = [*model.read, *sources.remarks]
     if sources.card.name != model.card:
         remarks.append(f"the model is of {model.card}, the logs of {sources.card.name}")
+    if model.own_logs is None and model.fit.chi_square > ADEQUATE:
+        remarks.append(
+            "the model leaves more than noise, and its file does not hold how far its own logs lie"
+            " from it; identify it again, or a drift may be cried that is the model's own misfit"
+        )
     if stream is not None and stream.state.model != key:
         remarks.append("the stored state is of another model; it begins anew with this one")
         stream = None
@@ -208,7 +230,7 @@ def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:
         "schema": DRIFT_SCHEMA,
         "card": found.model.card,
         "model": {"file": model_file, "key": found.key},
-        "settings": asdict(found.settings),
+        "settings": {**asdict(found.settings), "to_be_seen": found.settings.to_be_seen},
         "verdict": found.verdict,
         "log": [_of_run(one) for one in found.tests],
         "seen": [asdict(one) for one in found.stream.seen],
@@ -227,13 +249,21 @@ def _of_run(one: Tested) -> dict[str, Any]:
         "reason": test.reason,
         "found_by": test.found_by,
         "moved": [_number(shift) for shift in test.moved],
+        "unsure": list(test.unsure),
         "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
         "not_judged": dict(test.not_judged),
+        "could_have_seen": seen_sizes(test),
         "single": _statistic(test.single),
+        "alone": _statistic(test.alone),
         "mean": _statistic(test.mean),
         "chi_square": test.chi_square,
         "chi_square_allowed": test.allowed,
     }
+
+
+def seen_sizes(test: DriftTest) -> dict[str, float | None]:
+    """Smallest change of each parameter that a test could have seen, None where it sees none."""
+    return {n: x if np.isfinite(x) else None for n, x in test.could_have_seen.items()}
 
 
 def _number(shift: Shift) -> dict[str, Any]:

@@ -7,7 +7,7 @@ between, since that is what moves the body. A log from a closed loop is fitted d
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -16,6 +16,7 @@ from identification.arrays import Array
 from identification.arx.model import ArxModel, fit_arx, one_step_errors, simulation_errors
 from identification.arx.order_selection import OrderRange, select_arx
 from identification.arx.residual_tests import residual_tests
+from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
@@ -36,6 +37,7 @@ from workbench.documents.model import (
     versions,
 )
 from workbench.logs.sources import Source
+from workbench.steps.drift import model_in_force
 
 Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
@@ -76,6 +78,7 @@ def identify(
     for log in logs:  # wrong options are refused before the long part
         check_period(options.design_period, log.name, log.duration)
         decimation(log.h, options.design_period)
+    (alone,) = rng.spawn(1)
     fit = fit_plant(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
     unit = units_of(rig.motion)["F_cp"]
     always = None if fit.adequate else constant_force(logs, held=rig.kind == "motor")
@@ -84,36 +87,42 @@ def identify(
         why = f"m: {first}" if always is None else constant_remark(always, unit)
         raise NotIdentifiable(f"none of the nine parameters is identifiable: {why}")
     plant, reason = _arx_or_reason(logs, options)
-    errors = _force_error(logs[0], fit, rig)
-    return (
-        Model(
-            card=card,
-            rig=rig,
-            friction=_nine(fit, rig),
-            actuator=_actuator(fit, rig),
-            plant=plant,
-            plant_reason=reason,
-            fit=FitSummary(
-                drive=fit.drive,
-                stiffness=0.0,
-                noise_y=fit.noise_y,
-                noise_F=fit.noise_F,
-                chi_square=fit.chi_square,
-                adequate=fit.adequate,
-                evaluations=fit.evaluations,
-                force_relative=errors.relative if errors else None,
-                force_rms=errors.rms if errors else None,
-                remarks=(
-                    *fit.remarks,
-                    *([] if always is None else [constant_remark(always, unit)]),
-                    *closed_loop_remarks(logs),
-                ),
-            ),
-            log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
-            versions=versions(),
-            correlation=_correlation(fit),
+    model = Model(
+        card=card,
+        rig=rig,
+        friction=_nine(fit, rig),
+        actuator=_actuator(fit, rig),
+        plant=plant,
+        plant_reason=reason,
+        fit=_summary(
+            fit,
+            _force_error(logs[0], fit, rig),
+            [] if always is None else [constant_remark(always, unit)],
+            closed_loop_remarks(logs),
         ),
-        fit,
+        log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
+        versions=versions(),
+        correlation=_correlation(fit),
+    )
+    known = with_own_logs(model_in_force(model, ""), logs, alone)
+    return replace(model, own_logs=known.own_logs), fit
+
+
+def _summary(
+    fit: KarnoppFit, errors: ForceError | None, always: Sequence[str], closed: Sequence[str]
+) -> FitSummary:
+    """What the fit left; always, closed: lines on a constant force and on closed loops."""
+    return FitSummary(
+        drive=fit.drive,
+        stiffness=0.0,
+        noise_y=fit.noise_y,
+        noise_F=fit.noise_F,
+        chi_square=fit.chi_square,
+        adequate=fit.adequate,
+        evaluations=fit.evaluations,
+        force_relative=errors.relative if errors else None,
+        force_rms=errors.rms if errors else None,
+        remarks=(*fit.remarks, *always, *closed),
     )
 
 

@@ -151,7 +151,72 @@ def test_the_models_own_error_counts() -> None:
     settings = DriftSettings(variation=0.001)
     unsure = replace(known, covariance=np.diag((0.03 * known.values) ** 2))
     found = judged_estimate(unsure, log, "log", fresh_state("", known.names), settings)
-    assert found.verdict == "none"
+    assert found.verdict == "not_judged"
+
+
+def coulomb(sd: float, changed: float, *names: str) -> tuple[InForce, LogEstimate]:
+    """A model and a log that tell these to a deviation `sd`, all of them changed by a share."""
+    values = np.array([getattr(NINE, name) for name in names])
+    covariance = np.diag((sd * values) ** 2)
+    known = InForce(
+        Plant(NINE, ACTUATOR), names, values, 1e-6 * covariance, FORCE, "command", key="one"
+    )
+    return known, LogEstimate(names, (1.0 + changed) * values, covariance, {}, 1.0, 2.0)
+
+
+def test_ten_logs_that_could_not_have_seen_a_drift_of_five_percent_do_not_judge() -> None:
+    state = fresh_state("one", ("m", "F_cp", "F_cn"))
+    for k in range(10):
+        known, log = coulomb(0.1, 0.005 * (k + 1), "m", "F_cp", "F_cn")
+        found = judged_estimate(known, log, "log", state, DriftSettings())
+        assert found.verdict == "not_judged" and found.tested
+        assert "a change of 5 % could not have been seen (F_cp from" in found.reason
+        assert all(size > 0.05 for size in found.could_have_seen.values())
+        state = found.state
+
+
+def test_none_needs_both_coulomb_levels_and_no_more() -> None:
+    known, log = coulomb(0.002, 0.0, "m", "F_cp", "F_cn")
+    assert (
+        judged_estimate(known, log, "log", fresh_state("one", known.names), DriftSettings()).verdict
+        == "none"
+    )
+    for name, verdict in (("m", "none"), ("F_cn", "not_judged")):
+        i = known.names.index(name)
+        covariance = log.covariance.copy()
+        covariance[i, i] *= 60.0**2
+        found = judged_estimate(
+            known, replace(log, covariance=covariance), "log", fresh_state("one", known.names),
+            DriftSettings(),
+        )  # fmt: skip
+        assert found.verdict == verdict
+        assert found.could_have_seen[name] > 0.05 > found.could_have_seen["F_cp"]
+
+
+def test_what_is_seen_is_found() -> None:
+    """A change as large as the smallest that could have been seen, of one parameter alone."""
+    known, quiet = coulomb(0.003, 0.0, "m", "F_cp", "F_cn")
+    state = fresh_state("one", known.names)
+    size = judged_estimate(known, quiet, "log", state, DriftSettings()).could_have_seen["F_cp"]
+    rng, alarms = np.random.default_rng(1), 0
+    for _ in range(100):
+        factor = 1.0 + 0.003 * rng.standard_normal(3) + size * np.array([0.0, 1.0, 0.0])
+        log = replace(quiet, values=factor * known.values)
+        found = judged_estimate(known, log, "log", state, DriftSettings())
+        alarms += found.verdict == "drift"
+    assert alarms >= 85
+
+
+def test_of_parameters_that_cannot_be_told_apart_none_is_named() -> None:
+    known, log = coulomb(0.05, 0.0, "F_cp", "F_vp")
+    together = np.array([[1.0, -0.999], [-0.999, 1.0]]) * np.outer(
+        0.05 * known.values, 0.05 * known.values
+    )
+    log = replace(log, values=known.values * np.array([1.045, 1.045]), covariance=together)
+    found = judged_estimate(known, log, "log", fresh_state("one", known.names), DriftSettings())
+    assert found.verdict == "drift"
+    assert found.moved == ()
+    assert set(found.unsure) == {"F_cp", "F_vp"}
 
 
 @pytest.mark.parametrize(

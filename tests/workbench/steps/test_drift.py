@@ -1,5 +1,6 @@
 """The drift command and what lies behind it: model in force, stored stream, report, refusals."""
 
+import hashlib
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from identification.drift.drift_test import DriftSettings, DriftTest, Statistic
+from identification.drift.mewma import fresh_state
+from identification.drift.reference_model import OwnLogs
 from identification.errors import BadModel
 from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
@@ -14,7 +18,16 @@ from tests.told import broken_in
 from workbench.cli import main
 from workbench.documents.model import ParameterCorrelation, model_document, read_model
 from workbench.output import dumps
-from workbench.steps.drift import model_in_force, model_key, read_stream
+from workbench.steps.drift import (
+    Drifted,
+    Stream,
+    model_in_force,
+    model_key,
+    read_stream,
+)
+from workbench.steps.drift import (
+    Tested as OneRun,
+)
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +64,54 @@ def test_no_drift_is_status_0_and_a_report(shop: Path, tmp_path: Path) -> None:
     assert list(broken_in(found)) == []
     report = (tmp_path / "d/report.html").read_text(encoding="utf-8")
     assert "<svg" in report and "No drift" in report
+
+
+def test_what_could_not_have_been_seen_is_status_0_and_loud(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    capsys.readouterr()
+    assert run(shop, tmp_path / "d", "b", "--variation", "5") == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    assert shown.startswith("NOT JUDGED, which is no all-clear: b.csv: no alarm, but a change of")
+    assert "could have seen: nothing; not judged: m (" in shown
+    found = json.loads((tmp_path / "d/drift.json").read_text(encoding="utf-8"))
+    assert found["verdict"] == found["log"][0]["verdict"] == "not_judged"
+    assert found["settings"]["to_be_seen"] == 0.05
+    assert found["log"][0]["could_have_seen"]["F_cp"] > 0.05
+    assert set(NAMES) <= set(found["log"][0]["parameters"])
+
+
+def test_an_older_log_is_no_comfort_for_a_newer_one_that_could_see_nothing() -> None:
+    state = fresh_state("k", ())
+    blank = DriftTest("a", "none", (), {}, {}, None, None, None, None, None, "", state)
+    tested = replace(blank, single=Statistic(0.0, 1.0, 1.0, 1))
+    silent = replace(blank, verdict="not_judged")
+    coarse = replace(tested, verdict="not_judged")
+    model = identified().model
+    source = identified().sources[0]
+    for tests, verdict in (
+        ((tested, coarse), "not_judged"),
+        ((coarse, tested), "none"),
+        ((tested, silent), "none"),
+        ((silent,), "not_judged"),
+    ):
+        runs = tuple(OneRun(source, one, False) for one in tests)
+        found = Drifted(model, "k", DriftSettings(), runs, Stream(state, ()), ())
+        assert found.verdict == verdict
+
+
+def test_the_model_file_carries_its_own_logs_and_older_ones_keep_their_key(tmp_path: Path) -> None:
+    model = identified().model
+    own = OwnLogs(("m", "F_cp"), (0.01, None), (1.0, 2.0), (3.0, 4.0))
+    path = tmp_path / "model.json"
+    path.write_text(dumps(model_document(replace(model, own_logs=own))), encoding="utf-8")
+    read = read_model(path)
+    assert read.own_logs == own
+    assert model_in_force(read, "k").own_logs == own
+    document = model_document(replace(model, own_logs=None))
+    del document["own_logs"]  # as before there were any
+    path.write_text(dumps(document), encoding="utf-8")
+    assert model_key(read_model(path)) == hashlib.sha256(dumps(document).encode()).hexdigest()
 
 
 def test_drift_is_status_1_and_names_the_parameter(
