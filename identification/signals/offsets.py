@@ -1,0 +1,96 @@
+"""A position that jumps or wraps, put back where the body is, and cut there.
+
+What is left of a jump's size after it is taken out would still be an error of all that follows; so
+the log is cut there too, where that leaves pieces long enough to tell something.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.arrays import Array
+from identification.log import Log
+from identification.signals.bad_samples import BadSamples
+from identification.signals.check import JUMPS_ALIKE
+from identification.signals.differentiate import resolution
+from identification.signals.jumps import jumps
+from identification.signals.steps import SIDES, jump_size, small_jumps
+
+LONGEST_ROUNDS = 8  # in which jumps of another size are looked for
+SHORTEST_PIECE = 1.0  # s, on either side of a jump, of a log that is cut there
+CUT = 3  # samples to either side of a jump that are left out
+OF_TURN = 0.02  # of a turn or of a counter's range, that the wraps of one are off
+FEWEST_WRAPS = 2
+
+
+def without_jumps(log: Log, rotary: bool) -> tuple[Log, tuple[BadSamples, ...]]:
+    """The log with a position that does not jump, and the jumps; those of no clear size are left
+    for `check` to refuse."""
+    log, found = _unwrapped(log, rotary)
+    at = list[int]()
+    for _ in range(LONGEST_ROUNDS):
+        large = jumps(log, rotary)
+        new = small_jumps(log["t"], log["y"]) if large is None else large.at
+        new = np.array([k for k in new if SIDES[-1] <= k < len(log) - SIDES[-1]], dtype=np.intp)
+        if not len(new) or set(new.tolist()) & set(at) or (large is not None and large.wraps):
+            break
+        before = log["y"]
+        log = log.with_signals(y=_continued(before, new))
+        at += new.tolist()
+        found += [_jump(log, int(k), abs(jump_size(before, int(k)))) for k in new]
+    return _cut(log, sorted(at)), tuple(found)
+
+
+def _continued(y: Array, at: NDArray[np.intp]) -> Array:
+    """The position (n,) that goes on after each sample `at` as it was going."""
+    out = np.array(y)
+    for k in at.tolist():
+        out[k + 1 :] -= jump_size(out, k)
+    return out
+
+
+def _jump(log: Log, k: int, size: float) -> BadSamples:
+    t = float(log["t"][k + 1])
+    return BadSamples(log.name, "y", "jump", t, t, 1, size, "offset removed")
+
+
+def _unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
+    """The log with a counter that wraps unwrapped, where all its leaps are of one size."""
+    found = jumps(log, rotary)
+    if found is None or not found.wraps or len(found.at) < FEWEST_WRAPS:
+        return log, []
+    y = log["y"]
+    inner = [int(k) for k in found.at if SIDES[-1] <= k < len(y) - SIDES[-1]]
+    sizes = np.abs([jump_size(y, k) for k in inner])
+    if len(sizes) < FEWEST_WRAPS or np.ptp(sizes) > JUMPS_ALIKE * np.max(sizes):
+        return log, []
+    period = _period(float(np.median(sizes)), y, rotary)
+    made = np.zeros(len(y))
+    made[found.at + 1] = np.sign(found.size) * period
+    t = log["t"][found.at + 1]
+    one = BadSamples(
+        log.name, "y", "wrap", float(t[0]), float(t[-1]), len(t), period, "offset removed"
+    )
+    return log.with_signals(y=y - np.cumsum(made)), [one]
+
+
+def _period(size: float, y: Array, rotary: bool) -> float:
+    """Range of a counter that leaps by about this size: a turn, or a power of two of its counts."""
+    if rotary and abs(size / (2.0 * np.pi) - 1.0) < OF_TURN:
+        return 2.0 * float(np.pi)
+    count = resolution(y)
+    if count > 0.0:
+        power = count * 2.0 ** round(np.log2(size / count))
+        return power if abs(size / power - 1.0) < OF_TURN else count * round(size / count)
+    return size
+
+
+def _cut(log: Log, at: list[int]) -> Log:
+    """The log without the samples around these jumps, where pieces on both sides are long."""
+    away = np.zeros(len(log), dtype=bool)
+    least, last = round(SHORTEST_PIECE / log.h), 0
+    ends = [*at[1:], len(log)] if at else []
+    for k, after in zip(at, ends, strict=True):
+        if k - last >= least and after - k >= least:
+            away[k + 1 - CUT : k + 1 + CUT] = True
+            last = k
+    return Log(log.name, {key: x[~away] for key, x in log.signals.items()}) if at else log
