@@ -139,10 +139,11 @@ def tails(x: Array, _at: int, rng: np.random.Generator, noise: float, share: flo
     x[off] += noise * rng.choice([-1, 1], len(x))[off] * rng.uniform(5, 50, len(x))[off]
 
 
-def wrapped(x: Array, _at: int, _rng: np.random.Generator) -> None:
-    """A counter of too few bits."""
-    period = 0.55 * float(np.ptp(x))
-    x[:] = np.mod(x, period)
+def wrapped(x: Array, _at: int, _rng: np.random.Generator, noise: float, turn: bool) -> None:
+    """A counter of too few bits, or an angle that begins anew at each turn."""
+    count = 0.25 * noise
+    period = count * 2.0 ** round(np.log2(0.6 * float(np.ptp(x)) / count))
+    x[:] = np.mod(x, 2.0 * np.pi) if turn else np.mod(count * np.round(x / count), period)
 
 
 def clipped(x: Array, _at: int, _rng: np.random.Generator) -> None:
@@ -166,7 +167,7 @@ def faults(machine: Machine) -> Iterator[tuple[str, str, Change]]:
         yield "frozen", name, partial(frozen, length=40)
         if name == "y":
             yield "frozen, lost", name, partial(frozen, length=40, lost=True)
-            yield "wrapped", name, wrapped
+            yield "wrapped", name, partial(wrapped, noise=noise, turn=machine.rig.motion == "rotary")
         if name == "u":
             yield "clipped", name, clipped
         else:

@@ -15,6 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.estimation.contradicted import corrected, told_of
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
@@ -35,10 +36,18 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant
 from identification.progress import Progress, quiet
-from identification.thresholds import ACTUATOR_MISFIT, ACTUATOR_SHARE, COMPLETE, NO_RUN
+from identification.signals.bad_samples import BadSamples
+from identification.thresholds import (
+    ACTUATOR_MISFIT,
+    ACTUATOR_SHARE,
+    COMPLETE,
+    NEARLY_FOLLOWED,
+    NO_RUN,
+)
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+CORRECTIONS = 3  # rounds in which bad samples are looked for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
@@ -64,15 +73,58 @@ def fit_plant(
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
         return _with_effects(prior, recorded, settle, report)
-    near = None
+    near, bad = None, tuple[BadSamples, ...]()
     if prior is not None:
-        near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+        recorded, near, bad = _near(prior, recorded)
         if near.misfit <= COMPLETE:
-            return settled(near.plant, recorded, near.misfit, settle, report, refined=near)
-    found = plain_structure(recorded, begin)
+            fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
+            return _telling(fit, bad)
+    recorded, found, more = _without_bad(recorded, begin)
     if near is not None and near.misfit < found.misfit:
         found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
-    return _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
+    fit = _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
+    return _telling(fit, (*bad, *more))
+
+
+def _telling(fit: KarnoppFit, bad: tuple[BadSamples, ...]) -> KarnoppFit:
+    """The fit that says which samples it has set aside."""
+    return replace(fit, bad=bad, remarks=(*told_of(bad), *fit.remarks)) if bad else fit
+
+
+def _near(
+    prior: Plant, recorded: RecordedLogs
+) -> tuple[RecordedLogs, Refit, tuple[BadSamples, ...]]:
+    """The plant that was in force refined on the logs, without the samples that it contradicts."""
+    near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+    made = corrected(near.plant, recorded) if near.misfit <= NEARLY_FOLLOWED else None
+    if made is None or not made.bad:
+        return recorded, near, ()
+    again = refit(near.plant, made.recorded.logs, recorded.drive, prior={}, effort="near")
+    return made.recorded, again, made.bad
+
+
+def _without_bad(
+    recorded: RecordedLogs, rng: np.random.Generator
+) -> tuple[RecordedLogs, FittedStructure, tuple[BadSamples, ...]]:
+    """The logs without the samples that the plain plant contradicts, that plant, and those samples.
+
+    Looked for where the plant follows the logs but for a few places; again from the plant without
+    what was found.
+    """
+    bad = list[BadSamples]()
+    found = plain_structure(recorded, rng)
+    for seed in rng.spawn(CORRECTIONS):
+        if found.imposed or found.misfit > NEARLY_FOLLOWED:
+            break
+        made = corrected(found.plant, recorded)
+        if not made.bad:
+            break
+        again = plain_structure(made.recorded, seed)
+        if again.misfit > max(found.misfit, COMPLETE):
+            break
+        recorded, found = made.recorded, again
+        bad += made.bad
+    return recorded, found, tuple(bad)
 
 
 def finished(

@@ -23,7 +23,10 @@ from identification.signals.offsets import without_jumps
 from identification.signals.steps import small_spikes, white_noise
 
 LONGEST_REPAIR = 3
-"""Missing samples in a row that are interpolated; at a longer run the log is cut."""
+"""Missing samples in a row that are interpolated; at a longer run the log is cut.
+
+So it is at any of a command: what a controller gave is not what lies between two other samples.
+"""
 
 LONGEST_GAP = 5.0
 """Sampling periods between two samples above which a log is cut in two."""
@@ -107,7 +110,7 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
         if not np.any(missing):
             continue
         what = f"{log.name}: signal {name!r}"
-        long = _refuse_runs(what, missing, first_row)
+        long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
         isolated = missing & ~long
         away |= long
         filled = np.interp(log["t"], log["t"][~missing], values[~missing])
@@ -118,6 +121,8 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
         bad += _found(log, name, "missing", long, "cut out")
         log = log.with_signals(**{name: filled})
     for name in ("y", "F", "p_p", "p_n", "u"):
+        if name == "F" and _commanded(log):
+            continue
         if name in log and name not in {one.signal for one in bad if one.done == "cut out"}:
             still = frozen(log[name], at_limits=name == "u")
             bad += _found(log, name, "frozen", still, "cut out")
@@ -134,6 +139,15 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     bad += _limits(log)
     told = [one for one in bad if one.done != "interpolated"]
     return Repaired(log, (*remarks, *lines(told)), tuple(bad))
+
+
+def _commanded(log: Log) -> bool:
+    """Whether the force is the command times a constant, and no measured one."""
+    if "F" not in log or "u" not in log:
+        return False
+    F, u = log["F"], log["u"]
+    largest = int(np.argmax(np.abs(u)))
+    return bool(u[largest] != 0.0 and np.allclose(F, u * (F[largest] / u[largest]), rtol=1e-9))
 
 
 def _left_out(log: Log, away: Mask, first_row: int) -> Log:
@@ -229,8 +243,8 @@ def _unit(name: str, rotary: bool) -> str:
     return units.get(name, "Pa")
 
 
-def _refuse_runs(what: str, missing: Mask, first_row: int) -> Mask:
-    """Where more than `LONGEST_REPAIR` are missing in a row, (n,); BadLog where too many are."""
+def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mask:
+    """Where more than so many are missing in a row, (n,); BadLog where too many are."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], missing.astype(np.int8), [0]))))
     starts, stops = edges[0::2], edges[1::2]
     if missing[0] or missing[-1]:
@@ -238,7 +252,7 @@ def _refuse_runs(what: str, missing: Mask, first_row: int) -> Mask:
         raise BadLog(f"{what} is NaN or infinite in row {where}, an end of the log; cut it off")
     long = np.zeros_like(missing)
     for a, b in zip(starts.tolist(), stops.tolist(), strict=True):
-        long[a:b] = b - a > LONGEST_REPAIR
+        long[a:b] = b - a > repaired
     isolated = missing & ~long
     if isolated.mean() > _MANY or missing.mean() > _MOST_CUT:
         raise BadLog(

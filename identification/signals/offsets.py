@@ -59,9 +59,12 @@ def _unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
     if found is None or not found.wraps or len(found.at) < FEWEST_WRAPS:
         return log, []
     y = log["y"]
-    inner = [int(k) for k in found.at if SIDES[-1] <= k < len(y) - SIDES[-1]]
-    sizes = np.abs([jump_size(y, k) for k in inner])
-    if len(sizes) < FEWEST_WRAPS or np.ptp(sizes) > JUMPS_ALIKE * np.max(sizes):
+    apart = np.diff(np.concatenate([[-np.inf], found.at, [np.inf]])) > 2 * SIDES[-1]
+    alone = found.at[apart[1:] & apart[:-1]]
+    alone = alone[(alone >= SIDES[-1]) & (alone < len(y) - SIDES[-1])]
+    # Where a counter goes to and fro over its end, its steps on the way even out.
+    sizes = np.abs([jump_size(y, int(k)) for k in alone] if len(alone) else found.size)
+    if np.ptp(np.abs(found.size)) > JUMPS_ALIKE * np.max(np.abs(found.size)):
         return log, []
     period = _period(float(np.median(sizes)), y, rotary)
     made = np.zeros(len(y))

@@ -53,34 +53,34 @@ def _line_weights(side: int) -> tuple[Array, Array]:
     return height, slope
 
 
-def steps_between(x: Array) -> Array:
+def steps_between(x: Array, sides: tuple[int, ...] = SIDES) -> Array:
     """How much each sample steps beyond the motion around it, (n - 1,); 0 where that is a kink.
 
     The least of the heights between the lines of each number of samples, where all agree in sign.
     """
-    n, widest = len(x), SIDES[-1]
+    n, widest = len(x), sides[-1]
     least = np.full(n - 1, 0.0 if n < 2 * widest else np.inf)
     way = np.zeros(n - 1)
     bend = np.zeros(n - 1)
-    for side in SIDES:
+    for side in sides:
         height, slope = _line_weights(side)
         here = slice(side - 1, n - side)
         found = np.correlate(x, height, mode="valid")
         least[here] = np.minimum(least[here], np.abs(found))
         way[here] += np.sign(found)
         bend[here] = np.maximum(bend[here], np.abs(np.correlate(x, slope, mode="valid")))
-    agreed = (np.abs(way) == len(SIDES)) & (least > BEND * bend)
+    agreed = (np.abs(way) == len(sides)) & (least > BEND * bend)
     agreed[: widest - 1] = agreed[n - widest :] = False
     size = np.where(agreed, least, 0.0)
-    return np.asarray(np.sign(way) * np.where(size > CLEAR * _roughness(x), size, 0.0))
+    return np.asarray(np.sign(way) * np.where(size > CLEAR * _roughness(x, widest), size, 0.0))
 
 
-def _roughness(x: Array) -> Array:
-    """What the lines through the widest sides leave, root mean square of the worse side, (n - 1,).
+def _roughness(x: Array, side: int) -> Array:
+    """What the lines through so many samples leave, root mean square of the worse side, (n - 1,).
 
     A body that is moved for a few samples only is far off these lines.
     """
-    side, n = SIDES[-1], len(x)
+    n = len(x)
     out = np.full(n - 1, np.inf)
     if n < 2 * side:
         return out
@@ -101,10 +101,23 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
         return np.zeros(0, dtype=np.intp)
     period = np.diff(t)
     gap = maximum_filter1d(period, 2 * SIDES[-1] + 1) > WHOLE_PERIODS * float(np.median(period))
-    size = np.where(gap, 0.0, np.abs(steps_between(y)))
+    found = outstanding(np.where(gap, 0.0, steps_between(y)), JUMP_FROM * white_noise(y))
+    # What changes the speed elsewhere within a sample may do so here, from rest to rest.
+    change = np.where(gap[1:] | gap[:-1], 0.0, np.abs(np.diff(y, 2)))
+    for k in found.tolist():
+        change[max(k - NEAR, 0) : k + NEAR] = 0.0
+    size = np.abs([jump_size(y, int(k)) for k in found])
+    return found[size > SUDDEN * float(np.max(change))]
+
+
+def outstanding(steps: Array, least: float) -> NDArray[np.intp]:
+    """Places (k,) of the largest of these steps (n,), which stand out of all others, in order.
+
+    least: size that one has at least; none where too many stand out.
+    """
+    size = np.abs(steps)
     peak = np.flatnonzero((size > 0.0) & (size == maximum_filter1d(size, 2 * NEAR + 1)))
     order = peak[np.argsort(-size[peak], kind="stable")][: MOST_JUMPS + 1]
-    least = JUMP_FROM * white_noise(y)
     if not len(order) or size[order[0]] < least:
         return order[:0]
     after = np.append(size[order[1:]], 0.0)
@@ -112,17 +125,11 @@ def small_jumps(t: Array, y: Array) -> NDArray[np.intp]:
     count = int(np.argmax(np.where(size[order] >= least, ratio, 0.0))) + 1
     if ratio[count - 1] < STANDS_OUT or count > MOST_JUMPS:
         return order[:0]
-    # What changes the speed elsewhere within a sample may do so here, from rest to rest.
-    change = np.where(gap[1:] | gap[:-1], 0.0, np.abs(np.diff(y, 2)))
-    for k in order[:count].tolist():
-        change[max(k - NEAR, 0) : k + NEAR] = 0.0
-    found = order[:count]
-    return np.sort(found[size[found] > SUDDEN * float(np.max(change))])
+    return np.sort(order[:count])
 
 
-def jump_size(y: Array, at: int) -> float:
-    """By how much the position jumps after sample `at`, from lines through 8 samples a side."""
-    side = SIDES[-1]
+def jump_size(y: Array, at: int, side: int = SIDES[-1]) -> float:
+    """By how much the position jumps after sample `at`, from lines through `side` samples each."""
     height, _ = _line_weights(side)
     return float(height @ y[at - side + 1 : at + side + 1])
 
@@ -140,26 +147,32 @@ def _parabola(length: int) -> tuple[Array, Array]:
     return np.eye(2 * BESIDE) - basis @ solve, np.vander(inside, 3) @ solve
 
 
+def deviations(x: Array, length: int) -> tuple[Array, Array]:
+    """How far so many samples from each on lie off the parabola through their neighbours, all to
+    one side (else 0), and how far the neighbours themselves usually do, each (n,)."""
+    height, own = np.zeros(len(x)), np.full(len(x), np.inf)
+    if len(x) < 2 * BESIDE + length:
+        return height, own
+    leaves, gives = _parabola(length)
+    view = np.lib.stride_tricks.sliding_window_view(x, 2 * BESIDE + length)
+    beside = np.concatenate([view[:, :BESIDE], view[:, BESIDE + length :]], axis=1)
+    off = view[:, BESIDE : BESIDE + length] - beside @ gives.T
+    one_side = np.abs(np.sum(np.sign(off), axis=1)) == length
+    left = np.partition(np.abs(beside @ leaves.T), int(USUAL * 2 * BESIDE), axis=1)
+    here = slice(BESIDE, BESIDE + len(view))
+    height[here] = np.where(one_side, np.min(np.abs(off), axis=1), 0.0)
+    own[here] = left[:, int(USUAL * 2 * BESIDE)]
+    return height, own
+
+
 def small_spikes(x: Array) -> NDArray[np.bool_]:
     """Where 1 to 3 samples lie off the parabola through their neighbours, all to one side, (n,)."""
     out = np.zeros(len(x), dtype=bool)
     if len(x) < 4 * BESIDE + LONGEST:
         return out
     noise = white_noise(x)
-    if noise == 0.0:
-        return out
-    for length in range(1, LONGEST + 1):
-        leaves, gives = _parabola(length)
-        view = np.lib.stride_tricks.sliding_window_view(x, 2 * BESIDE + length)
-        beside = np.concatenate([view[:, :BESIDE], view[:, BESIDE + length :]], axis=1)
-        off = view[:, BESIDE : BESIDE + length] - beside @ gives.T
-        height = np.min(np.abs(off), axis=1)
-        one_side = np.abs(np.sum(np.sign(off), axis=1)) == length
-        may = np.flatnonzero(one_side & (height > SPIKE_FROM * noise))
-        if not len(may):
-            continue
-        left = np.sort(np.abs(beside[may] @ leaves.T), axis=1)
-        own = left[:, int(USUAL * 2 * BESIDE)]
-        for first in may[height[may] > SPIKE_FROM * np.maximum(noise, own)]:
-            out[first + BESIDE : first + BESIDE + length] = True
+    for length in range(1, LONGEST + 1) if noise > 0.0 else ():
+        height, own = deviations(x, length)
+        for first in np.flatnonzero(height > SPIKE_FROM * np.maximum(noise, own)):
+            out[first : first + length] = True
     return out

@@ -1,0 +1,214 @@
+"""Bad samples that no signal shows by itself: those that a run which follows the log contradicts.
+
+A position that has jumped by a few deviations of its noise looks like any other, but from there on
+the run is off by as much. A command or a force that was logged wrong for a sample drives the run
+away, and without it the run stays. So where a plant follows a log but for a few places, these are
+looked at, corrected and told, and the plant is fitted anew.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from identification.arrays import Array, BoolArray, IntArray
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.refinement import loss
+from identification.estimation.windowed_run.windows import (
+    Freed,
+    Starts,
+    freed,
+    starts,
+    window_errors,
+    window_run,
+)
+from identification.log import Log
+from identification.model.estimates import Drive
+from identification.model.plant import Motor, Plant
+from identification.signals.bad_samples import BadSamples, Kind
+from identification.signals.steps import (
+    LONGEST,
+    deviations,
+    jump_size,
+    outstanding,
+    steps_between,
+)
+from identification.thresholds import REPLACED_GAINS, RUN_JUMP_FROM, RUN_SPIKE_FROM
+
+SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
+BESIDE = 11  # samples whose median a single one is compared to
+MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single samples
+MOST_TRIED = 16  # samples of a drive that are tried without
+SEEN = 2.0  # deviations of the drive's own roughness, from which one is tried
+SHIFTS, FAR = 3, 20.0  # steps to the likeliest value in place of a bad one, and their longest
+LEAST_SPREAD = 1e-3  # of a run's errors in noise units: a simulated log may have none
+
+
+@dataclass(frozen=True, eq=False)
+class Corrected:
+    """Logs without what the run contradicts, and what that was."""
+
+    recorded: RecordedLogs
+    bad: tuple[BadSamples, ...]
+
+
+def corrected(plant: Plant, recorded: RecordedLogs) -> Corrected:
+    """The logs with their contradicted samples put right, as the run of this plant has them."""
+    logs, bad = list[Log](), list[BadSamples]()
+    for one in recorded.logs:
+        log, found = _of_log(plant, one, recorded.drive)
+        logs.append(log)
+        bad += found
+    return Corrected(recorded.of(logs), tuple(bad)) if bad else Corrected(recorded, ())
+
+
+def _of_log(plant: Plant, one: MotionLog, drive: Drive) -> tuple[Log, list[BadSamples]]:
+    begun = starts(one, drive)
+    weighted = freed(plant, one, drive, begun)
+    states = freed(plant, one, drive, begun, even=True)
+    if weighted is None or states is None:
+        return one.log, []
+    log, found = _without_drive_spikes(plant, one, drive, weighted)
+    run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
+    if run is None:
+        return log, found
+    r = states(window_errors(run, one, drive))
+    y, off = _without_spikes(r[0])
+    found += _told(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
+    seen = log["y"] + (r[0] - y) * one.noise_y
+    jumped = _jumps(y, begun)
+    for k in jumped.tolist():
+        size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise_y
+        seen = np.concatenate([seen[: k + 1], seen[k + 1 :] - size])
+        t = float(log["t"][k + 1])
+        found.append(BadSamples(log.name, "y", "jump", t, t, 1, abs(size), "offset removed"))
+    log = log.with_signals(y=seen)
+    if len(r) > 1:
+        F, off = _without_spikes(r[1])
+        found += _told(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
+        log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise_F)
+    return log, found
+
+
+def _spread(r: Array) -> float:
+    """Standard deviation of errors (n,), whatever single ones and slow parts are."""
+    return max(float(np.median(np.abs(np.diff(r)))) / 0.954, LEAST_SPREAD)
+
+
+def _without_spikes(r: Array) -> tuple[Array, BoolArray]:
+    """Errors (n,) of a run with the single ones put on the level around them, and where."""
+    level = np.asarray(median_filter(r, BESIDE, mode="nearest"))
+    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
+    for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
+        off[a:b] = b - a <= LONGEST
+    if off.mean() > MOST_SPIKES:
+        return r, np.zeros_like(off)
+    return np.where(off, level, r), off
+
+
+def _jumps(r: Array, begun: Starts) -> IntArray:
+    """Samples after which a run's errors (n,) stay off, none beside the start of a window."""
+    if len(r) < 4 * SIDES[-1]:
+        return np.zeros(0, dtype=np.int64)
+    steps = steps_between(r, SIDES)
+    for k in begun.at.tolist():
+        steps[max(k - SIDES[0], 0) : k + SIDES[0]] = 0.0
+    least = RUN_JUMP_FROM * _spread(r)
+    return np.asarray(outstanding(steps, least), dtype=np.int64)
+
+
+def _side(k: int, begun: Starts, n: int) -> int:
+    """Samples to either side of a jump after sample k that are of its window."""
+    borders = np.append(begun.at, n)
+    nearest = int(np.min(np.abs(borders - k)))
+    return int(np.clip(nearest - 1, SIDES[0] // 2, 2 * SIDES[-1]))
+
+
+def _told(log: Log, name: str, kind: Kind, off: BoolArray, size: Array) -> list[BadSamples]:
+    """The samples that are off as one finding."""
+    if not np.any(off):
+        return []
+    t, largest = log["t"][off], float(np.max(size[off]))
+    count = int(np.count_nonzero(off))
+    first, last = float(t[0]), float(t[-1])
+    return [BadSamples(log.name, name, kind, first, last, count, largest, "interpolated")]
+
+
+def _driving(one: MotionLog, log: Log, drive: Drive) -> Log:
+    """The log that drives a run, with what lies between samples of a measured force."""
+    if drive != "force":
+        return log
+    return one.again(log).driving if log is not one.log else one.driving
+
+
+def _without_drive_spikes(
+    plant: Plant, one: MotionLog, drive: Drive, states: Freed
+) -> tuple[Log, list[BadSamples]]:
+    """The log without those samples of what drives it, without which the run follows better."""
+    name = "F" if drive == "force" else "u"
+    x = np.asarray(one.log[name])
+    bad, height = np.zeros(len(x), dtype=bool), np.zeros(len(x))
+
+    def cost(tried: Log) -> float:
+        """What a run driven by this log leaves."""
+        run = window_run(plant, one, drive, states.begun, log=_driving(one, tried, drive))
+        return np.inf if run is None else loss(states(window_errors(run, one, drive)))
+
+    def replaced(values: Array) -> Log:
+        tried = one.log.with_signals(**{name: values})
+        if isinstance(plant.actuator, Motor):
+            return tried.with_signals(F=plant.actuator.k_a * values)
+        return tried
+
+    now = np.array(x)
+    before = cost(replaced(now))
+    for first, length, rough in _candidates(x):
+        own = slice(first, first + length)
+        if np.any(bad[own]):
+            continue
+        without = now.copy()
+        inside = np.arange(first, first + length)
+        without[own] = np.interp(inside, [first - 1, first + length], x[[first - 1, first + length]])
+        after = cost(replaced(without))
+        if before - after <= REPLACED_GAINS:
+            continue
+        # What was given there is not known but by what the run makes of it.
+        for _ in range(SHIFTS):
+            shift = np.zeros(len(x))
+            shift[own] = rough
+            low, high = (cost(replaced(without + way * shift)) for way in (-1.0, 1.0))
+            if not low + high - 2.0 * after > 0.0:
+                break
+            best = float(np.clip(0.5 * (low - high) / (low + high - 2.0 * after), -FAR, FAR))
+            moved = without + best * shift
+            left = cost(replaced(moved))
+            if left >= after:
+                break
+            without, after = moved, left
+        now, before = without, after
+        bad[own], height[own] = True, np.abs(x[own] - without[own])
+    return replaced(now) if np.any(bad) else one.log, _told(one.log, name, "spike", bad, height)
+
+
+def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:
+    """First samples and lengths of what stands out of a drive (n,) the most, and the roughness
+    around."""
+    found = list[tuple[float, int, int, float]]()
+    for length in range(1, LONGEST + 1):
+        height, own = deviations(x, length)
+        usual = max(float(np.median(own)), 1e-300)
+        share = height / np.maximum(own, usual)
+        for k in np.argsort(-share)[:MOST_TRIED].tolist():
+            if share[k] > SEEN:
+                rough = float(np.maximum(own[k], usual))
+                found.append((float(share[k]) * length**0.5, k, length, rough))
+    return [one[1:] for one in sorted(found, reverse=True)[:MOST_TRIED]]
+
+
+def told_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:
+    """A line for each finding of a fit."""
+    return tuple(f"{one.line}, since the run contradicts it" for one in fit_bad)
+
