@@ -38,6 +38,7 @@ from identification.signals.steps import (
 from identification.thresholds import REPLACED_GAINS, RUN_JUMP_FROM, RUN_SPIKE_FROM
 
 SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
+CLEAR = 2.5  # times what lines through them leave of the errors, that a jump is
 BESIDE = 11  # samples whose median a single one is compared to
 MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single samples
 MOST_TRIED = 16  # samples of a drive that are tried without
@@ -113,7 +114,7 @@ def _jumps(r: Array, begun: Starts) -> IntArray:
     """Samples after which a run's errors (n,) stay off, none beside the start of a window."""
     if len(r) < 4 * SIDES[-1]:
         return np.zeros(0, dtype=np.int64)
-    steps = steps_between(r, SIDES)
+    steps = steps_between(r, SIDES, CLEAR)
     for k in begun.at.tolist():
         steps[max(k - SIDES[0], 0) : k + SIDES[0]] = 0.0
     least = RUN_JUMP_FROM * _spread(r)

@@ -19,7 +19,7 @@ from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
 from identification.signals.frozen import frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
-from identification.signals.offsets import without_jumps
+from identification.signals.offsets import unwrapped, without_jumps
 from identification.signals.steps import small_spikes, white_noise
 
 LONGEST_REPAIR = 3
@@ -120,6 +120,9 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
             bad += _found(log, name, "missing", isolated, "interpolated")
         bad += _found(log, name, "missing", long, "cut out")
         log = log.with_signals(**{name: filled})
+    if "y" in log:
+        log, found = unwrapped(log, rotary)
+        bad += found
     for name in ("y", "F", "p_p", "p_n", "u"):
         if name == "F" and _commanded(log):
             continue
@@ -130,12 +133,12 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     log = _left_out(log, away, first_row)
     for name in _SPIKING:
         if name in log:
-            log, said, found = _without_spikes(log, name, first_row, rotary)
+            log, said, spiked = _without_spikes(log, name, first_row, rotary)
             remarks.extend(said)
-            bad.extend(found)
+            bad.extend(spiked)
     if "y" in log:
-        log, found = without_jumps(log, rotary)
-        bad.extend(found)
+        log, jumped = without_jumps(log, rotary)
+        bad.extend(jumped)
     bad += _limits(log)
     told = [one for one in bad if one.done != "interpolated"]
     return Repaired(log, (*remarks, *lines(told)), tuple(bad))

@@ -11,7 +11,6 @@ from identification.arrays import Array
 from identification.log import Log
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import JUMPS_ALIKE
-from identification.signals.differentiate import resolution
 from identification.signals.jumps import jumps
 from identification.signals.steps import SIDES, jump_size, small_jumps
 
@@ -19,14 +18,16 @@ LONGEST_ROUNDS = 8  # in which jumps of another size are looked for
 SHORTEST_PIECE = 1.0  # s, on either side of a jump, of a log that is cut there
 CUT = 3  # samples to either side of a jump that are left out
 OF_TURN = 0.02  # of a turn or of a counter's range, that the wraps of one are off
+OF_RANGE = 0.9  # of the position's range, that a counter leaps as it wraps
+ROUNDING = 1e-10  # of a range, that is no count
+WHOLE, MOSTLY = 0.01, 0.99  # of a count, that the steps of a counter are off; share that are
 FEWEST_WRAPS = 2
 
 
 def without_jumps(log: Log, rotary: bool) -> tuple[Log, tuple[BadSamples, ...]]:
     """The log with a position that does not jump, and the jumps; those of no clear size are left
-    for `check` to refuse."""
-    log, found = _unwrapped(log, rotary)
-    at = list[int]()
+    for `check` to refuse. rotary: positions are angles [rad]."""
+    found, at = list[BadSamples](), list[int]()
     for _ in range(LONGEST_ROUNDS):
         large = jumps(log, rotary)
         new = small_jumps(log["t"], log["y"]) if large is None else large.at
@@ -53,12 +54,18 @@ def _jump(log: Log, k: int, size: float) -> BadSamples:
     return BadSamples(log.name, "y", "jump", t, t, 1, size, "offset removed")
 
 
-def _unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
-    """The log with a counter that wraps unwrapped, where all its leaps are of one size."""
+def unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
+    """The log with a counter that wraps unwrapped, where all its leaps are of one size.
+
+    rotary: positions are angles [rad].
+    """
     found = jumps(log, rotary)
-    if found is None or not found.wraps or len(found.at) < FEWEST_WRAPS:
-        return log, []
     y = log["y"]
+    if found is None or len(found.at) < FEWEST_WRAPS:
+        return log, []
+    # A counter that wraps never leaves its range, whatever way it goes over the end.
+    if not found.wraps and np.min(np.abs(found.size)) < OF_RANGE * np.ptp(y):
+        return log, []
     apart = np.diff(np.concatenate([[-np.inf], found.at, [np.inf]])) > 2 * SIDES[-1]
     alone = found.at[apart[1:] & apart[:-1]]
     alone = alone[(alone >= SIDES[-1]) & (alone < len(y) - SIDES[-1])]
@@ -67,24 +74,33 @@ def _unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
     if np.ptp(np.abs(found.size)) > JUMPS_ALIKE * np.max(np.abs(found.size)):
         return log, []
     period = _period(float(np.median(sizes)), y, rotary)
-    made = np.zeros(len(y))
-    made[found.at + 1] = np.sign(found.size) * period
-    t = log["t"][found.at + 1]
+    turns = np.round(np.diff(y) / period)
+    t = log["t"][1:][turns != 0.0]
     one = BadSamples(
         log.name, "y", "wrap", float(t[0]), float(t[-1]), len(t), period, "offset removed"
     )
-    return log.with_signals(y=y - np.cumsum(made)), [one]
+    return log.with_signals(y=y - period * np.concatenate([[0.0], np.cumsum(turns)])), [one]
 
 
 def _period(size: float, y: Array, rotary: bool) -> float:
     """Range of a counter that leaps by about this size: a turn, or a power of two of its counts."""
     if rotary and abs(size / (2.0 * np.pi) - 1.0) < OF_TURN:
         return 2.0 * float(np.pi)
-    count = resolution(y)
+    count = _count(y)
     if count > 0.0:
         power = count * 2.0 ** round(np.log2(size / count))
         return power if abs(size / power - 1.0) < OF_TURN else count * round(size / count)
     return size
+
+
+def _count(y: Array) -> float:
+    """What a counter counts in, but for rounding; 0 of a position that is not counted."""
+    levels = np.diff(np.unique(y))
+    levels = levels[levels > ROUNDING * np.ptp(y)]
+    count = float(np.min(levels, initial=np.inf))
+    steps = np.diff(y) / count
+    whole = np.abs(steps - np.round(steps)) < WHOLE
+    return count if float(np.mean(whole)) > MOSTLY else 0.0
 
 
 def _cut(log: Log, at: list[int]) -> Log:

@@ -53,10 +53,13 @@ def _line_weights(side: int) -> tuple[Array, Array]:
     return height, slope
 
 
-def steps_between(x: Array, sides: tuple[int, ...] = SIDES) -> Array:
+def steps_between(
+    x: Array, sides: tuple[int, ...] = SIDES, clear: float = CLEAR
+) -> Array:  # fmt: skip
     """How much each sample steps beyond the motion around it, (n - 1,); 0 where that is a kink.
 
     The least of the heights between the lines of each number of samples, where all agree in sign.
+    clear: times what the lines leave of their samples, that it is at least.
     """
     n, widest = len(x), sides[-1]
     least = np.full(n - 1, 0.0 if n < 2 * widest else np.inf)
@@ -72,7 +75,7 @@ def steps_between(x: Array, sides: tuple[int, ...] = SIDES) -> Array:
     agreed = (np.abs(way) == len(sides)) & (least > BEND * bend)
     agreed[: widest - 1] = agreed[n - widest :] = False
     size = np.where(agreed, least, 0.0)
-    return np.asarray(np.sign(way) * np.where(size > CLEAR * _roughness(x, widest), size, 0.0))
+    return np.asarray(np.sign(way) * np.where(size > clear * _roughness(x, widest), size, 0.0))
 
 
 def _roughness(x: Array, side: int) -> Array:
