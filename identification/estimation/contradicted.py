@@ -44,25 +44,54 @@ MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single sample
 MOST_TRIED = 16  # samples of a drive that are tried without
 SEEN = 2.0  # deviations of the drive's own roughness, from which one is tried
 SHIFTS, FAR = 3, 20.0  # steps to the likeliest value in place of a bad one, and their longest
+SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
 LEAST_SPREAD = 1e-3  # of a run's errors in noise units: a simulated log may have none
 
 
 @dataclass(frozen=True, eq=False)
 class Corrected:
-    """Logs without what the run contradicts, and what that was."""
+    """Logs without what the run contradicts, and what that was.
+
+    owner: for each log the number of the one that it is a piece of.
+    """
 
     recorded: RecordedLogs
     bad: tuple[BadSamples, ...]
+    owner: tuple[int, ...]
 
 
 def corrected(plant: Plant, recorded: RecordedLogs) -> Corrected:
-    """The logs with their contradicted samples put right, as the run of this plant has them."""
-    logs, bad = list[Log](), list[BadSamples]()
-    for one in recorded.logs:
+    """The logs with their contradicted samples put right, as the run of this plant has them.
+
+    Where the command was logged wrong, the log is cut: what the machine was given is not known.
+    """
+    logs, bad, owner = list[Log](), list[BadSamples](), list[int]()
+    for i, one in enumerate(recorded.logs):
         log, found = _of_log(plant, one, recorded.drive)
-        logs.append(log)
+        pieces = _pieces(log, one, found)
+        logs += pieces
+        owner += [i] * len(pieces)
         bad += found
-    return Corrected(recorded.of(logs), tuple(bad)) if bad else Corrected(recorded, ())
+    if not bad:
+        return Corrected(recorded, (), tuple(range(len(recorded.logs))))
+    return Corrected(recorded.of(logs), tuple(bad), tuple(owner))
+
+
+def _pieces(log: Log, one: MotionLog, found: Sequence[BadSamples]) -> list[Log]:
+    """The log cut at the samples of its command that were wrong, where both pieces move."""
+    t, moves = log["t"], one.signals["d"] != 0
+    least = max(LEAST_PIECE, round(SHORTEST_PIECE / log.h))
+    out, low = list[Log](), 0
+    for bad in found:
+        if bad.signal != "u":
+            continue
+        before, after = np.searchsorted(t, [bad.first - 1.5 * log.h, bad.last + 1.5 * log.h])
+        if min(before - low, len(t) - after) < least:
+            continue
+        if np.any(moves[low:before]) and np.any(moves[after:]):
+            out.append(log.part(low, int(before)))
+            low = int(after)
+    return [*out, log.part(low, len(t))] if out else [log]
 
 
 def _of_log(plant: Plant, one: MotionLog, drive: Drive) -> tuple[Log, list[BadSamples]]:
@@ -191,7 +220,13 @@ def _without_drive_spikes(
             without, after = moved, left
         now, before = without, after
         bad[own], height[own] = True, np.abs(x[own] - without[own])
-    return replaced(now) if np.any(bad) else one.log, _told(one.log, name, "spike", bad, height)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad.astype(np.int8), [0]))))
+    found = list[BadSamples]()
+    for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
+        only = np.zeros_like(bad)
+        only[a:b] = True
+        found += _told(one.log, name, "spike", only, height)
+    return replaced(now) if found else one.log, found
 
 
 def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:

@@ -11,11 +11,11 @@ force, or along a motion that a rig imposes; from nothing, or from the model tha
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.contradicted import corrected, told_of
+from identification.estimation.contradicted import Corrected, corrected, told_of
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
@@ -73,45 +73,69 @@ def fit_plant(
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
         return _with_effects(prior, recorded, settle, report)
-    near, bad = None, tuple[BadSamples, ...]()
+    near, given = None, recorded
+    set_aside = SetAside((), tuple(range(len(logs))))
     if prior is not None:
-        recorded, near, bad = _near(prior, recorded)
+        near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+        if near.misfit <= NEARLY_FOLLOWED:
+            made = corrected(near.plant, recorded)
+            if made.bad:
+                recorded, set_aside = made.recorded, set_aside.and_of(made)
+                near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
             fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
-            return _telling(fit, bad)
-    recorded, found, more = _without_bad(recorded, begin)
+            return set_aside.told(fit, given)
+    recorded, found, set_aside = _without_bad(recorded, begin, set_aside)
     if near is not None and near.misfit < found.misfit:
         found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
     fit = _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
-    return _telling(fit, (*bad, *more))
+    return set_aside.told(fit, given)
 
 
-def _telling(fit: KarnoppFit, bad: tuple[BadSamples, ...]) -> KarnoppFit:
-    """The fit that says which samples it has set aside."""
-    return replace(fit, bad=bad, remarks=(*told_of(bad), *fit.remarks)) if bad else fit
+@dataclass(frozen=True)
+class SetAside:
+    """Samples that were set aside, and for each log the number of the given one that it is of."""
+
+    bad: tuple[BadSamples, ...]
+    owner: tuple[int, ...]
+
+    def and_of(self, made: Corrected) -> "SetAside":
+        """With what was found next, in these logs."""
+        return SetAside((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
+
+    def told(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
+        """The fit of all pieces as one of the given logs, that says what was set aside."""
+        if not self.bad:
+            return fit
+        logs = []
+        for i in range(len(given.logs)):
+            own = [one for one, of in zip(fit.logs, self.owner, strict=True) if of == i]
+            logs.append(
+                replace(
+                    own[0],
+                    position_rms=_together([one.position_rms for one in own]),
+                    force_rms=None if own[0].force_rms is None
+                    else _together([one.force_rms or 0.0 for one in own]),
+                    chi_square=float(np.mean([one.chi_square for one in own])),
+                )
+            )  # fmt: skip
+        said = (*told_of(self.bad), *fit.remarks)
+        return replace(fit, bad=self.bad, remarks=said, logs=tuple(logs))
 
 
-def _near(
-    prior: Plant, recorded: RecordedLogs
-) -> tuple[RecordedLogs, Refit, tuple[BadSamples, ...]]:
-    """The plant that was in force refined on the logs, without the samples that it contradicts."""
-    near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
-    made = corrected(near.plant, recorded) if near.misfit <= NEARLY_FOLLOWED else None
-    if made is None or not made.bad:
-        return recorded, near, ()
-    again = refit(near.plant, made.recorded.logs, recorded.drive, prior={}, effort="near")
-    return made.recorded, again, made.bad
+def _together(rms: Sequence[float]) -> float:
+    """Root mean square over pieces, of that of each."""
+    return float(np.sqrt(np.mean(np.square(rms))))
 
 
 def _without_bad(
-    recorded: RecordedLogs, rng: np.random.Generator
-) -> tuple[RecordedLogs, FittedStructure, tuple[BadSamples, ...]]:
+    recorded: RecordedLogs, rng: np.random.Generator, set_aside: SetAside
+) -> tuple[RecordedLogs, FittedStructure, SetAside]:
     """The logs without the samples that the plain plant contradicts, that plant, and those samples.
 
     Looked for where the plant follows the logs but for a few places; again from the plant without
     what was found.
     """
-    bad = list[BadSamples]()
     found = plain_structure(recorded, rng)
     for seed in rng.spawn(CORRECTIONS):
         if found.imposed or found.misfit > NEARLY_FOLLOWED:
@@ -122,9 +146,8 @@ def _without_bad(
         again = plain_structure(made.recorded, seed)
         if again.misfit > max(found.misfit, COMPLETE):
             break
-        recorded, found = made.recorded, again
-        bad += made.bad
-    return recorded, found, tuple(bad)
+        recorded, found, set_aside = made.recorded, again, set_aside.and_of(made)
+    return recorded, found, set_aside
 
 
 def finished(
