@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import median_filter
+from scipy.ndimage import maximum_filter1d, median_filter
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.recorded_logs import RecordedLogs
@@ -33,9 +33,16 @@ from identification.signals.steps import (
     deviations,
     jump_size,
     outstanding,
+    slope_weights,
     steps_between,
 )
-from identification.thresholds import REPLACED_GAINS, RUN_JUMP_FROM, RUN_SPIKE_FROM
+from identification.thresholds import (
+    NEARLY_FOLLOWED,
+    NO_RUN,
+    REPLACED_GAINS,
+    RUN_JUMP_FROM,
+    RUN_SPIKE_FROM,
+)
 
 SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
 CLEAR = 2.5  # times what lines through them leave of the errors, that a jump is
@@ -45,6 +52,8 @@ MOST_TRIED = 16  # samples of a drive that are tried without
 SEEN = 2.0  # deviations of the drive's own roughness, from which one is tried
 SHIFTS, FAR = 3, 20.0  # steps to the likeliest value in place of a bad one, and their longest
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
+BENT, KICK = (30, 90), 4.0  # samples a side, deviations by which lines through errors bend
+MOST_KICKS, KICK_GAINS = 6, 2.0  # tried; times the gain of a sample that stands out by itself
 LEAST_SPREAD = 1e-3  # of a run's errors in noise units: a simulated log may have none
 
 
@@ -60,14 +69,17 @@ class Corrected:
     owner: tuple[int, ...]
 
 
-def corrected(plant: Plant, recorded: RecordedLogs) -> Corrected:
+def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
     """The logs with their contradicted samples put right, as the run of this plant has them.
 
     Where the command was logged wrong, the log is cut: what the machine was given is not known.
+    misfit: what the plant leaves; of a run that is not followed at all nothing is looked for.
     """
+    if misfit > NO_RUN:
+        return Corrected(recorded, (), tuple(range(len(recorded.logs))))
     logs, bad, owner = list[Log](), list[BadSamples](), list[int]()
     for i, one in enumerate(recorded.logs):
-        log, found = _of_log(plant, one, recorded.drive)
+        log, found = _of_log(plant, one, recorded.drive, misfit)
         pieces = _pieces(log, one, found)
         logs += pieces
         owner += [i] * len(pieces)
@@ -94,15 +106,18 @@ def _pieces(log: Log, one: MotionLog, found: Sequence[BadSamples]) -> list[Log]:
     return [*out, log.part(low, len(t))] if out else [log]
 
 
-def _of_log(plant: Plant, one: MotionLog, drive: Drive) -> tuple[Log, list[BadSamples]]:
+def _of_log(
+    plant: Plant, one: MotionLog, drive: Drive, misfit: float
+) -> tuple[Log, list[BadSamples]]:
     begun = starts(one, drive)
     weighted = freed(plant, one, drive, begun)
     states = freed(plant, one, drive, begun, even=True)
     if weighted is None or states is None:
         return one.log, []
-    log, found = _without_drive_spikes(plant, one, drive, weighted)
+    gains = REPLACED_GAINS * max(1.0, misfit) ** 2
+    log, found = _without_drive_spikes(plant, one, drive, weighted, gains)
     run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
-    if run is None:
+    if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
     r = states(window_errors(run, one, drive))
     y, off = _without_spikes(r[0])
@@ -175,9 +190,12 @@ def _driving(one: MotionLog, log: Log, drive: Drive) -> Log:
 
 
 def _without_drive_spikes(
-    plant: Plant, one: MotionLog, drive: Drive, states: Freed
+    plant: Plant, one: MotionLog, drive: Drive, states: Freed, gains: float
 ) -> tuple[Log, list[BadSamples]]:
-    """The log without those samples of what drives it, without which the run follows better."""
+    """The log without those samples of what drives it, without which the run follows better.
+
+    gains: cost that each of them gains at least.
+    """
     name = "F" if drive == "force" else "u"
     x = np.asarray(one.log[name])
     bad, height = np.zeros(len(x), dtype=bool), np.zeros(len(x))
@@ -195,15 +213,20 @@ def _without_drive_spikes(
 
     now = np.array(x)
     before = cost(replaced(now))
-    for first, length, rough in _candidates(x):
+    run = window_run(plant, one, drive, states.begun)
+    kicked = [] if run is None else _kicks(states(window_errors(run, one, drive))[0], x)
+    for first, length, rough in (*_candidates(x), *kicked):
         own = slice(first, first + length)
-        if np.any(bad[own]):
+        if np.any(bad[max(first - SIDES[0], 0) : first + SIDES[0]]):
             continue
         without = now.copy()
-        inside = np.arange(first, first + length)
-        without[own] = np.interp(inside, [first - 1, first + length], x[[first - 1, first + length]])
+        if length > 0:
+            inside = np.arange(first, first + length)
+            without[own] = np.interp(inside, [first - 1, first + length], x[inside[[0, -1]] + [-1, 1]])
+        else:
+            own = slice(first, first + 1)
         after = cost(replaced(without))
-        if before - after <= REPLACED_GAINS:
+        if length > 0 and before - after <= gains:
             continue
         # What was given there is not known but by what the run makes of it.
         for _ in range(SHIFTS):
@@ -218,6 +241,8 @@ def _without_drive_spikes(
             if left >= after:
                 break
             without, after = moved, left
+        if before - after <= (gains if length > 0 else KICK_GAINS * gains):
+            continue
         now, before = without, after
         bad[own], height[own] = True, np.abs(x[own] - without[own])
     edges = np.flatnonzero(np.diff(np.concatenate(([0], bad.astype(np.int8), [0]))))
@@ -227,6 +252,25 @@ def _without_drive_spikes(
         only[a:b] = True
         found += _told(one.log, name, "spike", only, height)
     return replaced(now) if found else one.log, found
+
+
+def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
+    """Samples at which a run's errors (n,) begin to go away, as after a wrong drive x (n,) that does
+    not stand out of it: length 0, and the drive's roughness."""
+    if len(r) < 4 * BENT[-1]:
+        return []
+    size, way = np.full(len(r), np.inf), np.zeros(len(r))
+    for side in BENT:
+        weights = slope_weights(side)
+        bent = np.correlate(r, weights, mode="valid") / (_spread(r) * np.linalg.norm(weights))
+        here = slice(side - 1, len(r) - side)
+        size[here] = np.minimum(size[here], np.abs(bent))
+        way[here] += np.sign(bent)
+    size[(np.abs(way) < len(BENT)) | ~np.isfinite(size)] = 0.0
+    size[: BENT[-1]] = size[-BENT[-1] :] = 0.0
+    peak = np.flatnonzero((size > KICK) & (size == maximum_filter1d(size, 2 * BENT[0] + 1)))
+    rough = float(np.median(np.abs(np.diff(x))))
+    return [(k, 0, rough) for k in peak[np.argsort(-size[peak])][:MOST_KICKS].tolist()]
 
 
 def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:

@@ -41,7 +41,6 @@ from identification.thresholds import (
     ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
     COMPLETE,
-    NEARLY_FOLLOWED,
     NO_RUN,
 )
 
@@ -77,11 +76,10 @@ def fit_plant(
     set_aside = SetAside((), tuple(range(len(logs))))
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
-        if near.misfit <= NEARLY_FOLLOWED:
-            made = corrected(near.plant, recorded)
-            if made.bad:
-                recorded, set_aside = made.recorded, set_aside.and_of(made)
-                near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
+        made = corrected(near.plant, recorded, near.misfit)
+        if made.bad:
+            recorded, set_aside = made.recorded, set_aside.and_of(made)
+            near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
             fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
             return set_aside.told(fit, given)
@@ -138,9 +136,9 @@ def _without_bad(
     """
     found = plain_structure(recorded, rng)
     for seed in rng.spawn(CORRECTIONS):
-        if found.imposed or found.misfit > NEARLY_FOLLOWED:
+        if found.imposed:
             break
-        made = corrected(found.plant, recorded)
+        made = corrected(found.plant, recorded, found.misfit)
         if not made.bad:
             break
         again = plain_structure(made.recorded, seed)

@@ -131,6 +131,11 @@ def outstanding(steps: Array, least: float) -> NDArray[np.intp]:
     return np.sort(order[:count])
 
 
+def slope_weights(side: int) -> Array:
+    """Weights (2 side,) of the change of slope between lines through `side` samples each."""
+    return _line_weights(side)[1]
+
+
 def jump_size(y: Array, at: int, side: int = SIDES[-1]) -> float:
     """By how much the position jumps after sample `at`, from lines through `side` samples each."""
     height, _ = _line_weights(side)
