@@ -21,7 +21,6 @@ import numpy as np
 
 from benchmarks.euler_loop import closed_loop
 from benchmarks.random_plants import drawn_reference
-from benchmarks.sound_logs import sound
 from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.fit import fit_plant
@@ -60,7 +59,7 @@ def motor(seed: int) -> Machine:
     """A small rotary motor."""
     rng, h, noise = np.random.default_rng([seed, 1]), 2e-3, 3e-4
     nine = np.array([2.1e-4, 0.010, 0.009, 4e-4, 4.5e-4, 1.0, -0.9, 0.014, -0.013])
-    t = h * np.arange(round(SECONDS / h))
+    t = h * np.arange(round(SECONDS / h), dtype=np.float64)
     r = drawn_reference("sine and steps", 3.0, 20.0, t, rng)
     gains = np.array([0.02, 2e-3, 0.02, 0.0, 0.0])
     out, y = in_loop(nine * rng.uniform(0.9, 1.1, 9), 0.05, gains, r, noise, seed, h)
@@ -73,7 +72,7 @@ def stage(seed: int) -> Machine:
     """A linear stage, whose force is measured."""
     rng, h, noise = np.random.default_rng([seed, 2]), 1e-3, 1e-5
     nine = np.array([3.0, 10.0, 9.0, 100.0, 110.0, 0.01, -0.009, 14.0, -13.0])
-    t = h * np.arange(round(SECONDS / h))
+    t = h * np.arange(round(SECONDS / h), dtype=np.float64)
     r = drawn_reference("ramps", 0.05, 0.2, t, rng)
     gains = np.array([1200.0, 30.0, 1500.0, 0.0, 0.0])
     out, y = in_loop(nine * rng.uniform(0.9, 1.1, 9), 1.0, gains, r, noise, seed, h)
@@ -167,7 +166,11 @@ def faults(machine: Machine) -> Iterator[tuple[str, str, Change]]:
         yield "frozen", name, partial(frozen, length=40)
         if name == "y":
             yield "frozen, lost", name, partial(frozen, length=40, lost=True)
-            yield "wrapped", name, partial(wrapped, noise=noise, turn=machine.rig.motion == "rotary")
+            yield (
+                "wrapped",
+                name,
+                partial(wrapped, noise=noise, turn=machine.rig.motion == "rotary"),
+            )
         if name == "u":
             yield "clipped", name, clipped
         else:

@@ -71,4 +71,5 @@ SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a 
 RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
 RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
 REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
+RESIDUAL_WALKS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere

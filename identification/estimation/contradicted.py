@@ -222,7 +222,9 @@ def _without_drive_spikes(
         without = now.copy()
         if length > 0:
             inside = np.arange(first, first + length)
-            without[own] = np.interp(inside, [first - 1, first + length], x[inside[[0, -1]] + [-1, 1]])
+            without[own] = np.interp(
+                inside, [first - 1, first + length], x[inside[[0, -1]] + [-1, 1]]
+            )
         else:
             own = slice(first, first + 1)
         after = cost(replaced(without))
@@ -255,8 +257,8 @@ def _without_drive_spikes(
 
 
 def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
-    """Samples at which a run's errors (n,) begin to go away, as after a wrong drive x (n,) that does
-    not stand out of it: length 0, and the drive's roughness."""
+    """Samples at which a run's errors (n,) begin to go away, as after a drive x (n,) that is wrong
+    there but does not stand out: length 0, and the drive's roughness."""
     if len(r) < 4 * BENT[-1]:
         return []
     size, way = np.full(len(r), np.inf), np.zeros(len(r))
@@ -291,4 +293,3 @@ def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:
 def told_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:
     """A line for each finding of a fit."""
     return tuple(f"{one.line}, since the run contradicts it" for one in fit_bad)
-

@@ -9,7 +9,6 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog, BadSpecification
@@ -196,13 +195,9 @@ def _limits(log: Log) -> list[BadSamples]:
     for limit in (low, high):
         at = u == limit
         if np.count_nonzero(at[1:] & at[:-1]) >= LONGEST_REPAIR:
-            t = log["t"][at]
-            out.append(
-                BadSamples(
-                    log.name, "u", "saturated", float(t[0]), float(t[-1]), int(at.sum()), None,
-                    "kept",
-                )  # fmt: skip
-            )
+            t, count = log["t"][at], int(at.sum())
+            first, last = float(t[0]), float(t[-1])
+            out.append(BadSamples(log.name, "u", "saturated", first, last, count, None, "kept"))
     return out
 
 

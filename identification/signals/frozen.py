@@ -1,4 +1,4 @@
-"""Values that stand still while the machine does not: a sensor, a counter or a logger that hangs."""
+"""Values that stand still while the machine does not: a sensor, counter or logger that hangs."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ def _dropped(x: Array, low: int, high: int) -> bool:
     if low == 0 or high >= len(x) or high - low > LONGEST_OFF:
         return False
     usual = LEAPS * float(np.median(np.abs(np.diff(x))))
-    return abs(x[low] - x[low - 1]) > usual and abs(x[high] - x[high - 1]) > usual
+    return bool(abs(x[low] - x[low - 1]) > usual and abs(x[high] - x[high - 1]) > usual)
 
 
 def _caught_up(x: Array, low: int, high: int) -> bool:

@@ -13,6 +13,7 @@ from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import actuator_units, all_converted, friction_units, in_unit
@@ -154,6 +155,7 @@ class ModelFile:
     effects: Mapping[str, Mapping[str, Estimate]] = field(default_factory=dict)
     posterior: Mapping[str, Any] | None = None
     correlation: ParameterCorrelation | None = None
+    bad_samples: tuple[BadSamples, ...] = ()
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -179,7 +181,8 @@ class Model(ModelFile):
 
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
-    posterior: what `--posterior` found; correlation: of the parameters' errors. library: where
+    posterior: what `--posterior` found; correlation: of the parameters' errors; bad_samples: what
+    was set aside of its logs. library: where
     the effects' equations are. read: what to say of its file, a line for each value in another
     unit than ours.
     """

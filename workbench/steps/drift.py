@@ -23,6 +23,7 @@ from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
+from identification.signals.bad_samples import BadSamples
 from workbench.documents.model import Model, as_number, model_document, used, versions
 from workbench.documents.reading import read_result
 from workbench.logs.sources import Source, Sources
@@ -70,6 +71,7 @@ class Drifted:
     tests: tuple[Tested, ...]
     stream: Stream
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
     @property
     def verdict(self) -> DriftVerdict:
@@ -81,7 +83,10 @@ class Drifted:
 
 def model_key(model: Model) -> str:
     """What names a model in a stored state: sha256 of what model.json says of it."""
-    return hashlib.sha256(dumps(model_document(model)).encode()).hexdigest()
+    said = model_document(model)
+    if not said["bad_samples"]:  # which models had no say on before
+        del said["bad_samples"]
+    return hashlib.sha256(dumps(said).encode()).hexdigest()
 
 
 def model_in_force(model: Model, key: str) -> InForce:
@@ -157,7 +162,8 @@ def drift_of(
         tests.append(Tested(source, found, again))
     assert state is not None
     seen = (*(stream.seen if stream else ()), *(_seen(one) for one in tests if not one.again))
-    return Drifted(model, key, settings, tuple(tests), Stream(state, seen), tuple(remarks))
+    after = Stream(state, seen)
+    return Drifted(model, key, settings, tuple(tests), after, tuple(remarks), sources.bad)
 
 
 def _same_machine(model: Model, sources: Sources) -> None:
@@ -211,6 +217,7 @@ def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:
         "verdict": found.verdict,
         "log": [_of_run(one) for one in found.tests],
         "seen": [asdict(one) for one in found.stream.seen],
+        "bad_samples": [one.as_json() for one in found.bad],
         "remarks": list(found.remarks),
         "versions": versions(),
     }
