@@ -31,8 +31,8 @@ from workbench.cards.card import load_card
 from workbench.logs.fetch import card_path
 from workbench.steps.simulate import record
 
-SECONDS = 12.0
-PLACES = ("motion", "rest", "reversal")
+SPOILT_SECONDS = 12.0
+FAULT_PLACES = ("motion", "rest", "reversal")
 Change = Callable[[Array, int, np.random.Generator], None]
 
 
@@ -59,7 +59,7 @@ def motor(seed: int) -> Machine:
     """A small rotary motor."""
     rng, h, noise = np.random.default_rng([seed, 1]), 2e-3, 3e-4
     nine = np.array([2.1e-4, 0.010, 0.009, 4e-4, 4.5e-4, 1.0, -0.9, 0.014, -0.013])
-    t = h * np.arange(round(SECONDS / h), dtype=np.float64)
+    t = h * np.arange(round(SPOILT_SECONDS / h), dtype=np.float64)
     r = drawn_reference("sine and steps", 3.0, 20.0, t, rng)
     gains = np.array([0.02, 2e-3, 0.02, 0.0, 0.0])
     out, y = in_loop(nine * rng.uniform(0.9, 1.1, 9), 0.05, gains, r, noise, seed, h)
@@ -72,7 +72,7 @@ def stage(seed: int) -> Machine:
     """A linear stage, whose force is measured."""
     rng, h, noise = np.random.default_rng([seed, 2]), 1e-3, 1e-5
     nine = np.array([3.0, 10.0, 9.0, 100.0, 110.0, 0.01, -0.009, 14.0, -13.0])
-    t = h * np.arange(round(SECONDS / h), dtype=np.float64)
+    t = h * np.arange(round(SPOILT_SECONDS / h), dtype=np.float64)
     r = drawn_reference("ramps", 0.05, 0.2, t, rng)
     gains = np.array([1200.0, 30.0, 1500.0, 0.0, 0.0])
     out, y = in_loop(nine * rng.uniform(0.9, 1.1, 9), 1.0, gains, r, noise, seed, h)
@@ -84,13 +84,13 @@ def pneumatic(seed: int) -> Machine:
     """The plant of table 1, by force and command."""
     recipe = load_card(card_path("paper_table1_rich")).recipe
     assert recipe is not None
-    log = record("pneumatic", replace(recipe, duration=SECONDS), seed)
+    log = record("pneumatic", replace(recipe, duration=SPOILT_SECONDS), seed)
     seen = Log("pneumatic", {key: log[key] for key in ("t", "y", "F", "u")})
     noise = {"y": recipe.noise_y, "F": recipe.noise_F, "u": 1e-3 * float(np.std(log["u"]))}
     return Machine(seen, Rig("force"), noise)
 
 
-MACHINES = {"motor": motor, "pneumatic": pneumatic, "stage": stage}
+SOUND_MACHINES = {"motor": motor, "pneumatic": pneumatic, "stage": stage}
 
 
 def place(log: Log, where: str, rng: np.random.Generator) -> int:
@@ -210,7 +210,7 @@ def judged(machine: Machine, clean: KarnoppFit, fault: tuple[str, str, Change], 
     """One line of the table; whether no parameter moved beyond its interval."""
     kind, name, change = fault
     rng = np.random.default_rng([seed, *kind.encode(), *name.encode()])
-    where = str(rng.choice(PLACES))
+    where = str(rng.choice(FAULT_PLACES))
     x = np.array(machine.log[name])
     at = place(machine.log, where, rng)
     change(x, at, rng)
@@ -234,9 +234,9 @@ def judged(machine: Machine, clean: KarnoppFit, fault: tuple[str, str, Change], 
 def spoilt(asked: argparse.Namespace) -> int:
     """The table of spoilt logs; how many moved a parameter."""
     held = total = 0
-    for name in [asked.machine] if asked.machine else MACHINES:
+    for name in [asked.machine] if asked.machine else SOUND_MACHINES:
         for seed in range(asked.first, asked.first + asked.seeds):
-            machine = MACHINES[name](seed)
+            machine = SOUND_MACHINES[name](seed)
             clean, said = fitted(machine.log, machine.rig)
             print(f"{name} {seed}: chi-square {clean.chi_square:.3g} {said}", flush=True)
             for fault in faults(machine):
@@ -252,7 +252,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=100)
     parser.add_argument("--seeds", type=int, default=2)
-    parser.add_argument("--machine", choices=tuple(MACHINES))
+    parser.add_argument("--machine", choices=tuple(SOUND_MACHINES))
     parser.add_argument("--kind", default="", help="of faults, a part of signal and kind")
     asked = parser.parse_args()
     return int(spoilt(asked) > 0)

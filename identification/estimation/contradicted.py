@@ -29,7 +29,7 @@ from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
 from identification.signals.bad_samples import BadSamples, Kind
 from identification.signals.steps import (
-    LONGEST,
+    LONGEST_SMALL,
     deviations,
     jump_size,
     outstanding,
@@ -44,15 +44,18 @@ from identification.thresholds import (
     RUN_SPIKE_FROM,
 )
 
-SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
-CLEAR = 2.5  # times what lines through them leave of the errors, that a jump is
-BESIDE = 11  # samples whose median a single one is compared to
+RUN_SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
+CLEAR_OF_ERRORS = 2.5  # times what lines through them leave of the errors, that a jump is
+MEDIAN_OVER = 11  # samples whose median a single one is compared to
 MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single samples
-MOST_TRIED = 16  # samples of a drive that are tried without
-SEEN = 2.0  # deviations of the drive's own roughness, from which one is tried
-SHIFTS, FAR = 3, 20.0  # steps to the likeliest value in place of a bad one, and their longest
+MOST_CANDIDATES = 16  # samples of a drive that are tried without
+SEEN_FROM = 2.0  # deviations of the drive's own roughness, from which one is tried
+SHIFT_STEPS, FARTHEST_SHIFT = (
+    3,
+    20.0,
+)  # steps to the likeliest value in place of a bad one, and their longest
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
-BENT, KICK = (30, 90), 4.0  # samples a side, deviations by which lines through errors bend
+BENT, KICK_FROM = (30, 90), 4.0  # samples a side, deviations by which lines through errors bend
 MOST_KICKS, KICK_GAINS = 6, 2.0  # tried; times the gain of a sample that stands out by itself
 LEAST_SPREAD = 1e-3  # of a run's errors in noise units: a simulated log may have none
 
@@ -94,7 +97,7 @@ def _pieces(log: Log, one: MotionLog, found: Sequence[BadSamples]) -> list[Log]:
     t, moves = log["t"], one.signals["d"] != 0
     least = max(LEAST_PIECE, round(SHORTEST_PIECE / log.h))
     out, low = list[Log](), 0
-    for bad in found:
+    for bad in sorted(found, key=lambda one: one.first):
         if bad.signal != "u":
             continue
         before, after = np.searchsorted(t, [bad.first - 1.5 * log.h, bad.last + 1.5 * log.h])
@@ -115,7 +118,7 @@ def _of_log(
     if weighted is None or states is None:
         return one.log, []
     gains = REPLACED_GAINS * max(1.0, misfit) ** 2
-    log, found = _without_drive_spikes(plant, one, drive, weighted, gains)
+    log, found = _without_drive_spikes(_Driven(plant, one, drive, weighted), gains)
     run = window_run(plant, one, drive, begun, log=_driving(one, log, drive))
     if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
@@ -144,11 +147,11 @@ def _spread(r: Array) -> float:
 
 def _without_spikes(r: Array) -> tuple[Array, BoolArray]:
     """Errors (n,) of a run with the single ones put on the level around them, and where."""
-    level = np.asarray(median_filter(r, BESIDE, mode="nearest"))
+    level = np.asarray(median_filter(r, MEDIAN_OVER, mode="nearest"))
     off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
-        off[a:b] = b - a <= LONGEST
+        off[a:b] = b - a <= LONGEST_SMALL
     if off.mean() > MOST_SPIKES:
         return r, np.zeros_like(off)
     return np.where(off, level, r), off
@@ -156,11 +159,11 @@ def _without_spikes(r: Array) -> tuple[Array, BoolArray]:
 
 def _jumps(r: Array, begun: Starts) -> IntArray:
     """Samples after which a run's errors (n,) stay off, none beside the start of a window."""
-    if len(r) < 4 * SIDES[-1]:
+    if len(r) < 4 * RUN_SIDES[-1]:
         return np.zeros(0, dtype=np.int64)
-    steps = steps_between(r, SIDES, CLEAR)
+    steps = steps_between(r, RUN_SIDES, CLEAR_OF_ERRORS)
     for k in begun.at.tolist():
-        steps[max(k - SIDES[0], 0) : k + SIDES[0]] = 0.0
+        steps[max(k - RUN_SIDES[0], 0) : k + RUN_SIDES[0]] = 0.0
     least = RUN_JUMP_FROM * _spread(r)
     return np.asarray(outstanding(steps, least), dtype=np.int64)
 
@@ -169,7 +172,7 @@ def _side(k: int, begun: Starts, n: int) -> int:
     """Samples to either side of a jump after sample k that are of its window."""
     borders = np.append(begun.at, n)
     nearest = int(np.min(np.abs(borders - k)))
-    return int(np.clip(nearest - 1, SIDES[0] // 2, 2 * SIDES[-1]))
+    return int(np.clip(nearest - 1, RUN_SIDES[0] // 2, 2 * RUN_SIDES[-1]))
 
 
 def _told(log: Log, name: str, kind: Kind, off: BoolArray, size: Array) -> list[BadSamples]:
@@ -189,71 +192,93 @@ def _driving(one: MotionLog, log: Log, drive: Drive) -> Log:
     return one.again(log).driving if log is not one.log else one.driving
 
 
-def _without_drive_spikes(
-    plant: Plant, one: MotionLog, drive: Drive, states: Freed, gains: float
-) -> tuple[Log, list[BadSamples]]:
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """A plant's run in windows along a log, by another command or force than the logged one."""
+
+    plant: Plant
+    one: MotionLog
+    drive: Drive
+    states: Freed
+
+    @property
+    def name(self) -> str:
+        """The signal that drives the run."""
+        return "F" if self.drive == "force" else "u"
+
+    def by(self, x: Array) -> Log:
+        """The log with this drive (n,)."""
+        log = self.one.log.with_signals(**{self.name: x})
+        motor = self.plant.actuator
+        return log.with_signals(F=motor.k_a * x) if isinstance(motor, Motor) else log
+
+    def errors(self, x: Array) -> Array | None:
+        """What a run by this drive (n,) leaves; None where it cannot be followed."""
+        log = _driving(self.one, self.by(x), self.drive)
+        run = window_run(self.plant, self.one, self.drive, self.states.begun, log=log)
+        return None if run is None else self.states(window_errors(run, self.one, self.drive))
+
+    def cost(self, x: Array) -> float:
+        """The robust cost of these."""
+        r = self.errors(x)
+        return np.inf if r is None else loss(r)
+
+    def likeliest(self, x: Array, own: slice, rough: float) -> tuple[Array, float]:
+        """The drive (n,) with its samples `own` where the run follows best, and the cost.
+
+        What was given there is not known but by what the run makes of it. rough: first step.
+        """
+        cost = self.cost(x)
+        for _ in range(SHIFT_STEPS):
+            shift = np.zeros(len(x))
+            shift[own] = rough
+            low, high = self.cost(x - shift), self.cost(x + shift)
+            curved = low + high - 2.0 * cost
+            if not curved > 0.0:
+                break
+            moved = (
+                x
+                + float(np.clip(0.5 * (low - high) / curved, -FARTHEST_SHIFT, FARTHEST_SHIFT))
+                * shift
+            )
+            left = self.cost(moved)
+            if left >= cost:
+                break
+            x, cost = moved, left
+        return x, cost
+
+
+def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadSamples]]:
     """The log without those samples of what drives it, without which the run follows better.
 
     gains: cost that each of them gains at least.
     """
-    name = "F" if drive == "force" else "u"
-    x = np.asarray(one.log[name])
-    bad, height = np.zeros(len(x), dtype=bool), np.zeros(len(x))
-
-    def cost(tried: Log) -> float:
-        """What a run driven by this log leaves."""
-        run = window_run(plant, one, drive, states.begun, log=_driving(one, tried, drive))
-        return np.inf if run is None else loss(states(window_errors(run, one, drive)))
-
-    def replaced(values: Array) -> Log:
-        tried = one.log.with_signals(**{name: values})
-        if isinstance(plant.actuator, Motor):
-            return tried.with_signals(F=plant.actuator.k_a * values)
-        return tried
-
-    now = np.array(x)
-    before = cost(replaced(now))
-    run = window_run(plant, one, drive, states.begun)
-    kicked = [] if run is None else _kicks(states(window_errors(run, one, drive))[0], x)
-    for first, length, rough in (*_candidates(x), *kicked):
-        own = slice(first, first + length)
-        if np.any(bad[max(first - SIDES[0], 0) : first + SIDES[0]]):
+    log = driven.one.log
+    x = np.asarray(log[driven.name])
+    r = driven.errors(x)
+    if r is None:
+        return log, []
+    now, before, found = x, loss(r), list[BadSamples]()
+    near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
+    for first, length, rough in (*_candidates(x), *_kicks(r[0], x)):
+        own = slice(first, first + max(length, 1))
+        if near[first]:
             continue
         without = now.copy()
         if length > 0:
-            inside = np.arange(first, first + length)
-            without[own] = np.interp(
-                inside, [first - 1, first + length], x[inside[[0, -1]] + [-1, 1]]
-            )
-        else:
-            own = slice(first, first + 1)
-        after = cost(replaced(without))
-        if length > 0 and before - after <= gains:
-            continue
-        # What was given there is not known but by what the run makes of it.
-        for _ in range(SHIFTS):
-            shift = np.zeros(len(x))
-            shift[own] = rough
-            low, high = (cost(replaced(without + way * shift)) for way in (-1.0, 1.0))
-            if not low + high - 2.0 * after > 0.0:
-                break
-            best = float(np.clip(0.5 * (low - high) / (low + high - 2.0 * after), -FAR, FAR))
-            moved = without + best * shift
-            left = cost(replaced(moved))
-            if left >= after:
-                break
-            without, after = moved, left
+            ends = [first - 1, first + length]
+            without[own] = np.interp(np.arange(first, first + length), ends, x[ends])
+            if before - driven.cost(without) <= gains:
+                continue
+        without, after = driven.likeliest(without, own, rough)
         if before - after <= (gains if length > 0 else KICK_GAINS * gains):
             continue
         now, before = without, after
-        bad[own], height[own] = True, np.abs(x[own] - without[own])
-    edges = np.flatnonzero(np.diff(np.concatenate(([0], bad.astype(np.int8), [0]))))
-    found = list[BadSamples]()
-    for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
-        only = np.zeros_like(bad)
-        only[a:b] = True
-        found += _told(one.log, name, "spike", only, height)
-    return replaced(now) if found else one.log, found
+        near[max(first - RUN_SIDES[0], 0) : first + RUN_SIDES[0]] = True
+        off = np.zeros(len(x), dtype=bool)
+        off[own] = True
+        found += _told(log, driven.name, "spike", off, np.abs(x - now))
+    return driven.by(now) if found else log, found
 
 
 def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
@@ -270,7 +295,7 @@ def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
         way[here] += np.sign(bent)
     size[(np.abs(way) < len(BENT)) | ~np.isfinite(size)] = 0.0
     size[: BENT[-1]] = size[-BENT[-1] :] = 0.0
-    peak = np.flatnonzero((size > KICK) & (size == maximum_filter1d(size, 2 * BENT[0] + 1)))
+    peak = np.flatnonzero((size > KICK_FROM) & (size == maximum_filter1d(size, 2 * BENT[0] + 1)))
     rough = float(np.median(np.abs(np.diff(x))))
     return [(k, 0, rough) for k in peak[np.argsort(-size[peak])][:MOST_KICKS].tolist()]
 
@@ -279,15 +304,15 @@ def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:
     """First samples and lengths of what stands out of a drive (n,) the most, and the roughness
     around."""
     found = list[tuple[float, int, int, float]]()
-    for length in range(1, LONGEST + 1):
+    for length in range(1, LONGEST_SMALL + 1):
         height, own = deviations(x, length)
         usual = max(float(np.median(own)), 1e-300)
         share = height / np.maximum(own, usual)
-        for k in np.argsort(-share)[:MOST_TRIED].tolist():
-            if share[k] > SEEN:
+        for k in np.argsort(-share)[:MOST_CANDIDATES].tolist():
+            if share[k] > SEEN_FROM:
                 rough = float(np.maximum(own[k], usual))
                 found.append((float(share[k]) * length**0.5, k, length, rough))
-    return [one[1:] for one in sorted(found, reverse=True)[:MOST_TRIED]]
+    return [one[1:] for one in sorted(found, reverse=True)[:MOST_CANDIDATES]]
 
 
 def told_of(fit_bad: Sequence[BadSamples]) -> tuple[str, ...]:

@@ -166,11 +166,11 @@ def _of_solution(problem: Problem, solution: Solution) -> Spread:
         evaluations=solution.evaluations,
         logs=tuple(_whole_log(problem, optimum, run, i) for i, run in enumerate(runs)),
         events=events_of([run.mode for run in runs], [run.v for run in runs]),
-        remarks=(WALKS.format(walk),) if walk else (),
+        remarks=(RESIDUAL_WALK_SAID.format(walk),) if walk else (),
     )
 
 
-WALKS = (
+RESIDUAL_WALK_SAID = (
     "what the run leaves walks by {:.3g} deviations in all, less than the noise at any sample: a"
     " sample of the command may be wrong, or the body was touched; intervals are widened for it"
 )

@@ -12,9 +12,9 @@ import numpy as np
 from identification.arrays import Array
 from identification.thresholds import RESIDUAL_WALKS
 
-STRETCHES = (50, 125, 250, 500)  # samples in a sum
+SUMMED = (50, 125, 250, 500)  # samples in a sum
 LEAST_SUMS = 6  # sums of a stretch
-HALF_WIDTH = 1.96  # deviations in half of an interval
+INTERVAL_HALF = 1.96  # deviations in half of an interval
 
 
 def walk_size(residuals: Sequence[Array]) -> float:
@@ -24,7 +24,7 @@ def walk_size(residuals: Sequence[Array]) -> float:
     those of noise.
     """
     largest, size = RESIDUAL_WALKS, 0.0
-    for length in STRETCHES:
+    for length in SUMMED:
         sums = [_sums(r, length) for r in residuals if len(r) >= LEAST_SUMS * length]
         if not sums:
             continue
@@ -45,4 +45,4 @@ def _sums(r: Array, length: int) -> Array:
 
 def widened(samples: Array, center: Array, size: float) -> Array:
     """Sets (k, d) about their center (d,), as wide as a part of this size may have moved them."""
-    return np.asarray(center + float(np.hypot(1.0, size / HALF_WIDTH)) * (samples - center))
+    return np.asarray(center + float(np.hypot(1.0, size / INTERVAL_HALF)) * (samples - center))

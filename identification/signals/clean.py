@@ -102,23 +102,8 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     1 % or has spikes in more, or where a tenth of the log would have to be left out.
     """
     check_time(log, first_row)
-    away: Mask = np.zeros(len(log), dtype=bool)
-    remarks, bad = list[str](), list[BadSamples]()
-    for name, values in log.signals.items():
-        missing = ~np.isfinite(values)
-        if not np.any(missing):
-            continue
-        what = f"{log.name}: signal {name!r}"
-        long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
-        isolated = missing & ~long
-        away |= long
-        filled = np.interp(log["t"], log["t"][~missing], values[~missing])
-        if np.any(isolated):
-            count = int(isolated.sum())
-            remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
-            bad += _found(log, name, "missing", isolated, "interpolated")
-        bad += _found(log, name, "missing", long, "cut out")
-        log = log.with_signals(**{name: filled})
+    (log, said, bad_ones), away = _without_missing(log, first_row)
+    remarks, bad = list(said), list(bad_ones)
     if "y" in log:
         log, found = unwrapped(log, rotary)
         bad += found
@@ -141,6 +126,28 @@ def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
     bad += _limits(log)
     told = [one for one in bad if one.done != "interpolated"]
     return Repaired(log, (*remarks, *lines(told)), tuple(bad))
+
+
+def _without_missing(log: Log, first_row: int) -> tuple[Repaired, Mask]:
+    """The log with its missing samples filled, and which rows are nevertheless to be left out."""
+    away: Mask = np.zeros(len(log), dtype=bool)
+    remarks, bad = list[str](), list[BadSamples]()
+    for name, values in log.signals.items():
+        missing = ~np.isfinite(values)
+        if not np.any(missing):
+            continue
+        what = f"{log.name}: signal {name!r}"
+        long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
+        isolated = missing & ~long
+        away |= long
+        filled = np.interp(log["t"], log["t"][~missing], values[~missing])
+        if np.any(isolated):
+            count = int(isolated.sum())
+            remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
+            bad += _found(log, name, "missing", isolated, "interpolated")
+        bad += _found(log, name, "missing", long, "cut out")
+        log = log.with_signals(**{name: filled})
+    return Repaired(log, tuple(remarks), tuple(bad)), away
 
 
 def _commanded(log: Log) -> bool:

@@ -11,16 +11,19 @@ from identification.arrays import Array
 from identification.log import Log
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import JUMPS_ALIKE
-from identification.signals.jumps import jumps
-from identification.signals.steps import SIDES, jump_size, small_jumps
+from identification.signals.jumps import LONGEST_SPIKE, jumps
+from identification.signals.steps import LINE_SIDES, jump_size, small_jumps
 
-LONGEST_ROUNDS = 8  # in which jumps of another size are looked for
-SHORTEST_PIECE = 1.0  # s, on either side of a jump, of a log that is cut there
-CUT = 3  # samples to either side of a jump that are left out
+JUMP_ROUNDS = 8  # in which jumps of another size are looked for
+SHORTEST_PART = 1.0  # s, on either side of a jump, of a log that is cut there
+CUT_BESIDE = 3  # samples to either side of a jump that are left out
 OF_TURN = 0.02  # of a turn or of a counter's range, that the wraps of one are off
 OF_RANGE = 0.9  # of the position's range, that a counter leaps as it wraps
-ROUNDING = 1e-10  # of a range, that is no count
-WHOLE, MOSTLY = 0.01, 0.99  # of a count, that the steps of a counter are off; share that are
+ROUNDED_OFF = 1e-10  # of a range, that is no count
+WHOLE_COUNT, MOST_WHOLE = (
+    0.01,
+    0.99,
+)  # of a count, that the steps of a counter are off; share that are
 FEWEST_WRAPS = 2
 
 
@@ -28,11 +31,17 @@ def without_jumps(log: Log, rotary: bool) -> tuple[Log, tuple[BadSamples, ...]]:
     """The log with a position that does not jump, and the jumps; those of no clear size are left
     for `check` to refuse. rotary: positions are angles [rad]."""
     found, at = list[BadSamples](), list[int]()
-    for _ in range(LONGEST_ROUNDS):
+    for _ in range(JUMP_ROUNDS):
         large = jumps(log, rotary)
         new = small_jumps(log["t"], log["y"]) if large is None else large.at
-        new = np.array([k for k in new if SIDES[-1] <= k < len(log) - SIDES[-1]], dtype=np.intp)
-        if not len(new) or set(new.tolist()) & set(at) or (large is not None and large.wraps):
+        new = np.array(
+            [k for k in new if LINE_SIDES[-1] <= k < len(log) - LINE_SIDES[-1]], dtype=np.intp
+        )
+        if (
+            not len(new)
+            or set(new.tolist()) & set(at)
+            or (large is not None and large.wraps and len(large.at) >= FEWEST_WRAPS)
+        ):
             break
         before = log["y"]
         log = log.with_signals(y=_continued(before, new))
@@ -63,12 +72,14 @@ def unwrapped(log: Log, rotary: bool) -> tuple[Log, list[BadSamples]]:
     y = log["y"]
     if found is None or len(found.at) < FEWEST_WRAPS:
         return log, []
-    # A counter that wraps never leaves its range, whatever way it goes over the end.
-    if not found.wraps and np.min(np.abs(found.size)) < OF_RANGE * np.ptp(y):
+    # A counter that wraps never leaves its range, whatever way it goes over the end. What comes
+    # back at once each time is a spike.
+    back = (np.diff(found.at) <= LONGEST_SPIKE) & (found.size[1:] * found.size[:-1] < 0.0)
+    if np.min(np.abs(found.size)) < OF_RANGE * np.ptp(y) or 2 * np.sum(back) == len(found.at):
         return log, []
-    apart = np.diff(np.concatenate([[-np.inf], found.at, [np.inf]])) > 2 * SIDES[-1]
+    apart = np.diff(np.concatenate([[-np.inf], found.at, [np.inf]])) > 2 * LINE_SIDES[-1]
     alone = found.at[apart[1:] & apart[:-1]]
-    alone = alone[(alone >= SIDES[-1]) & (alone < len(y) - SIDES[-1])]
+    alone = alone[(alone >= LINE_SIDES[-1]) & (alone < len(y) - LINE_SIDES[-1])]
     # Where a counter goes to and fro over its end, its steps on the way even out.
     sizes = np.abs([jump_size(y, int(k)) for k in alone] if len(alone) else found.size)
     if np.ptp(np.abs(found.size)) > JUMPS_ALIKE * np.max(np.abs(found.size)):
@@ -96,20 +107,20 @@ def _period(size: float, y: Array, rotary: bool) -> float:
 def _count(y: Array) -> float:
     """What a counter counts in, but for rounding; 0 of a position that is not counted."""
     levels = np.diff(np.unique(y))
-    levels = levels[levels > ROUNDING * np.ptp(y)]
+    levels = levels[levels > ROUNDED_OFF * np.ptp(y)]
     count = float(np.min(levels, initial=np.inf))
     steps = np.diff(y) / count
-    whole = np.abs(steps - np.round(steps)) < WHOLE
-    return count if float(np.mean(whole)) > MOSTLY else 0.0
+    whole = np.abs(steps - np.round(steps)) < WHOLE_COUNT
+    return count if float(np.mean(whole)) > MOST_WHOLE else 0.0
 
 
 def _cut(log: Log, at: list[int]) -> Log:
     """The log without the samples around these jumps, where pieces on both sides are long."""
     away = np.zeros(len(log), dtype=bool)
-    least, last = round(SHORTEST_PIECE / log.h), 0
+    least, last = round(SHORTEST_PART / log.h), 0
     ends = [*at[1:], len(log)] if at else []
     for k, after in zip(at, ends, strict=True):
         if k - last >= least and after - k >= least:
-            away[k + 1 - CUT : k + 1 + CUT] = True
+            away[k + 1 - CUT_BESIDE : k + 1 + CUT_BESIDE] = True
             last = k
     return Log(log.name, {key: x[~away] for key, x in log.signals.items()}) if at else log

@@ -41,8 +41,8 @@ def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
     Isolated missing samples and spikes are interpolated, other bad ones left out. A `kind =
-    "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or
-    its content is not what the card says.
+    "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
+    one line where the file or its content is not what the card says.
     """
     raw, first_row = _read_signals(path, card)
     log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
