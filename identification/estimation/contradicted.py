@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.windowed_run.refinement import loss
+from identification.estimation.windowed_run.refinement import NOISE_LOSS, loss
 from identification.estimation.windowed_run.windows import (
     Freed,
     Starts,
@@ -29,6 +29,7 @@ from identification.model.estimates import Drive
 from identification.model.plant import Motor, Plant
 from identification.signals.bad_samples import BadSamples, Kind
 from identification.signals.steps import (
+    LINE_SIDES,
     LONGEST_SMALL,
     deviations,
     jump_size,
@@ -47,9 +48,14 @@ from identification.thresholds import (
 RUN_SIDES = (12, 24)  # samples to either side of a jump, over which a run's errors are compared
 CLEAR_OF_ERRORS = 2.5  # times what lines through them leave of the errors, that a jump is
 MEDIAN_OVER = 11  # samples whose median a single one is compared to
+MOST_EXPLAINED = 0.8  # of what a run leaves beyond noise, that wrong samples of its drive explain
+# Of a jump in a run, that the position itself may differ from it, and times its noise
+JUMP_SHOWN, JUMP_UNSURE = 0.4, 2.5
+SHOWN = 0.5  # of a run's single error, that the signal itself shows
 MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single samples
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
-SEEN_FROM = 2.0  # deviations of the drive's own roughness, from which one is tried
+# Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
+SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
 SHIFT_STEPS, FARTHEST_SHIFT = (
     3,
     20.0,
@@ -123,18 +129,22 @@ def _of_log(
     if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
     r = states(window_errors(run, one, drive))
-    y, off = _without_spikes(r[0])
+    y, off = _without_spikes(r[0], log["y"] / one.noise_y)
     found += _told(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
     seen = log["y"] + (r[0] - y) * one.noise_y
     jumped = _jumps(y, begun)
     for k in jumped.tolist():
         size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise_y
+        seen_size = [jump_size(log["y"], k, side) for side in LINE_SIDES]
+        unsure = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise_y
+        if np.min(np.abs(seen_size - np.asarray(size))) > unsure:
+            continue
         seen = np.concatenate([seen[: k + 1], seen[k + 1 :] - size])
         t = float(log["t"][k + 1])
         found.append(BadSamples(log.name, "y", "jump", t, t, 1, abs(size), "offset removed"))
     log = log.with_signals(y=seen)
     if len(r) > 1:
-        F, off = _without_spikes(r[1])
+        F, off = _without_spikes(r[1], log["F"] / one.noise_F)
         found += _told(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
         log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise_F)
     return log, found
@@ -145,10 +155,20 @@ def _spread(r: Array) -> float:
     return max(float(np.median(np.abs(np.diff(r)))) / 0.954, LEAST_SPREAD)
 
 
-def _without_spikes(r: Array) -> tuple[Array, BoolArray]:
-    """Errors (n,) of a run with the single ones put on the level around them, and where."""
+def _without_spikes(r: Array, seen: Array) -> tuple[Array, BoolArray]:
+    """Errors (n,) of a run with the single ones put on the level around them, and where.
+
+    seen (n,): the signal in the same unit, which has to show the spike too: where it does not, the
+    run has stopped or set off a sample too late.
+    """
     level = np.asarray(median_filter(r, MEDIAN_OVER, mode="nearest"))
+    shown = np.zeros(len(r))
+    for length in range(1, LONGEST_SMALL + 1):
+        height = deviations(seen, length)[0]
+        for i in range(length):
+            shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
     off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r)
+    off &= shown > SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
         off[a:b] = b - a <= LONGEST_SMALL
@@ -260,7 +280,11 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
         return log, []
     now, before, found = x, loss(r), list[BadSamples]()
     near = np.zeros(len(x), dtype=bool)  # what is as near to a bad sample is its own doing
-    for first, length, rough in (*_candidates(x), *_kicks(r[0], x)):
+    if driven.drive == "force":  # which has noise, so that every run by it walks away
+        tried = _candidates(x, MEASURED_SEEN_FROM, RUN_SPIKE_FROM * driven.one.noise_F)
+    else:
+        tried = [*_candidates(x, SEEN_FROM), *_kicks(r[0], x)]
+    for first, length, rough in tried:
         own = slice(first, first + max(length, 1))
         if near[first]:
             continue
@@ -278,7 +302,11 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
         off = np.zeros(len(x), dtype=bool)
         off[own] = True
         found += _told(log, driven.name, "spike", off, np.abs(x - now))
-    return driven.by(now) if found else log, found
+    # Where most is left all the same, something else than a few samples is wrong.
+    excess = max(loss(r) - NOISE_LOSS * r.size, 0.0)
+    if not found or loss(r) - before < MOST_EXPLAINED * excess:
+        return log, []
+    return driven.by(now), found
 
 
 def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
@@ -300,16 +328,16 @@ def _kicks(r: Array, x: Array) -> list[tuple[int, int, float]]:
     return [(k, 0, rough) for k in peak[np.argsort(-size[peak])][:MOST_KICKS].tolist()]
 
 
-def _candidates(x: Array) -> Sequence[tuple[int, int, float]]:
+def _candidates(x: Array, seen_from: float, least: float = 0.0) -> list[tuple[int, int, float]]:
     """First samples and lengths of what stands out of a drive (n,) the most, and the roughness
-    around."""
+    around. seen_from: times that roughness; least: height."""
     found = list[tuple[float, int, int, float]]()
     for length in range(1, LONGEST_SMALL + 1):
         height, own = deviations(x, length)
         usual = max(float(np.median(own)), 1e-300)
         share = height / np.maximum(own, usual)
         for k in np.argsort(-share)[:MOST_CANDIDATES].tolist():
-            if share[k] > SEEN_FROM:
+            if share[k] > seen_from and height[k] > least:
                 rough = float(np.maximum(own[k], usual))
                 found.append((float(share[k]) * length**0.5, k, length, rough))
     return [one[1:] for one in sorted(found, reverse=True)[:MOST_CANDIDATES]]
