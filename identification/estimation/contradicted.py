@@ -81,7 +81,8 @@ class Corrected:
 def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
     """The logs with their contradicted samples put right, as the run of this plant has them.
 
-    Where the command was logged wrong, the log is cut: what the machine was given is not known.
+    Where the command was logged wrong, the log is cut: what the machine was given is not known; so
+    it is at a jump, whose size is known within its noise only.
     misfit: what the plant leaves; of a run that is not followed at all nothing is looked for.
     """
     if misfit > NO_RUN:
@@ -99,12 +100,15 @@ def corrected(plant: Plant, recorded: RecordedLogs, misfit: float) -> Corrected:
 
 
 def _pieces(log: Log, one: MotionLog, found: Sequence[BadSamples]) -> list[Log]:
-    """The log cut at the samples of its command that were wrong, where both pieces move."""
+    """The log cut where its command was wrong or its position jumps, where both pieces move.
+
+    What is left of a jump's size would be an error of all that follows.
+    """
     t, moves = log["t"], one.signals["d"] != 0
     least = max(LEAST_PIECE, round(SHORTEST_PIECE / log.h))
     out, low = list[Log](), 0
     for bad in sorted(found, key=lambda one: one.first):
-        if bad.signal != "u":
+        if bad.signal != "u" and bad.kind != "jump":
             continue
         before, after = np.searchsorted(t, [bad.first - 1.5 * log.h, bad.last + 1.5 * log.h])
         if min(before - low, len(t) - after) < least:

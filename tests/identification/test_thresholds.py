@@ -79,7 +79,8 @@ from identification.tracing.structure_search import useless
 from tests.identification.motor_logs import K_A, NOISE, H, plant, seen
 
 N = 100  # rows
-BEGUN = Starts(np.array([0]), *(np.zeros(1) for _ in range(3)), np.zeros((3, 1)))
+NONE = np.zeros(1)
+BEGUN = Starts(np.array([0]), NONE, NONE, NONE, np.zeros((3, 1)))
 FREE = Freed(BEGUN, np.ones((1, 1)), np.zeros((3, 1, 1)), np.eye(3)[np.newaxis])
 
 
