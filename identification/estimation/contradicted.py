@@ -51,7 +51,7 @@ MEDIAN_OVER = 11  # samples whose median a single one is compared to
 MOST_EXPLAINED = 0.8  # of what a run leaves beyond noise, that wrong samples of its drive explain
 # Of a jump in a run, that the position itself may differ from it, and times its noise
 JUMP_SHOWN, JUMP_UNSURE = 0.4, 2.5
-SHOWN = 0.5  # of a run's single error, that the signal itself shows
+SIGNAL_SHOWN = 0.5  # of a run's single error, that the signal itself shows
 MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single samples
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
 # Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
@@ -172,7 +172,7 @@ def _without_spikes(r: Array, seen: Array) -> tuple[Array, BoolArray]:
         for i in range(length):
             shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
     off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r)
-    off &= shown > SHOWN * np.abs(r - level)
+    off &= shown > SIGNAL_SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):
         off[a:b] = b - a <= LONGEST_SMALL
