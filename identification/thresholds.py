@@ -75,3 +75,12 @@ LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well
+
+# What of a log is set aside (sound_logs.py, bad_samples.py below seed 100); times the noise.
+JUMP_FROM = 10.0  # step of a position beyond its motion, that is a jump
+SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a spike
+RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
+RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
+REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
+RESIDUAL_WALKS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
+FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere

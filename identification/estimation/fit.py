@@ -11,10 +11,11 @@ force, or along a motion that a rig imposes; from nothing, or from the model tha
 """
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.estimation.contradicted import Corrected, corrected, told_of
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
@@ -35,10 +36,17 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant
 from identification.progress import Progress, quiet
-from identification.thresholds import ACTUATOR_MISFIT, ACTUATOR_SHARE, COMPLETE, NO_RUN
+from identification.signals.bad_samples import BadSamples
+from identification.thresholds import (
+    ACTUATOR_MISFIT,
+    ACTUATOR_SHARE,
+    COMPLETE,
+    NO_RUN,
+)
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+CORRECTIONS = 3  # rounds in which bad samples are looked for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
@@ -64,15 +72,80 @@ def fit_plant(
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
         return _with_effects(prior, recorded, settle, report)
-    near = None
+    near, given = None, recorded
+    set_aside = SetAside((), tuple(range(len(logs))))
     if prior is not None:
         near = refit(prior, recorded.logs, recorded.drive, prior={}, effort="near")
+        made = corrected(near.plant, recorded, near.misfit)
+        if made.bad:
+            recorded, set_aside = made.recorded, set_aside.and_of(made)
+            near = refit(near.plant, recorded.logs, recorded.drive, prior={}, effort="near")
         if near.misfit <= COMPLETE:
-            return settled(near.plant, recorded, near.misfit, settle, report, refined=near)
-    found = plain_structure(recorded, begin)
+            fit = settled(near.plant, recorded, near.misfit, settle, report, refined=near)
+            return set_aside.told(fit, given)
+    recorded, found, set_aside = _without_bad(recorded, begin, set_aside)
     if near is not None and near.misfit < found.misfit:
         found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
-    return _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
+    fit = _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
+    return set_aside.told(fit, given)
+
+
+@dataclass(frozen=True)
+class SetAside:
+    """Samples that were set aside, and for each log the number of the given one that it is of."""
+
+    bad: tuple[BadSamples, ...]
+    owner: tuple[int, ...]
+
+    def and_of(self, made: Corrected) -> "SetAside":
+        """With what was found next, in these logs."""
+        return SetAside((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
+
+    def told(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
+        """The fit of all pieces as one of the given logs, that says what was set aside."""
+        if not self.bad:
+            return fit
+        logs = []
+        for i in range(len(given.logs)):
+            own = [one for one, of in zip(fit.logs, self.owner, strict=True) if of == i]
+            logs.append(
+                replace(
+                    own[0],
+                    position_rms=_together([one.position_rms for one in own]),
+                    force_rms=None if own[0].force_rms is None
+                    else _together([one.force_rms or 0.0 for one in own]),
+                    chi_square=float(np.mean([one.chi_square for one in own])),
+                )
+            )  # fmt: skip
+        said = (*told_of(self.bad), *fit.remarks)
+        return replace(fit, bad=self.bad, remarks=said, logs=tuple(logs))
+
+
+def _together(rms: Sequence[float]) -> float:
+    """Root mean square over pieces, of that of each."""
+    return float(np.sqrt(np.mean(np.square(rms))))
+
+
+def _without_bad(
+    recorded: RecordedLogs, rng: np.random.Generator, set_aside: SetAside
+) -> tuple[RecordedLogs, FittedStructure, SetAside]:
+    """The logs without the samples that the plain plant contradicts, that plant, and those samples.
+
+    Looked for where the plant follows the logs but for a few places; again from the plant without
+    what was found.
+    """
+    found = plain_structure(recorded, rng)
+    for seed in rng.spawn(CORRECTIONS):
+        if found.imposed:
+            break
+        made = corrected(found.plant, recorded, found.misfit)
+        if not made.bad:
+            break
+        again = plain_structure(made.recorded, seed)
+        if again.misfit > max(found.misfit, COMPLETE):
+            break
+        recorded, found, set_aside = made.recorded, again, set_aside.and_of(made)
+    return recorded, found, set_aside
 
 
 def finished(

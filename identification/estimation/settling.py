@@ -36,6 +36,7 @@ from identification.estimation.plain_search.problem import (
 )
 from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.walking_residual import walk_size, widened
 from identification.estimation.windowed_run.refinement import (
     CANNOT_BE_FOLLOWED,
     Refit,
@@ -161,17 +162,34 @@ def _row(problem: Problem, plant: Plant) -> Array:
 def _of_solution(problem: Problem, solution: Solution) -> Spread:
     optimum = solution.optimum
     runs = [simulated(problem, optimum, i) for i in range(len(problem.logs))]
+    samples = solution.samples[:, : len(problem.free)]
+    walk = walk_size(_residuals(problem, runs)) if solution.chi_square <= ADEQUATE else 0.0
     return Spread(
         plant=plant_of(problem, optimum),
         names=tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free),
-        samples=solution.samples[:, : len(problem.free)],
+        samples=widened(samples, np.mean(samples, axis=0), walk) if walk else samples,
         chi_square=solution.chi_square,
         adequate=solution.adequate,
         noise=solution.noise,
         evaluations=solution.evaluations,
         logs=tuple(_whole_log(problem, optimum, run, i) for i, run in enumerate(runs)),
         events=events_of([run.mode for run in runs], [run.v for run in runs]),
+        remarks=(RESIDUAL_WALK_SAID.format(walk),) if walk else (),
     )
+
+
+RESIDUAL_WALK_SAID = (
+    "what the run leaves walks by {:.3g} deviations in all, less than the noise at any sample: a"
+    " sample of the command may be wrong, or the body was touched; intervals are widened for it"
+)
+
+
+def _residuals(problem: Problem, runs: Sequence[FreeRun]) -> list[Array]:
+    """What the runs leave of position and, where it is measured, force."""
+    out = []
+    for log, run in zip(problem.logs, runs, strict=True):
+        out += [run.y - log["y"], *([] if problem.hold else [run.F - log["F"]])]
+    return out
 
 
 def _whole_log(problem: Problem, optimum: Optimum, run: FreeRun, index: int) -> LogFit:

@@ -10,6 +10,7 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor
+from identification.signals.bad_samples import BadSamples
 
 Drive = Literal["command", "force"]
 
@@ -65,6 +66,7 @@ class KarnoppFit:
     noise_y [m], noise_F [N]: standard deviations found in the residual.
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
+    bad: samples of the logs that the run contradicts, which were set aside.
     """
 
     friction: Karnopp
@@ -83,6 +85,7 @@ class KarnoppFit:
     evaluations: int
     remarks: tuple[str, ...]
     effects: tuple[Acting, ...] = ()
+    bad: tuple[BadSamples, ...] = ()
 
     @property
     def imposed(self) -> bool:

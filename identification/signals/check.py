@@ -30,7 +30,7 @@ _NOISE_LIKE = 0.3  # share of samples at which the second difference of noise ch
 # Times the card's limit that a command may reach: noise and an amplifier's reserve stay within it,
 # a slip of unit (mV for V, % for a share) does not.
 _BEYOND_LIMIT = 1.5
-_ALIKE = 0.3  # spread of jumps that count as of one size, as those of a counter do
+JUMPS_ALIKE = 0.3  # spread of jumps that count as of one size, as those of a counter do
 
 
 def check(log: Log, rig: Rig, first_row: int = 1) -> None:
@@ -150,7 +150,7 @@ def _jumping(log: Log, rig: Rig, found: Jumps, first_row: int) -> str:
         f" {rows[0] + 1}, which no body does"
     )
     if len(rows) > 1:
-        alike = np.ptp(np.abs(size)) < _ALIKE * np.max(np.abs(size))
+        alike = np.ptp(np.abs(size)) < JUMPS_ALIKE * np.max(np.abs(size))
         said += f" ({len(rows)} such jumps{', all about as large' if alike else ''})"
     if found.wraps and len(rows) > 1:
         return (

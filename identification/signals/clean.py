@@ -1,7 +1,7 @@
 """Stages Log -> Log: missing samples, spikes, an even clock, F_e (7), filters A/B/C, velocity (5).
 
-`prepare` runs them in order and says in `remarks` what it changed. A run of missing values is
-never invented: it is refused (`check`).
+`prepare` runs them in order and says in `remarks`, and sample by sample in `bad`, what it changed.
+A run of missing values is never invented: the log is cut there.
 """
 
 from dataclasses import dataclass
@@ -9,23 +9,37 @@ from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.arrays import Array
 from identification.errors import BadLog, BadSpecification
 from identification.log import Log, Rig
+from identification.signals.bad_samples import BadSamples, Done, Kind, lines
 from identification.signals.check import SHORTEST_LOG, check_time
 from identification.signals.check import check as check
+from identification.signals.frozen import frozen
 from identification.signals.jumps import LONGEST_SPIKE, Mask, spikes
+from identification.signals.offsets import unwrapped, without_jumps
+from identification.signals.steps import small_spikes, white_noise
 
 LONGEST_REPAIR = 3
-"""Missing samples in a row that are interpolated; a longer run is refused."""
+"""Missing samples in a row that are interpolated; at a longer run the log is cut.
+
+So it is at any of a command: what a controller gave is not what lies between two other samples.
+"""
 
 LONGEST_GAP = 5.0
 """Sampling periods between two samples above which a log is cut in two."""
 
 _EVEN = 1e-3  # part of a period: below the timing error of any logger, above printed rounding
 _MANY = 0.01  # share of missing samples in a column above which the sensor is not to be trusted
+_TAILS = 0.05  # the same of small spikes, which a sensor with heavy tails has
+_LARGE = 0.05  # of a signal's range, from which a spike is no small one
+_MOST_CUT = 0.1  # share of a log that may be cut out
+_SHORTEST_CUT = 6  # samples that are cut out at least, so that the gap is one
+_SMALL = ("y", "p_p", "p_n")  # what no machine changes for a sample or two
+_LEVELS = 10  # values that a command takes at least where its limits are looked for
+_ROUNDS = 4  # in which small spikes are looked for beside those found
+_MOVED = 20.0  # times its noise, that the position of a piece spans where it is not left out
 _SPIKING = ("y", "F", "p_p", "p_n")  # what sensors measure; a command may do anything
 
 
@@ -34,14 +48,17 @@ class Repaired(NamedTuple):
 
     log: Log
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """Runs on an even clock, and in `remarks` what had to be done for it, a line each."""
+    """Runs on an even clock, in `remarks` what had to be done for it, a line each, and in `bad`
+    which samples were set aside."""
 
     runs: tuple[Log, ...]
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
 
 def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
@@ -49,42 +66,146 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
 
     Raises BadLog as `repair`, `check` and `even_clock` do.
     """
-    log, remarks = repair(log, first_row, rotary=rig.motion == "rotary")
+    log, remarks, bad = repair(log, first_row, rotary=rig.motion == "rotary")
     check(log, rig, first_row)
     runs = even_clock(log)
     if len(runs) == 1 and runs[0] is log:
-        return Prepared(runs, remarks)
+        return Prepared(runs, remarks, bad)
+    runs = _moving(runs)
     lost = log.duration - sum(run.duration for run in runs)
     text = f"{log.name}: uneven clock, resampled every {log.h:.6g} s"
+    if any(one.done == "cut out" for one in bad) and all(_is_even(run["t"]) for run in runs):
+        text = f"{log.name}: cut where samples are bad"
     if len(runs) > 1 or lost > LONGEST_GAP * log.h:
         text += f", in {len(runs)} runs; {lost:.3g} s in gaps or short runs left out"
-    return Prepared(runs, (*remarks, text))
+    return Prepared(runs, (*remarks, text), bad)
+
+
+def _moving(runs: tuple[Log, ...]) -> tuple[Log, ...]:
+    """The runs in which the position moves, if there are any."""
+    found = tuple(
+        run for run in runs
+        if "y" not in run or np.ptp(run["y"]) > _MOVED * white_noise(run["y"])
+    )  # fmt: skip
+    return found or runs
 
 
 def repair(log: Log, first_row: int = 1, *, rotary: bool = False) -> Repaired:
-    """Isolated missing samples (NaN or infinite) and spikes filled by linear interpolation in time.
+    """The log without bad samples, and what they were.
+
+    Isolated missing samples (NaN or infinite) and spikes are filled by linear interpolation in
+    time; where more than `LONGEST_REPAIR` are missing in a row or a value stands still, the rows
+    are left out; a position that jumps or wraps goes on from where it was.
 
     first_row: the file's row of the first sample, for the messages; rotary: positions are angles.
-    Raises BadLog where more than `LONGEST_REPAIR` are missing in a row, where they are at an end of
-    the log, or where a column misses more than 1 % or has spikes in more.
+    Raises BadLog where samples are missing at an end of the log, where a column misses more than
+    1 % or has spikes in more, or where a tenth of the log would have to be left out.
     """
     check_time(log, first_row)
-    filled: dict[str, Array] = {}
-    remarks = []
-    for name, values in log.signals.items():
-        missing = ~np.isfinite(values)
-        count = int(missing.sum())
-        if count == 0:
+    (log, said, bad_ones), away = _without_missing(log, first_row)
+    remarks, bad = list(said), list(bad_ones)
+    if "y" in log:
+        log, found = unwrapped(log, rotary)
+        bad += found
+    for name in ("y", "F", "p_p", "p_n", "u"):
+        if name == "F" and _commanded(log):
             continue
-        _refuse_runs(f"{log.name}: signal {name!r}", missing, first_row)
-        filled[name] = np.interp(log["t"], log["t"][~missing], values[~missing])
-        remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
-    log = log.with_signals(**filled) if filled else log
+        if name in log and name not in {one.signal for one in bad if one.done == "cut out"}:
+            still = frozen(log[name], at_limits=name == "u")
+            bad += _found(log, name, "frozen", still, "cut out")
+            away |= still
+    log = _left_out(log, away, first_row)
     for name in _SPIKING:
         if name in log:
-            log, said = _without_spikes(log, name, first_row, rotary)
+            log, said, spiked = _without_spikes(log, name, first_row, rotary)
             remarks.extend(said)
-    return Repaired(log, tuple(remarks))
+            bad.extend(spiked)
+    if "y" in log:
+        log, jumped = without_jumps(log, rotary)
+        bad.extend(jumped)
+    bad += _limits(log)
+    told = [one for one in bad if one.done != "interpolated"]
+    return Repaired(log, (*remarks, *lines(told)), tuple(bad))
+
+
+def _without_missing(log: Log, first_row: int) -> tuple[Repaired, Mask]:
+    """The log with its missing samples filled, and which rows are nevertheless to be left out."""
+    away: Mask = np.zeros(len(log), dtype=bool)
+    remarks, bad = list[str](), list[BadSamples]()
+    for name, values in log.signals.items():
+        missing = ~np.isfinite(values)
+        if not np.any(missing):
+            continue
+        what = f"{log.name}: signal {name!r}"
+        long = _refuse_runs(what, missing, first_row, 0 if name == "u" else LONGEST_REPAIR)
+        isolated = missing & ~long
+        away |= long
+        filled = np.interp(log["t"], log["t"][~missing], values[~missing])
+        if np.any(isolated):
+            count = int(isolated.sum())
+            remarks.append(f"{log.name}: {count} isolated missing samples of {name!r} interpolated")
+            bad += _found(log, name, "missing", isolated, "interpolated")
+        bad += _found(log, name, "missing", long, "cut out")
+        log = log.with_signals(**{name: filled})
+    return Repaired(log, tuple(remarks), tuple(bad)), away
+
+
+def _commanded(log: Log) -> bool:
+    """Whether the force is the command times a constant, and no measured one."""
+    if "F" not in log or "u" not in log:
+        return False
+    F, u = log["F"], log["u"]
+    largest = int(np.argmax(np.abs(u)))
+    return bool(u[largest] != 0.0 and np.allclose(F, u * (F[largest] / u[largest]), rtol=1e-9))
+
+
+def _left_out(log: Log, away: Mask, first_row: int) -> Log:
+    """The log without these rows, and without their neighbours where they are few."""
+    if not np.any(away):
+        return log
+    wide = np.convolve(away, np.ones(_SHORTEST_CUT // 2 + 1), mode="same") > 0.5
+    if wide.mean() > _MOST_CUT:
+        raise BadLog(
+            f"{log.name}: in {away.mean():.0%} of the rows, first in row"
+            f" {first_row + int(np.argmax(away))}, a signal is missing or stands still; at most"
+            f" {_MOST_CUT:.0%} are cut out; check the sensor and its cable"
+        )
+    return Log(log.name, {key: x[~wide] for key, x in log.signals.items()})
+
+
+def _found(
+    log: Log, name: str, kind: Kind, where: Mask, done: Done, size: float | None = None
+) -> list[BadSamples]:
+    """The stretches of a mask as findings; many isolated ones as one."""
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], where.astype(np.int8), [0]))))
+    starts, stops = edges[0::2], edges[1::2]
+    if done == "interpolated" and len(starts) > 1:
+        starts, stops = starts[:1], stops[-1:]
+    t = log["t"]
+    return [
+        BadSamples(
+            log.name, name, kind, float(t[a]), float(t[b - 1]), int(where[a:b].sum()), size, done
+        )
+        for a, b in zip(starts.tolist(), stops.tolist(), strict=True)
+    ]
+
+
+def _limits(log: Log) -> list[BadSamples]:
+    """Where the command stands at its largest or smallest value: told, and kept."""
+    if "u" not in log:
+        return []
+    u = log["u"]
+    low, high = float(u.min()), float(u.max())
+    if low == high or len(np.unique(u)) < _LEVELS:
+        return []
+    out = []
+    for limit in (low, high):
+        at = u == limit
+        if np.count_nonzero(at[1:] & at[:-1]) >= LONGEST_REPAIR:
+            t, count = log["t"][at], int(at.sum())
+            first, last = float(t[0]), float(t[-1])
+            out.append(BadSamples(log.name, "u", "saturated", first, last, count, None, "kept"))
+    return out
 
 
 def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repaired:
@@ -94,6 +215,11 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     while np.any(new := spikes(log, name, rotary) & ~spiking):  # one may hide another beside it
         spiking |= new
         log = log.with_signals(**{name: np.interp(t, t[~spiking], raw[~spiking])})
+    rounds = 0
+    while name in _SMALL and rounds < _ROUNDS and np.any(new := small_spikes(log[name]) & ~spiking):
+        spiking |= new
+        rounds += 1
+        log = log.with_signals(**{name: np.interp(t, t[~spiking], raw[~spiking])})
     if not np.any(spiking):
         return Repaired(log, ())
     rows, height = np.flatnonzero(spiking), np.abs(raw - log[name])
@@ -101,13 +227,20 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
         f"{first_row + int(rows[0])}, the largest of {np.max(height):.3g}"
         f" {_unit(name, rotary)} in row {first_row + int(np.argmax(height))}"
     )
-    if spiking.mean() > _MANY:
+    if np.mean(height > _LARGE * np.ptp(log[name])) > _MANY or spiking.mean() > _TAILS:
         raise BadLog(
             f"{log.name}: signal {name!r} has spikes in {spiking.mean():.1%} of the rows, first in"
             f" row {found}; at most {_MANY:.0%} are interpolated; check the sensor and its cable"
         )
     said = f"{log.name}: isolated spikes of {name!r} in {len(rows)} samples interpolated"
-    return Repaired(log, (f"{said} (at most {LONGEST_SPIKE} in a row), first in row {found}",))
+    return Repaired(
+        log,
+        (
+            f"{said} (at most {LONGEST_SPIKE} in a row), first in row {found},"
+            f" t = {t[int(np.argmax(height))]:.6g} s",
+        ),
+        tuple(_found(log, name, "spike", spiking, "interpolated", float(np.max(height)))),
+    )
 
 
 def _unit(name: str, rotary: bool) -> str:
@@ -115,24 +248,23 @@ def _unit(name: str, rotary: bool) -> str:
     return units.get(name, "Pa")
 
 
-def _refuse_runs(what: str, missing: NDArray[np.bool_], first_row: int) -> None:
+def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mask:
+    """Where more than so many are missing in a row, (n,); BadLog where too many are."""
     edges = np.flatnonzero(np.diff(np.concatenate(([0], missing.astype(np.int8), [0]))))
-    starts, lengths = edges[0::2], edges[1::2] - edges[0::2]
-    longest = int(np.argmax(lengths))
-    at = f"row {first_row + int(starts[longest])}"
-    if lengths[longest] > LONGEST_REPAIR:
-        raise BadLog(
-            f"{what} is NaN or infinite for {lengths[longest]} rows from {at}, at most "
-            f"{LONGEST_REPAIR} in a row are interpolated; cut the log there"
-        )
+    starts, stops = edges[0::2], edges[1::2]
     if missing[0] or missing[-1]:
         where = first_row if missing[0] else first_row + len(missing) - 1
         raise BadLog(f"{what} is NaN or infinite in row {where}, an end of the log; cut it off")
-    if missing.mean() > _MANY:
+    long = np.zeros_like(missing)
+    for a, b in zip(starts.tolist(), stops.tolist(), strict=True):
+        long[a:b] = b - a > repaired
+    isolated = missing & ~long
+    if isolated.mean() > _MANY or missing.mean() > _MOST_CUT:
         raise BadLog(
             f"{what} is NaN or infinite in {missing.mean():.0%} of the rows, first in row "
             f"{first_row + int(starts[0])}, at most {_MANY:.0%} are interpolated; check the sensor"
         )
+    return long
 
 
 def even_clock(log: Log) -> tuple[Log, ...]:

@@ -23,6 +23,7 @@ from identification.drift.reference_model import InForce
 from identification.drift.single_log import seen_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
+from identification.estimation import contradicted
 from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import is_no_run, leaves_much
 from identification.estimation.gauss_newton import Minimum
@@ -40,11 +41,22 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
+from identification.estimation.walking_residual import walk_size
+from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.signals.force_walk import shows
+from identification.signals.frozen import frozen
+from identification.signals.steps import (
+    jump_size,
+    outstanding,
+    small_spikes,
+    steps_between,
+    white_noise,
+)
+from identification.thresholds import JUMP_FROM, REPLACED_GAINS
 from identification.tracing.dependence import dependence
 from identification.tracing.free_run.backward_elimination import (
     Setting,
@@ -77,6 +89,9 @@ from identification.tracing.verdict import is_headline, other_law
 from tests.identification.motor_logs import K_A, NOISE, H, plant, seen
 
 N = 100  # rows
+NONE = np.zeros(1)
+BEGUN = Starts(np.array([0]), NONE, NONE, NONE, np.zeros((3, 1)))
+FREE = Freed(BEGUN, np.ones((1, 1)), np.zeros((3, 1, 1)), np.eye(3)[np.newaxis])
 
 
 @cache
@@ -571,6 +586,98 @@ def test_sure_of_walk() -> None:
     """A force that walks off its command by less than chance does not walk."""
     assert not shows(16.0)
     assert shows(25.0)
+
+
+def smooth(size: float, at: int, length: int) -> Array:
+    """A motion behind a sensor of noise 1, off by this much from a sample on."""
+    t = np.arange(4000.0)
+    y = 200.0 * np.sin(2.0 * np.pi * t / 4000.0)
+    y += np.random.default_rng(1).standard_normal(4000)
+    y[at : at + length] += size
+    return y
+
+
+def test_jump_from() -> None:
+    """A position that steps by so many deviations has jumped."""
+
+    def jumps(size: float) -> bool:
+        y = smooth(0.0, 0, 0)
+        y[2000:] += size - jump_size(y, 1999)  # by the widest lines, of which noise has its part
+        return bool(len(outstanding(steps_between(y), JUMP_FROM * white_noise(y))))
+
+    assert not jumps(6.5)
+    assert jumps(16.0)
+
+
+def test_spike_from() -> None:
+    """A sample that is so far from its neighbours is no sample of the body."""
+    assert not np.any(small_spikes(smooth(5.0, 2000, 1)))
+    assert np.any(small_spikes(smooth(13.0, 2000, 1)))
+
+
+def rest(size: float, length: int) -> Array:
+    """Errors of a run that follows, off by this much for a while."""
+    r = np.random.default_rng(2).standard_normal(2000)
+    r[1000 : 1000 + length] += size
+    return r
+
+
+def test_run_jump_from() -> None:
+    """What stays off a run by a few deviations has jumped."""
+    assert not len(contradicted._jumps(rest(2.0, 1000), BEGUN))
+    assert len(contradicted._jumps(rest(5.0, 1000), BEGUN))
+
+
+def test_run_spike_from() -> None:
+    """A single error of a run of so many deviations is the sensor's."""
+    small, large = rest(4.0, 1), rest(9.0, 1)
+    assert not np.any(contradicted._without_spikes(small, small)[1])
+    assert np.any(contradicted._without_spikes(large, large)[1])
+    assert not np.any(contradicted._without_spikes(large, rest(0.0, 1))[1])
+
+
+def test_replaced_gains() -> None:
+    """A command is taken to be wrong where the run gains much without it."""
+    one = log()
+    found = contradicted._Driven(plant(), one, "command", FREE)
+
+    def wrong(gain: float) -> bool:
+        """Of a command with one sample off, without which the cost falls by this much."""
+        x = np.array(one.log["u"])
+        x[700] += 1.0
+        errors = {True: np.sqrt(gain), False: 0.0}
+        fake = replace(found, one=replace(one, log=one.log.with_signals(u=x)))
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(
+                contradicted._Driven,
+                "errors",
+                lambda _self, u: np.full((1, 1), errors[bool(abs(u[700] - x[700]) < 0.1)]),
+            )
+            patch.setattr(contradicted, "loss", lambda r: float(np.sum(r**2)))
+            return bool(contradicted._without_drive_spikes(fake, REPLACED_GAINS)[1])
+
+    assert not wrong(12.0)
+    assert wrong(18.75)
+
+
+def test_residual_walks() -> None:
+    """Sums of what a run leaves that are so sure to be more than noise make it walk."""
+    noise = np.random.default_rng(3).standard_normal(6000)
+    assert walk_size([noise]) == 0.0
+    assert walk_size([noise + 0.08 * np.sin(np.arange(6000) / 600.0)]) == 0.0
+    assert walk_size([noise + 0.1 * np.sin(np.arange(6000) / 600.0)]) > 0.0
+
+
+def test_frozen_run() -> None:
+    """A value that a noisy signal repeats so many times stands still."""
+
+    def found(length: int) -> bool:
+        y = smooth(0.0, 0, 0)
+        y[2000 : 2000 + length] = y[2000]
+        return bool(np.any(frozen(y)))
+
+    assert not found(6)
+    assert found(10)
 
 
 def test_every_threshold_has_a_test() -> None:

@@ -14,6 +14,7 @@ from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
+from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import actuator_units, all_converted, friction_units, in_unit
@@ -156,6 +157,7 @@ class ModelFile:
     posterior: Mapping[str, Any] | None = None
     correlation: ParameterCorrelation | None = None
     own_logs: OwnLogs | None = None
+    bad_samples: tuple[BadSamples, ...] = ()
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -182,9 +184,9 @@ class Model(ModelFile):
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
     posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
-    the logs lie from the model, each alone. library: where the effects'
-    equations are. read: what to say of its file, a line for each value in another
-    unit than ours.
+    the logs lie from the model, each alone; bad_samples: what was set aside of them. library:
+    where the effects' equations are. read: what to say of its file, a line for each value in
+    another unit than ours.
     """
 
     library: Library = field(default_factory=built_in, compare=False, repr=False)

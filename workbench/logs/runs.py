@@ -40,9 +40,9 @@ class Fingerprint:
 def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
-    Isolated missing samples and spikes are interpolated. A `kind = "force"` rig with pressures
-    keeps the force as logged in `F_logged`. Raises BadLog or BadCard in one line where the file or
-    its content is not what the card says.
+    Isolated missing samples and spikes are interpolated, other bad ones left out. A `kind =
+    "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
+    one line where the file or its content is not what the card says.
     """
     raw, first_row = _read_signals(path, card)
     log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
@@ -60,7 +60,11 @@ def read_runs(path: Path, card: Card) -> Prepared:
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
     prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
-    return Prepared(prepared.runs, (*repaired.remarks, *thin.remarks, *prepared.remarks))
+    remarks = (*repaired.remarks, *thin.remarks, *prepared.remarks)
+    bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
+    return Prepared(
+        prepared.runs, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
+    )  # fmt: skip
 
 
 def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:

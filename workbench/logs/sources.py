@@ -7,6 +7,7 @@ from pathlib import Path
 
 from identification.errors import BadLog
 from identification.log import Log, Rig
+from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.documents.plausible import log_remarks
 from workbench.logs.fetch import card_path, find_data
@@ -25,12 +26,14 @@ class Source:
 
 @dataclass(frozen=True)
 class Sources:
-    """The card, its rig for these files, their runs, and what had to be repaired in them."""
+    """The card, its rig for these files, their runs, what had to be repaired in them, and which
+    samples were set aside."""
 
     card: Card
     rig: Rig
     runs: tuple[Source, ...]
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
 
 def read_sources(names: Sequence[str], card_name: str) -> Sources:
@@ -40,7 +43,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
     """
     card = load_card(card_path(card_name), with_recipe=False)
     found: list[tuple[Path, Source]] = []
-    remarks: list[str] = []
+    remarks, bad = list[str](), list[BadSamples]()
     rigs: dict[Path, Rig] = {}
     for name in names:
         path = find_data(name, card)
@@ -50,6 +53,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
         rigs[whole] = card.rig(path.name)
         prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
+        bad.extend(prepared.bad)
         found.extend((whole, _source(path, run)) for run in prepared.runs)
     names_of = Counter(path.name for path in rigs)
     runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
@@ -61,7 +65,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
                 " one by one"
             )
     remarks.extend(log_remarks([run.log for run in runs], rigs[first], card.signals))
-    return Sources(card, rigs[first], tuple(runs), tuple(remarks))
+    return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 
 
 def _source(path: Path, run: Log) -> Source:

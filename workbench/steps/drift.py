@@ -24,6 +24,7 @@ from identification.estimation.estimates import told_estimate
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
+from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, as_number, model_document, used, versions
 from workbench.documents.reading import read_result
@@ -72,6 +73,7 @@ class Drifted:
     tests: tuple[Tested, ...]
     stream: Stream
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
     @property
     def verdict(self) -> DriftVerdict:
@@ -98,6 +100,8 @@ def model_key(model: Model) -> str:
     document = model_document(model)
     if model.own_logs is None:  # as a model was named before it could hold them
         del document["own_logs"]
+    if not document["bad_samples"]:
+        del document["bad_samples"]
     return hashlib.sha256(dumps(document).encode()).hexdigest()
 
 
@@ -180,7 +184,8 @@ def drift_of(
         tests.append(Tested(source, found, again))
     assert state is not None
     seen = (*(stream.seen if stream else ()), *(_seen(one) for one in tests if not one.again))
-    return Drifted(model, key, settings, tuple(tests), Stream(state, seen), tuple(remarks))
+    after = Stream(state, seen)
+    return Drifted(model, key, settings, tuple(tests), after, tuple(remarks), sources.bad)
 
 
 def _same_machine(model: Model, sources: Sources) -> None:
@@ -234,6 +239,7 @@ def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:
         "verdict": found.verdict,
         "log": [_of_run(one) for one in found.tests],
         "seen": [asdict(one) for one in found.stream.seen],
+        "bad_samples": [one.as_json() for one in found.bad],
         "remarks": list(found.remarks),
         "versions": versions(),
     }

@@ -46,6 +46,7 @@ def identify_sources(
         options=options,
         on_progress=on_progress,
     )
+    model = replace(model, bad_samples=(*sources.bad, *fit.bad))
     if posterior:
         model = replace(model, posterior=_posterior(sources, fit, seed, on_progress))
     return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)))

@@ -1,7 +1,7 @@
 """Training and test runs -> trace: what the model lacks, errors before and after, and the model."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.progress import KeepGoing, without_end
+from identification.signals.bad_samples import BadSamples
 from identification.tracing.result import Errors, FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
@@ -35,6 +36,7 @@ class Traced:
     train: tuple[Source, ...]
     test: tuple[Source, ...]
     remarks: tuple[str, ...]
+    bad: tuple[BadSamples, ...] = ()
 
 
 def named_logs(
@@ -87,7 +89,9 @@ def trace_sources(
     )
     remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
     model = traced_model(found, train, library)
-    return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)))
+    bad = (*train.bad, *(test.bad if test else ()))
+    model = replace(model, bad_samples=train.bad)
+    return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)), bad)
 
 
 def _held_out(train: Sources) -> list[str]:
@@ -216,6 +220,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             "before": _numbers(found.parameters_before),
             "after": _numbers(found.parameters_after),
         },
+        "bad_samples": [one.as_json() for one in traced.bad],
         "remarks": [*traced.remarks, *found.remarks],
         "versions": versions(),
     }

@@ -113,7 +113,7 @@ def test_isolated_nan_is_filled_and_remarked() -> None:
     log = sliding_log()
     y = log["y"].copy()
     y[[100, 500, 501]] = np.nan
-    repaired, remarks = repair(log.with_signals(y=y))
+    repaired, remarks, _ = repair(log.with_signals(y=y))
     np.testing.assert_allclose(repaired["y"], log["y"], atol=1e-4)
     assert remarks == ("run: 3 isolated missing samples of 'y' interpolated",)
 
@@ -121,13 +121,14 @@ def test_isolated_nan_is_filled_and_remarked() -> None:
 @pytest.mark.parametrize(
     ("rows", "message"),
     [
-        (range(40, 44), "NaN or infinite for 4 rows from row 42"),
         ([0], "row 2, an end of the log"),
         ([1999], "row 2001, an end of the log"),
         (range(10, 1900, 20), "in 5% of the rows, first in row 12"),
     ],
 )
-def test_runs_of_nan_are_refused_with_their_row(rows: list[int], message: str) -> None:
+def test_missing_ends_and_too_many_are_refused_with_their_row(
+    rows: list[int], message: str
+) -> None:
     log = sliding_log()
     for bad in (np.nan, np.inf):
         F = log["F"].copy()
@@ -259,3 +260,42 @@ def test_filters_pass_a_constant_and_match_their_difference_equations() -> None:
     np.testing.assert_allclose(apply_filter(low, np.full(90, 2.0)), 2.0)
     with pytest.raises(BadSpecification, match="cut-off"):
         fir_lowpass(600.0, 1e-3)
+
+
+def test_a_run_of_missing_samples_cuts_the_log() -> None:
+    log = sliding_log()
+    F = log["F"].copy()
+    F[700:720] = np.nan
+    made = prepare(log.with_signals(F=F), RIG)
+    assert len(made.runs) == 2
+    assert all(np.all(np.isfinite(run["F"])) for run in made.runs)
+    (found,) = made.bad
+    assert (found.kind, found.done, found.samples) == ("missing", "cut out", 20)
+    assert (found.first, found.last) == pytest.approx((7.0, 7.19))
+
+
+def test_any_missing_command_cuts_the_log() -> None:
+    """What a controller gave is not what lies between two other samples."""
+    log = sliding_log()
+    u = log["F"].copy()
+    u[700] = np.nan
+    made = prepare(log.with_signals(u=u), RIG)
+    assert len(made.runs) == 2
+    assert made.bad[0].done == "cut out"
+
+
+def test_a_tenth_of_a_log_is_not_cut_out() -> None:
+    log = sliding_log()
+    F = log["F"].copy()
+    for first in range(100, 1900, 100):
+        F[first : first + 9] = np.nan
+    with pytest.raises(BadLog, match=r"at most 10% are cut out|is NaN or infinite in"):
+        repair(log.with_signals(F=F))
+
+
+def test_a_command_at_its_limit_is_told_and_kept() -> None:
+    log = sliding_log()
+    u = np.clip(log["F"] + 0.01 * np.sin(30.0 * log["t"]), -9.5, 9.5)
+    made = prepare(log.with_signals(u=u), RIG)
+    assert {(one.kind, one.done) for one in made.bad} == {("saturated", "kept")}
+    np.testing.assert_array_equal(made.runs[0]["u"], u)

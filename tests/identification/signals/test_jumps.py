@@ -40,7 +40,7 @@ def test_a_spike_each_second_is_interpolated(name: str, height: float, length: i
         for first in range(500, 12_000, 1000):
             x[first : first + length] += height
 
-    found, remarks = repair(changed(log, name, spike), first_row=2)
+    found, remarks, _ = repair(changed(log, name, spike), first_row=2)
     np.testing.assert_allclose(found[name], log[name], atol=1e-3 if name == "y" else 1.0)
     assert len(remarks) == 1
     assert f"isolated spikes of {name!r} in {12 * length} samples interpolated" in remarks[0]
@@ -57,7 +57,7 @@ def test_two_spikes_side_by_side_and_a_pressure_s() -> None:
     def burst(x: Array) -> None:
         x[700:702] = 2e6
 
-    found, remarks = repair(changed(changed(log, "y", spike), "p_p", burst))
+    found, remarks, _ = repair(changed(changed(log, "y", spike), "p_p", burst))
     np.testing.assert_allclose(found["y"], log["y"], atol=1e-3)
     np.testing.assert_allclose(found["p_p"], log["p_p"], rtol=1e-3)
     assert [line.split("(")[0] for line in remarks] == [
@@ -74,35 +74,60 @@ def test_a_sensor_that_spikes_all_the_time_is_refused() -> None:
         repair(changed(moving(), "y", spike))
 
 
-@pytest.mark.parametrize("size", [0.5, -0.01, 0.002])
-def test_one_lasting_jump_is_refused_with_row_and_size(size: float) -> None:
+@pytest.mark.parametrize("size", [0.5, -0.01, 0.002, 3e-4])
+def test_a_lasting_jump_is_taken_out_and_the_log_cut_there(size: float) -> None:
     def jump(x: Array) -> None:
         x[7000:] += size
 
-    jumped = changed(moving(), "y", jump)
-    with pytest.raises(BadLog, match=r"jumps by -?0\.\d+ m from row 7001 to 7002, which no") as one:
-        prepare(jumped, RIG, first_row=2)
-    assert "cut the log there" in str(one.value)
-    assert "\n" not in str(one.value)
+    log = moving()
+    before, after = prepare(changed(log, "y", jump), RIG, first_row=2).runs
+    np.testing.assert_array_equal(before["y"], log["y"][: len(before)])
+    np.testing.assert_allclose(after["y"], log["y"][-len(after) :], atol=5e-5)
+    assert len(before) + len(after) > len(log) - 10
+    (found,) = prepare(changed(log, "y", jump), RIG).bad
+    assert (found.signal, found.kind, found.done) == ("y", "jump", "offset removed")
+    assert found.first == found.last == log["t"][7000]
+    assert found.size == pytest.approx(abs(size), abs=5e-5)
+    assert "'y' has a jump that stays at t = 7 s" in found.line
+
+
+def test_a_jump_near_another_is_taken_out_without_a_cut() -> None:
+    def jump(x: Array) -> None:
+        x[7000:] += 0.01
+        x[7400:] -= 0.003
+
+    log = moving()
+    made = prepare(changed(log, "y", jump), RIG)
+    assert [one.kind for one in made.bad] == ["jump", "jump"]
+    np.testing.assert_allclose(made.runs[-1]["y"][-1000:], log["y"][-1000:], atol=1e-4)
 
 
 @pytest.mark.parametrize("period", [0.02, 2.0**16 * 1e-6, 0.095])
 @pytest.mark.parametrize("h", [1e-3, 1e-2])
-def test_a_counter_that_wraps_is_refused(period: float, h: float) -> None:
+def test_a_counter_that_wraps_is_unwrapped(period: float, h: float) -> None:
     log = moving(h=h)
     wrapped = log.with_signals(y=np.mod(log["y"] + 0.013, period))
-    with pytest.raises(BadLog, match=r"such jumps, all about as large.*wraps at the end") as caught:
-        prepare(wrapped, RIG)
-    assert "unwrap the column" in str(caught.value)
-    assert "signed = true" in str(caught.value)
+    made = prepare(wrapped, RIG)
+    assert [one.kind for one in made.bad] == ["wrap"]
+    assert made.bad[0].size == pytest.approx(period, abs=2e-5)
+    off = made.runs[0]["y"] - log["y"]
+    assert np.ptp(off) < 2e-4
 
 
-def test_an_angle_modulo_a_turn_is_refused() -> None:
+def test_a_counter_of_whole_steps_is_unwrapped_exactly() -> None:
+    log = moving()
+    count = 2e-6
+    y = count * np.round(log["y"] / count)
+    made = prepare(log.with_signals(y=np.mod(y, count * 2.0**14)), RIG)
+    assert np.ptp(made.runs[0]["y"] - y) < 1e-12
+
+
+def test_an_angle_modulo_a_turn_is_unwrapped_exactly() -> None:
     log = moving(h=5e-3)
     turns = np.mod(200.0 * log["y"], 2 * np.pi)
-    with pytest.raises(BadLog, match=r"jumps by -?6\.\d+ rad from row"):
-        prepare(log.with_signals(y=turns), ROTARY)
-    prepare(log.with_signals(y=np.unwrap(turns)), ROTARY)
+    made = prepare(log.with_signals(y=turns), ROTARY)
+    assert np.ptp(made.runs[0]["y"] - 200.0 * log["y"]) < 1e-9
+    assert prepare(log.with_signals(y=np.unwrap(turns)), ROTARY).bad == ()
 
 
 @pytest.mark.parametrize("h", [2e-2, 5e-3, 1e-3, 1e-4])
@@ -128,7 +153,7 @@ def test_impacts_on_end_stops_are_no_fault(h: float, bounce: float) -> None:
         out[i] = y
     y_h = out[:: round(h / fine)]
     t = h * np.arange(y_h.size, dtype=np.float64)
-    repaired, remarks = repair(Log("stops", {"t": t, "y": y_h}))
+    repaired, remarks, _ = repair(Log("stops", {"t": t, "y": y_h}))
     assert remarks == ()
     check(repaired, RIG)
 
@@ -144,7 +169,7 @@ def test_slips_of_a_stick_slip_are_no_fault(h: float) -> None:
         share = np.clip((t - begin) / 6e-3, 0.0, 1.0)
         y += size * share**2 * (3 - 2 * share)
     log = Log("slips", {"t": t, "y": y + 1e-6 * rng.standard_normal(t.size)})
-    repaired, remarks = repair(log)
+    repaired, remarks, _ = repair(log)
     assert remarks == ()
     check(repaired, RIG)
 

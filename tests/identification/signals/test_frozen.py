@@ -1,0 +1,51 @@
+"""A signal that hangs is found; a body at rest, a limit and an encoder are not."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.signals.frozen import frozen
+
+
+def motion(noise: float = 1e-5, count: float = 0.0, n: int = 4000) -> Array:
+    """A position to and fro with rests, every millisecond."""
+    t = 1e-3 * np.arange(n)
+    y = 0.05 * np.clip(1.3 * np.sin(2.0 * np.pi * t), -1.0, 1.0)
+    y = y + noise * np.random.default_rng(0).standard_normal(n)
+    return np.asarray(count * np.round(y / count) if count else y)
+
+
+@pytest.mark.parametrize("at", [60, 1000, 1250])
+@pytest.mark.parametrize("value", [None, 0.0])
+def test_a_noisy_signal_that_stands_still(at: int, value: float | None) -> None:
+    y = motion()
+    y[at : at + 30] = y[at] if value is None else value
+    found = np.flatnonzero(frozen(y))
+    assert (found[0], found[-1]) == (at, at + 29)
+
+
+def test_a_counter_that_catches_up_with_a_motion() -> None:
+    y = motion(noise=0.0, count=1e-5)
+    assert not np.any(frozen(y))
+    y[985:1015] = y[985]
+    found = np.flatnonzero(frozen(y))
+    assert found[0] in (984, 985)
+    assert found[-1] == 1014
+
+
+@pytest.mark.parametrize("count", [0.0, 1e-6, 2e-5, 1e-3])
+@pytest.mark.parametrize("noise", [0.0, 1e-6, 1e-5])
+def test_rests_and_counts_are_no_fault(count: float, noise: float) -> None:
+    assert not np.any(frozen(motion(noise, count)))
+
+
+def test_a_command_at_its_limit_or_off_is_no_fault() -> None:
+    u = np.clip(20.0 * motion(noise=1e-3), -0.9, 0.9)
+    u[:500] = 0.0
+    assert not np.any(frozen(u, at_limits=True))
+
+
+def test_a_command_that_drops_out_for_a_moment() -> None:
+    u = 20.0 * motion(noise=1e-3)
+    u[1300:1315] = 0.0
+    assert np.count_nonzero(frozen(u, at_limits=True)) == 15

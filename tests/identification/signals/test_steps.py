@@ -1,0 +1,55 @@
+"""Small jumps and spikes are told from kinks, impacts and encoders; the callers' arrays stay."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array, frozen
+from identification.signals.steps import jump_size, small_jumps, small_spikes, white_noise
+
+H, NOISE = 1e-3, 1e-5
+T = H * np.arange(6000.0)
+
+
+def way(seed: int = 0) -> Array:
+    """A smooth motion with reversals, behind a noisy sensor."""
+    y = 0.05 * np.sin(2.0 * np.pi * T)
+    return np.asarray(y + NOISE * np.random.default_rng(seed).standard_normal(len(T)))
+
+
+@pytest.mark.parametrize("at", [1250, 2000, 3100])
+@pytest.mark.parametrize("size", [20.0, -30.0, 1000.0])
+def test_a_small_jump_is_found_in_motion_and_in_reversals(at: int, size: float) -> None:
+    y = way()
+    y[at:] += size * NOISE
+    y = frozen(y)
+    assert small_jumps(T, y).tolist() == [at - 1]
+    assert jump_size(y, at - 1) == pytest.approx(size * NOISE, abs=4.0 * NOISE)
+
+
+@pytest.mark.parametrize("at", [1250, 2000, 3100])
+@pytest.mark.parametrize("length", [1, 2, 3])
+def test_a_small_spike_is_found_in_motion_and_in_reversals(at: int, length: int) -> None:
+    y = way()
+    y[at : at + length] += 15.0 * NOISE
+    found = small_spikes(frozen(y))
+    assert np.flatnonzero(found).tolist() == list(range(at, at + length))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_noise_and_an_impact_are_neither(seed: int) -> None:
+    """A body that hits a stop within a sample and comes back with half its speed."""
+    y = way(seed)
+    y[2000:] += -1.5 * 0.05 * 2.0 * np.pi * (T[2000:] - T[2000] + 0.4 * H)
+    assert not len(small_jumps(T, y))
+    assert not np.any(small_spikes(y))
+
+
+@pytest.mark.parametrize("count", [1e-6, 2e-5, 1e-3])
+def test_an_encoder_s_counts_are_neither(count: float) -> None:
+    y = count * np.round(0.05 * np.sin(2.0 * np.pi * T) / count)
+    assert not len(small_jumps(T, y))
+    assert not np.any(small_spikes(y))
+
+
+def test_noise_is_told_beside_motion() -> None:
+    assert white_noise(way()) == pytest.approx(NOISE, rel=0.15)
