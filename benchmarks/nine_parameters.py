@@ -1,10 +1,11 @@
 """Nine parameters from simulated logs: errors, intervals, Cramer-Rao bound and time.
 
-    python benchmarks/nine_parameters.py [--seeds 20] [--first 1000] [--signals t,y,F,u] [CARD ...]
+    python benchmarks/nine_parameters.py [--seeds 20] [--first 1000] [--signals t,y,F,u] [--noise-u 1e-4] [CARD ...]
 
 Each recipe card is simulated with `--seeds` seeds from `--first` on; the method was chosen on
 seeds below 600, so those from 1000 on judge it. The bound is that of the log itself: Fisher
 information of position and force by central differences of exact simulations at the truth.
+--noise-u [V] is added to the command as it is logged, of which the valve knows nothing.
 """
 
 import argparse
@@ -69,11 +70,14 @@ def bound(recipe: Recipe, log: Log) -> Array:
     return np.asarray(np.sqrt(np.diag(inverse))[:9] * scale[:9])
 
 
-def trial(name: str, recipe: Recipe, seed: int, signals: tuple[str, ...]) -> Trial:
+def trial(name: str, recipe: Recipe, seed: int, signals: tuple[str, ...], noise_u: float) -> Trial:
     """Simulate, fit, compare."""
     log = record(name, recipe, seed)
     least = bound(recipe, log)
     seen = Log(name, {key: log[key] for key in signals})
+    if noise_u > 0.0:
+        noise = noise_u * np.random.default_rng([seed, 1]).standard_normal(len(log))
+        seen = seen.with_signals(u=log["u"] + noise)
     begin = time.perf_counter()
     fit: KarnoppFit = fit_plant([seen], np.random.default_rng(seed), rig=Rig("force"))
     seconds = time.perf_counter() - begin
@@ -119,6 +123,7 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--signals", default="t,y,F,u")
+    parser.add_argument("--noise-u", type=float, default=0.0)
     asked = parser.parse_args()
     signals = tuple(asked.signals.split(","))
     for name in asked.cards:
@@ -126,7 +131,7 @@ def main() -> None:
         assert recipe is not None
         plain = replace(recipe, plant=replace(recipe.plant, effects=()))
         trials = [
-            trial(name, plain, seed, signals)
+            trial(name, plain, seed, signals, asked.noise_u)
             for seed in range(asked.first, asked.first + asked.seeds)
         ]
         report(name, trials, "u" in signals)

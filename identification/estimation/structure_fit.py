@@ -99,14 +99,12 @@ class _Regressed:
 def fitted_structure(
     stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
     recorded: RecordedLogs, rng: np.random.Generator, *, near: Karnopp | None = None,
-    vain: float = np.inf,
 ) -> FittedStructure:  # fmt: skip
     """The plant of a structure: the regression's numbers, refined on the free run.
 
     rng: of the search where nothing holds the run to the log's position; near: band and stick
-    limits to begin from too, where those of the regression lead nowhere; vain: misfit of short logs
-    from which no search is worth its while. Halted, it gives the best so far, with the deviations
-    that the regression tells.
+    limits to begin from too, where those of the regression lead nowhere. Halted, it gives the best
+    so far, with the deviations that the regression tells.
     """
     logs, drive = recorded.logs, recorded.drive
     told = _regressed(stage, outcomes, effects, recorded)
@@ -130,7 +128,7 @@ def fitted_structure(
         followed = ADEQUATE if effects else COMPLETE
         if free and done.misfit > followed and not hopeless:
             banded = BREAKAWAY in outcomes and not missing
-            done = _closest(told, recorded, rng, (near, missing, banded, vain), done)
+            done = _closest(told, recorded, rng, (near, missing, banded), done)
         return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
     except Halted as halted:
         best, least = _best_so_far(plant, done, halted, recorded)
@@ -140,14 +138,13 @@ def fitted_structure(
 
 def _closest(
     told: _Regressed, recorded: RecordedLogs, rng: np.random.Generator,
-    known: tuple[Karnopp | None, bool, bool, float], done: Refit,
+    known: tuple[Karnopp | None, bool, bool], done: Refit,
 ) -> Refit:  # fmt: skip
     """The plant searched where nothing holds its run to the log's position.
 
-    known: what else to begin from, whether sliding is not explained, whether breakaways are told,
-    and the misfit of short logs from which no search is worth its while.
+    known: what else to begin from, whether sliding is not explained, whether breakaways are told.
     """
-    near, missing, banded, vain = known
+    near, missing, banded = known
     plant = told.plant
     by_loads = any(by_load(one.effect) for one in plant.effects)
     begins = [plant, done.plant]
@@ -157,7 +154,7 @@ def _closest(
     if missing:  # it will not do, however closely it is searched
         begins = begins[:1]
     open_to = {} if missing else left_open(plant.effects, dict(told.prior))
-    limits = SearchLimits(0 if missing else SEARCHES, banded and not by_loads, open_to, vain)
+    limits = SearchLimits(0 if missing else SEARCHES, banded and not by_loads, open_to)
     return closest(begins, recorded.logs, recorded.drive, rng, limits, done)
 
 

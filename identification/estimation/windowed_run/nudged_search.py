@@ -137,14 +137,12 @@ class SearchLimits:
 
     most: searches on the whole logs, none where no search will do; told: the first plant has
     everything but its band from the equations, so it is searched close by before; known: by name,
-    how far the equations leave a parameter open; vain: misfit on the short logs beyond which what
-    was found already stays.
+    how far the equations leave a parameter open.
     """
 
     most: int = SEARCHES
     told: bool = False
     known: Mapping[str, float] = field(default_factory=lambda: MappingProxyType({}))
-    vain: float = np.inf
 
 
 USUAL_LIMITS = SearchLimits()
@@ -173,8 +171,6 @@ def closest(
                 stages = ((1.0, replace(FAR_RANGE, known=limits.known)), (0.0, around))
                 near = nudged_search(plant, short, drive, rng, stages)
             begun = refit(near, short, drive, prior=even(near), effort="quick")
-            if best is not None and begun.misfit > limits.vain:
-                break
             hopes = not plant.effects or begun.misfit <= PROMISING_MISFIT
             worth = limits.most if hopes else min(limits.most, 1)
             found = _on_whole(begun, logs, drive, rng, worth, around, best)
@@ -214,13 +210,13 @@ def _on_whole(
 
 def closer(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator,
-    searches: int = SEARCHES, around: Range = CLOSE_RANGE, hopeless: float = np.inf,
+    searches: int = SEARCHES, around: Range = CLOSE_RANGE,
     done: Refit | None = None,
 ) -> Refit:  # fmt: skip
     """The plant refined, then searched close by and refined again, so many times at most, as long
     as that helps.
 
-    hopeless: misfit beyond which no other search will do; done: found from elsewhere, with which
+    done: found from elsewhere, with which
     one that agrees is the last.
     """
     part = [shortened(one, MIDDLE) for one in logs] if plant.effects else logs
@@ -229,7 +225,7 @@ def closer(
     best = None if slow else onward(plant, logs, drive)
     try:
         for _ in range(searches):
-            if best is not None and (best.misfit <= enough or best.misfit > hopeless):
+            if best is not None and best.misfit <= enough:
                 break
             if agree(done, best):
                 break

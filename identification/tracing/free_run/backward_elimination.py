@@ -48,8 +48,6 @@ from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, Step, absorb, material
 
 LEAST_MASS = 0.1  # of the mass before, that a regression may leave
-# Times what it stands against, that brief windows leave where no search will do
-NO_SEARCH_WILL_DO = 2.0
 VAIN = 0.9  # of the plain model's misfit, that effects leave which do not help
 ONCE_MORE = 2  # searches of a run that is all but followed
 
@@ -119,7 +117,6 @@ def _model(choice: Choice, setting: Setting) -> FittedStructure:
     near = None if setting.plain.imposed else setting.plain.plant.friction
     model = fitted_structure(
         choice.end, choice.base, choice.effects, setting.recorded, setting.rng, near=near,
-        vain=vain(setting),
     )  # fmt: skip
     if model.imposed:
         return model
@@ -272,7 +269,7 @@ def doubted(
             continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
-        found = refined_near(keeping(after.plant, stay), setting, after.misfit)
+        found = refined_near(keeping(after.plant, stay), setting)
         other = FittedStructure(less.end, less.base, found.plant, found.sd, False, found.misfit)
         if other.misfit > COMPLETE:
             again = fitted(less, setting) if stay else setting.plain
@@ -314,7 +311,7 @@ def pruned(
                 base = nearer((base, level), setting.logs, setting.drive)
             elif stay:
                 base = replace(base, friction=levelled(base.friction, less.end.theta))
-            found = refined_near(base, setting, model.misfit)
+            found = refined_near(base, setting)
             found = insisted(found.plant, found.misfit, setting) or found
         if found.misfit > COMPLETE and not is_needless(found.misfit, model.misfit):
             continue
@@ -389,12 +386,9 @@ def insisted(plant: Plant, left: float, setting: Setting) -> Refit | None:
     return best
 
 
-def refined_near(plant: Plant, setting: Setting, rival: float = np.inf) -> Refit:
-    """The plant refined on the whole logs from close by.
-
-    rival: misfit of what it stands against; one far beyond that is not searched again.
-    """
+def refined_near(plant: Plant, setting: Setting) -> Refit:
+    """The plant refined on the whole logs from close by."""
     logs, drive = setting.logs, setting.drive
     if loose(plant, drive):
-        return closer(plant, logs, drive, setting.rng, hopeless=NO_SEARCH_WILL_DO * max(rival, 1.0))
+        return closer(plant, logs, drive, setting.rng)
     return refit(plant, logs, drive, prior=even(plant), effort="near")

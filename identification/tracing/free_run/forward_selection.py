@@ -91,14 +91,8 @@ from identification.tracing.regression.candidates import EffectCandidate, trial
 from identification.tracing.regression.significance import by_luck
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
-OF_STEPS = 2.0  # times that, of a bristle where no spring mends the errors of its sub-steps
 MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
-GOES_ON = 0.6  # of the misfit before, that the best may leave on the short logs to go on
 WORTH = 1.25  # times that, up to which an effect's other starts are tried
-FINALISTS = 2  # refined on the whole logs
-AHEAD = 4  # first of those begun, tried where two effects are there already: each takes long
-FAR_BEHIND = 2.0  # times the first's excess misfit, with which none is a finalist, or its loss
-BEHIND = 1.4  # times the first search's loss of one that is followed, beyond which none is tried
 LARGER = 3  # starts of a play, from the best up
 RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
 Report = Callable[[str, float], None]
@@ -227,34 +221,16 @@ def contest(
     begun.sort(key=lambda one: (one.misfit > ADEQUATE, one.loss))
     if quickly and not (begun and begun[0].misfit <= ADEQUATE):
         return None
-    many = len(choice.steps) > 1
-    begun = begun[:AHEAD] if many else begun
-    # The short logs may be those stretches of which most is left.
-    short = max(model.misfit, misfit(model.plant, setting.short, setting.drive))
-    promising = max(NEARLY_FOLLOWED, GOES_ON * short)
-    promising = min(promising, earning(choice, model, setting))
-    needed = earned(model.misfit) if choice.steps else np.inf
+    promising = earning(choice, model, setting)
     screened = screening(begun, setting, promising, report)
     if not screened or screened[0].misfit > promising:
         return None
-    best: tuple[Refit, RunContender] | None = None
-    for finalist in screened[: 1 if many else FINALISTS]:
-        if finalist.misfit - 1.0 > FAR_BEHIND * max(screened[0].misfit - 1.0, 1.0):
-            break
-        found = _whole(finalist, setting)
-        if best is None or found.misfit < best[0].misfit:
-            best = found, finalist
-        # Those that follow the short logs no better would not do either.
-        if found.misfit <= COMPLETE or found.misfit > needed:
-            break
-    if best is None:
-        return None
-    done, winner = best
+    winner = screened[0]
+    done = _whole(winner, setting)
     rivals = [one for one in screened if one.effect.key != winner.effect.key]
-    bound = decisive(model.misfit, rivals)
-    if winner.effect.place.elastic and loose(done.plant, setting.drive):
-        bound = 1.0 + OF_STEPS * (bound - 1.0)
-    if done.misfit > bound or scales_alone(winner.effect, done.plant, setting.logs):
+    if done.misfit > decisive(model.misfit, rivals) or scales_alone(
+        winner.effect, done.plant, setting.logs
+    ):
         return None
     taken = _taken(winner, done, rivals, setting, model.misfit)
     return None if by_luck(taken[0].steps[-1].p_value) else taken
@@ -280,15 +256,14 @@ def screening(
     it are not tried.
     """
     screened = list[RunContender]()
-    settled_at, lost = np.inf, np.inf
+    lost = np.inf
     for i, one in enumerate(begun):
-        if one.loss > settled_at or one.misfit > lost:
+        if one.misfit > lost:
             continue
         found = _screened(one, setting, promising)
         if found is not None:
             screened.append(found)
             if found.misfit <= ADEQUATE:
-                settled_at = min(settled_at, BEHIND * one.loss)
                 lost = ASTRAY if one.misfit <= ADEQUATE else lost
         report("judging", 0.5 + 0.5 * (i + 1) / len(begun))
     return sorted(screened, key=lambda one: one.misfit)
