@@ -1,6 +1,7 @@
 """Nine parameters from simulated logs: errors, intervals, Cramer-Rao bound and time.
 
-    python benchmarks/nine_parameters.py [--seeds 20] [--first 1000] [--signals t,y,F,u] [--noise-u 1e-4] [CARD ...]
+    python benchmarks/nine_parameters.py [--seeds 20] [--first 1000] [--signals t,y,F,u]
+        [--noise-u 1e-4] [CARD ...]
 
 Each recipe card is simulated with `--seeds` seeds from `--first` on; the method was chosen on
 seeds below 600, so those from 1000 on judge it. The bound is that of the log itself: Fisher
