@@ -47,7 +47,7 @@ DOES_NOTHING = 1.002  # the same, of the plant as it is
 SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noise
 IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
-STANDS_OUT = 1.3  # times the sensors' square, that an error on the test logs is to be spoken of
+SHOWN_FROM = 1.3  # times the sensors' square, that an error on the test logs is to be spoken of
 HEADLINE = 0.5  # share left at most of what was missing there, by effects that are told first
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure
@@ -63,8 +63,8 @@ DRIFT_LEAST = 0.01  # of its value, that it changes
 # What a test of a new log must be able to see, or it does not judge (drift.py: coarse).
 SEEN = 0.05  # of a Coulomb level, the change that it sees
 SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
-POWER = 0.9  # chance with which it would have alarmed
-LOST = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
+CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
+LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
 VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).

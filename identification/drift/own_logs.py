@@ -18,8 +18,8 @@ from identification.errors import NotIdentifiable
 from identification.log import Log
 from identification.thresholds import COMPLETE
 
-PARTS = 3  # stretches of a single log
-LEAST_PART = 3.0  # s, of a stretch that tells something by itself
+LOG_PARTS = 3  # stretches of a single log
+LEAST_STRETCH = 3.0  # s, of a stretch that tells something by itself
 
 
 def with_own_logs(model: InForce, logs: Sequence[Log], rng: np.random.Generator) -> InForce:
@@ -43,7 +43,7 @@ def with_own_logs(model: InForce, logs: Sequence[Log], rng: np.random.Generator)
 
 def _stretches(log: Log) -> list[Log]:
     """A log in parts that are long enough to be fitted."""
-    count = min(PARTS, int(log.duration / LEAST_PART))
+    count = min(LOG_PARTS, int(log.duration / LEAST_STRETCH))
     edges = np.linspace(0, len(log), count + 1).astype(int)
     return [log.part(int(a), int(b)) for a, b in pairwise(edges)]
 

@@ -7,7 +7,7 @@ from scipy.stats import chi2
 
 from identification.arrays import Array
 from identification.drift.reference_model import InForce
-from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE, LOST
+from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE, LOST_FIT
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +27,7 @@ class OwnMisfit:
     def has_lost_its_way(self, misfit: float) -> bool:
         """Whether a log's fit leaves so much beside those of the model's own logs that it says
         nothing of the parameters."""
-        return misfit > LOST * self.left
+        return misfit > LOST_FIT * self.left
 
     def of_log(self, own: Array, misfit: float) -> Array:
         """Covariance (d, d) of a log's errors, by that of its fit and the misfit this leaves.

@@ -15,7 +15,7 @@ from scipy.stats import norm
 from identification.arrays import Array
 from identification.drift.mewma import Mean
 from identification.drift.practical_margin import beyond_margin
-from identification.thresholds import POWER
+from identification.thresholds import CHANCE_TO_SEE
 
 WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looked for
 
@@ -70,12 +70,12 @@ class LogChange:
 
 
 def seen_alone(found: LogChange, square: float) -> Array:
-    """Smallest change (k,) of each parameter that its own test sees, with a power of POWER.
+    """Smallest change (k,) of each parameter that its own test sees, with a power of CHANCE_TO_SEE.
 
     square: threshold of the largest of `alone`, squared. The power is over the errors of the log
     and the model: the parameter lies by so much from the model's on the day of the log.
     """
-    limit, more = np.sqrt(square), float(norm.ppf(POWER))
+    limit, more = np.sqrt(square), float(norm.ppf(CHANCE_TO_SEE))
     beyond = found.margin + (limit + more) * found.measured_sd
     return np.asarray(np.maximum(beyond, limit * found.sd + more * found.measured_sd))
 
@@ -84,9 +84,9 @@ def seen_together(found: Mean, square: float) -> Array:
     """Smallest change (k,) of one parameter that the test of all together sees, or at most that.
 
     square: its threshold. By how far the change lies from the margin's box without errors: errors
-    bring it nearer by more than a normal deviation once in 1 / (1 - POWER) at most.
+    bring it nearer by more than a normal deviation once in 1 / (1 - CHANCE_TO_SEE) at most.
     """
-    needed = (np.sqrt(square) + float(norm.ppf(POWER))) ** 2
+    needed = (np.sqrt(square) + float(norm.ppf(CHANCE_TO_SEE))) ** 2
     return np.array([_first_beyond(found, i, needed) for i in range(len(found.at))])
 
 

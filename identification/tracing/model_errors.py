@@ -18,7 +18,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.refinement import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, CARRIED, ROUGH_LEFT, STANDS_OUT
+from identification.thresholds import ADEQUATE, CARRIED, ROUGH_LEFT, SHOWN_FROM
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
@@ -89,7 +89,7 @@ def share_left(
 
     Of squares, beyond what the sensors alone leave; 0 where nothing stood out of that.
     """
-    most, share = STANDS_OUT, 0.0
+    most, share = SHOWN_FROM, 0.0
     for name in ("force_rms", "position_rms", "actuator_rms"):
         own, left, least = (getattr(x, name) for x in (before["test"], after["test"], noise))
         if own is None or left is None or not least:

@@ -397,7 +397,7 @@ def test_imposed_left() -> None:
 FLOOR = NoiseFloor(1.0, 1.0, None)  # of the sensors
 
 
-def test_stands_out() -> None:
+def test_shown_from() -> None:
     """An error on the test logs is spoken of where it stands out of the sensors' noise."""
     assert share_left(errors(1.0, np.sqrt(1.04)), errors(1.0, np.sqrt(1.02)), FLOOR) == 0.0
     left = share_left(errors(1.0, np.sqrt(1.62)), errors(1.0, np.sqrt(1.31)), FLOOR)
@@ -508,7 +508,7 @@ def test_seen_margins() -> None:
     assert not says_none(0.25, DriftSettings(margin=0.08))
 
 
-def test_lost() -> None:
+def test_lost_fit() -> None:
     """A fit that leaves so much more than those of the model's own logs has lost its way."""
     misfit = OwnMisfit(1.0, np.zeros(1), 3, 20.0)
     assert not misfit.has_lost_its_way(80.0 * 20.0)
@@ -521,7 +521,7 @@ def test_vanished() -> None:
     assert at_bound(-0.995)
 
 
-def test_power() -> None:
+def test_chance_to_see() -> None:
     """Of the smallest change that a test sees, nine in ten are found."""
     size = float(seen_together(Mean((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
     assert norm.sf(3.0 - size) == pytest.approx(0.9, abs=0.005)

@@ -144,7 +144,9 @@ def test_measured_sets_have_no_remark(name: str) -> None:
         pytest.skip(f"no measured data ({error})")
     logs = [source.log for source in sources.runs]
     assert log_remarks(logs, sources.rig, card.signals) == ()
-    assert not [line for line in sources.remarks if "spike" in line]
+    spiked = [line for line in sources.remarks if "spike" in line]
+    # The seals' laser misses by up to half a millimetre once in a hundred samples.
+    assert bool(spiked) == (name == "pneumatic_seals")
 
 
 def test_a_model_file_is_not_changed_by_a_remark() -> None:

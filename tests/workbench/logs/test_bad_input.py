@@ -100,13 +100,21 @@ def test_row_of_another_length(tmp_path: Path, fields: int) -> None:
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf", ""])
-def test_runs_of_nan_or_infinite(tmp_path: Path, value: str) -> None:
+def test_runs_of_nan_or_infinite_are_cut_out_and_told(tmp_path: Path, value: str) -> None:
     path = with_columns(tmp_path)
     lines = path.read_text("utf-8").splitlines()
     for row in range(99, 120):
         lines[row] = f"{0.01 * (row - 1)},{value},1.0"
     path.write_text("\n".join(lines), "utf-8")
-    assert "signal 'y' is NaN or infinite for 21 rows from row 100" in refusal(path)
+    found = read_runs(path, card(tmp_path, CARD))
+    assert "a.csv: 'y' has missing samples at t = 0.98 s to 1.18 s (21 samples): cut out" in (
+        found.remarks
+    )
+    (bad,) = found.bad
+    assert (bad.signal, bad.kind, bad.samples, bad.done) == ("y", "missing", 21, "cut out")
+    for run in found.runs:
+        assert all(np.all(np.isfinite(x)) for x in run.signals.values())
+        assert not np.any((run["t"] > 0.975) & (run["t"] < 1.185))
 
 
 def test_absurd_values(tmp_path: Path) -> None:

@@ -109,7 +109,7 @@ def test_the_model_file_carries_its_own_logs_and_older_ones_keep_their_key(tmp_p
     assert read.own_logs == own
     assert model_in_force(read, "k").own_logs == own
     document = model_document(replace(model, own_logs=None))
-    del document["own_logs"]  # as before there were any
+    del document["own_logs"], document["bad_samples"]  # as before there were any
     path.write_text(dumps(document), encoding="utf-8")
     assert model_key(read_model(path)) == hashlib.sha256(dumps(document).encode()).hexdigest()
 

@@ -47,7 +47,8 @@ CONTRACT = {
     "next_experiment",
 }  # fmt: skip
 BESIDE = {
-    "complete", "left", "not_tried", "remarks", "parameters", "card", "log", "test_log", "versions",
+    "bad_samples", "complete", "left", "not_tried", "remarks", "parameters", "card", "log",
+    "test_log", "versions",
 }  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}

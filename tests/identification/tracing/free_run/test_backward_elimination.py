@@ -152,7 +152,7 @@ def test_what_sliding_calls_for_is_not_searched_without(
     model = replace(setting.plain, plant=plant(SPRING), misfit=1.0)
     searched: list[object] = []
 
-    def refined(tried: Plant, _setting: Setting, _rival: float) -> Refit:
+    def refined(tried: Plant, _setting: Setting) -> Refit:
         searched.append(tried)
         return Refit(tried, 5.0, (), {}, lambda: np.zeros((0, 0)))
 
