@@ -19,6 +19,10 @@ APART = 0.1  # of the residual, that a swing in time must explain beyond any sig
 # motion makes all that depends on place or speed swing as well
 FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length tells apart
 GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
+OF_MOTION = (
+    0.1  # of the motion, that goes at a rate (or with it as a harmonic) where the rate is its
+)
+HARMONICS = 3  # of a motion, in which what depends on it may swing
 SWINGS = 200  # rows; of fewer, the frequency that fits best does so by luck
 ROWS_IN_PERIOD = 4.0  # rows in a period
 
@@ -66,7 +70,8 @@ def dependence(
     rate = frequency(r, signals["t"]) if "t" in signals and len(r) >= SWINGS else 0.0
     if rate > 0.0:
         swing = swinging_share(r, signals["t"], rate, block)
-        if swing[0] > APART + max(share for share, _ in best.values()):
+        apart = swing[0] > APART + max(share for share, _ in best.values())
+        if apart and not _of_the_motion(signals, rate, block):
             best["t"] = swing
         else:
             rate = 0.0
@@ -81,6 +86,16 @@ def dependence(
             named.append(name)
     return Dependence(
         tuple(named[:MOST_SIGNALS]), best[order[0]][0], rate if named[0] == "t" else 0.0
+    )
+
+
+def _of_the_motion(signals: Mapping[str, Array], rate: float, block: IntArray) -> bool:
+    """Whether the motion itself goes at this rate [Hz], or at one of which it is a harmonic."""
+    t = signals["t"]
+    return any(
+        swinging_share(x - np.mean(x), t, rate / harmonic, block)[0] > OF_MOTION
+        for x in (signals[name] for name in ("y", "v") if name in signals)
+        for harmonic in range(1, HARMONICS + 1)
     )
 
 

@@ -79,6 +79,21 @@ def test_what_depends_on_a_periodic_place_is_no_vibration() -> None:
     assert found.swing == 0.0
 
 
+@pytest.mark.parametrize("harmonic", [1, 2, 3])
+def test_what_swings_with_the_reference_is_no_vibration(harmonic: int) -> None:
+    """A lag of a decimated log swings at the reference's rate, or at a harmonic of it."""
+    rng = np.random.default_rng(4)
+    t = np.sort(rng.uniform(0.0, 40.0, 2000))
+    rate = 1.3 / harmonic
+    y = np.sin(2 * np.pi * rate * t) + 0.2 * np.sin(2 * np.pi * 0.11 * t + 1.0)
+    v = np.cos(2 * np.pi * rate * t) + 0.02 * np.cos(2 * np.pi * 0.11 * t + 1.0)
+    r = np.sin(2 * np.pi * 1.3 * t + 0.8) + 0.3 * rng.standard_normal(len(t))
+    # No function of place and speed one by one follows it as well as the swing does.
+    other = {"t": t, "y": y + 0.5 * rng.standard_normal(len(t)), "v": v}
+    found = dependence(r, other, v > 0, np.arange(len(t)) * 64 // len(t) % 8)
+    assert found.swing == 0.0
+
+
 def test_few_rows_tell_no_swing() -> None:
     swings = 0
     for seed in range(200):  # the frequency that fits best is one of many
