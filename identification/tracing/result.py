@@ -61,7 +61,8 @@ class Dependence:
 @dataclass(frozen=True)
 class Left:
     """What the effects named leave: the share of the square that was missing on the test logs
-    beyond the sensors' noise, where it shows most, and the signals on which that depends."""
+    beyond the sensors' noise, of the first error that stood out of it (force, actuator, position),
+    and the signals on which that depends."""
 
     share: float
     depends_on: tuple[str, ...]

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.effects._library import Library
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -74,13 +74,15 @@ def trace(
     report("telling", 0.0)
     with halt.closing():
         seen = [plain.rows.recorded.record(log) for log in test]
-        return _told(chosen, found, judgement(chosen, found, seen, rig), halt.not_tried)
+        judged = judgement(chosen, found, seen, rig)
+        return _told(chosen, found, judged, seen, halt.not_tried)
 
 
 def _told(
-    chosen: Selection, found: Refinement, judged: Judgement, not_tried: tuple[str, ...]
-) -> Trace:
-    """All of it as the trace's result."""
+    chosen: Selection, found: Refinement, judged: Judgement, seen: Sequence[MotionLog],
+    not_tried: tuple[str, ...],
+) -> Trace:  # fmt: skip
+    """All of it as the trace's result; seen: the test logs."""
     rows, before = chosen.plain.rows, chosen.plain.model
     choice, after, logs = found.choice, found.model, list(rows.logs)
     return Trace(
@@ -92,7 +94,7 @@ def _told(
         noise_force=row_noise(choice.base, MECHANICAL) or 0.0,
         noise_actuator=row_noise(choice.base, ACTUATOR),
         effects=tuple(found_effect(s, after, choice) for s in choice.steps),
-        rivals=rivals_of(choice),
+        rivals=rivals_of(choice, seen),
         unknown=judged.left,
         drift=judged.drift,
         next_experiment=_next(judged, choice, not_tried),

@@ -8,8 +8,13 @@ from identification.arrays import Array
 from identification.estimation.estimates import of_effect
 from identification.estimation.imposed_motion import imposed_estimates
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.effect_rows import EffectRows, with_effect
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    MECHANICAL,
+    MotionLog,
+    stacked,
+)
 from identification.estimation.regression.row_fit import RowFit, rms
 from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
@@ -17,6 +22,7 @@ from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
 from identification.thresholds import HEADLINE, OTHER_LAW
 from identification.tracing.free_run.rivals import equal_rivals
+from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.cross_validation import left_out_residual
 from identification.tracing.regression.stepwise import Choice, Step, explained_part
@@ -99,10 +105,11 @@ def found_effect(step: Step, after: FittedStructure, choice: Choice) -> FoundEff
     return FoundEffect(effect, params, explained, step.p_value)
 
 
-def rivals_of(choice: Choice) -> tuple[EffectRival, ...]:
-    """Rivals of each effect in the order of what they gain."""
+def rivals_of(choice: Choice, seen: Sequence[MotionLog]) -> tuple[EffectRival, ...]:
+    """Rivals of each effect in the order of what they gain, with their errors on the test logs."""
     out = []
-    for step in choice.steps:
+    for i, step in enumerate(choice.steps):
+        stage = seen_by(step.stage, choice.steps[:i], seen) if seen else None
         equal = {c.effect.key for c in equal_rivals(step)}
         for c in step.rivals[:RIVALS_SHOWN]:
             key = c.effect.key
@@ -114,16 +121,28 @@ def rivals_of(choice: Choice) -> tuple[EffectRival, ...]:
                 if key in step.apart
                 else f"gains {100 * max(share, 0.0):.3g} % of what {step.candidate.effect.key} does"
             )
-            out.append(EffectRival(key, _left_out_rms(step, c), why))
+            out.append(EffectRival(key, _test_rms(step, c, stage), why))
     return tuple(out)
 
 
-def _left_out_rms(step: Step, rival: EffectCandidate) -> float | None:
-    """Force error of a rival [N] on stretches left out, over the rows that count for the best."""
+def _test_rms(step: Step, rival: EffectCandidate, seen: EffectRows | None) -> float | None:
+    """Force error [N] of a rival in an effect's place, over the rows that count for the effect.
+
+    seen: the test logs as the step found the others; None: of the stretches left out in turn.
+    """
     if MECHANICAL not in rival.outcomes:
         return None
     o = rival.outcomes[MECHANICAL]
-    return rms(left_out_residual(o.rows, step.candidate.outcomes.get(MECHANICAL, o).slowest)[0])
+    slowest = step.candidate.outcomes.get(MECHANICAL, o).slowest
+    if seen is None:
+        return rms(left_out_residual(o.rows, slowest)[0])
+    parts = [
+        with_effect(seen, MECHANICAL, rival.effect, rival.values, i, rows)
+        for i, rows in enumerate(seen.parts[MECHANICAL])
+    ]
+    rows = stacked(parts)
+    keep = rows.speed >= slowest
+    return rms((rows.b - rows.X @ o.fit.theta)[keep]) if np.any(keep) else None
 
 
 def next_experiment(verdict: TraceVerdict, choice: Choice, left: Dependence) -> str:

@@ -399,8 +399,8 @@ FLOOR = NoiseFloor(1.0, 1.0, None)  # of the sensors
 
 def test_shown_from() -> None:
     """An error on the test logs is spoken of where it stands out of the sensors' noise."""
-    assert share_left(errors(1.0, np.sqrt(1.04)), errors(1.0, np.sqrt(1.02)), FLOOR) == 0.0
-    left = share_left(errors(1.0, np.sqrt(1.62)), errors(1.0, np.sqrt(1.31)), FLOOR)
+    assert share_left(errors(1.0, np.sqrt(1.6)), errors(1.0, np.sqrt(1.3)), FLOOR) == 0.0
+    left = share_left(errors(1.0, np.sqrt(2.5)), errors(1.0, np.sqrt(1.75)), FLOOR)
     assert left == pytest.approx(0.5)
 
 

@@ -37,8 +37,12 @@ def test_the_share_left_is_that_of_the_test_logs() -> None:
     assert left == pytest.approx((1.0 - 0.25) / (4.0 - 0.25))
 
 
-def test_the_share_is_that_of_the_error_that_stood_out_most() -> None:
+def test_the_share_is_that_of_the_first_error_that_stood_out() -> None:
     """An effect of stops hardly shows in the equation of sliding."""
     before = {"test": Errors(1.2, None, 50e-6, None)}
     after = {"test": Errors(1.19, None, 5e-6, None)}
+    assert share_left(before, after, NoiseFloor(1.0, 5e-6, None)) == 0.0
+    # A stop lost by luck is not held against what explains the force.
+    before = {"test": Errors(9.0, None, 1e-3, None)}
+    after = {"test": Errors(1.0, None, 2e-3, None)}
     assert share_left(before, after, NoiseFloor(1.0, 5e-6, None)) == 0.0

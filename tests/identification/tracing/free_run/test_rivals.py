@@ -54,7 +54,7 @@ def test_the_run_has_a_say(
     monkeypatch.setattr(module, "fitted", leaving(misfit))
     told = told_apart(choice, after, setting)
     assert verdict_of(told, NOTHING, ()) == verdict
-    (rival,) = rivals_of(told)
+    (rival,) = rivals_of(told, ())
     assert ("leaves more in the run" in rival.why_not) == (verdict == "effect")
 
 
