@@ -47,6 +47,7 @@ DOES_NOTHING = 1.002  # the same, of the plant as it is
 SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noise
 IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
+# (the next three by what they mean; no bench has chosen them yet)
 SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
 HEADLINE = 0.5  # share left at most of what was missing there, by effects that are told first
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one

@@ -56,10 +56,8 @@ MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single sample
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
 # Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
 SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
-SHIFT_STEPS, FARTHEST_SHIFT = (
-    3,
-    20.0,
-)  # steps to the likeliest value in place of a bad one, and their longest
+SHIFT_STEPS = 3  # to the likeliest value in place of a bad one
+FARTHEST_SHIFT = 20.0  # times the drive's roughness, the longest of these steps
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
 BENT, KICK_FROM = (30, 90), 4.0  # samples a side, deviations by which lines through errors bend
 MOST_KICKS, KICK_GAINS = 6, 2.0  # tried; times the gain of a sample that stands out by itself

@@ -19,9 +19,7 @@ APART = 0.1  # of the residual, that a swing in time must explain beyond any sig
 # motion makes all that depends on place or speed swing as well
 FINER_FREQUENCIES = 4.0  # trial frequencies in each step that a log's length tells apart
 GRID_PLACES = 4  # of the even grid, on which rows are put, to a row
-OF_MOTION = (
-    0.1  # of the motion, that goes at a rate (or with it as a harmonic) where the rate is its
-)
+OF_MOTION = 0.1  # of the motion, that a swing at a rate explains where the rate is its own
 HARMONICS = 3  # of a motion, in which what depends on it may swing
 SWINGS = 200  # rows; of fewer, the frequency that fits best does so by luck
 ROWS_IN_PERIOD = 4.0  # rows in a period

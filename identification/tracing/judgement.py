@@ -83,12 +83,13 @@ def judgement(
         *doubts,
         *map(_not_its_law, of_other_law),
     )
-    whole = predicted(after, errors_after["test"], noise, seen or logs, rows.drive)
+    complete = verdict != "unknown" and predicted(
+        after, errors_after["test"], noise, seen or logs, rows.drive
+    )
     return Judgement(
         verdict, errors_before, errors_after,
         left if verdict == "unknown" else NOTHING, tuple(changed), said,
-        complete=whole and verdict != "unknown",
-        rest=Left(share, left.depends_on),
+        complete=complete, rest=Left(0.0 if complete else share, left.depends_on),
     )  # fmt: skip
 
 

@@ -478,11 +478,11 @@ def onward(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Refit:
 def _noise(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Array | None:
     """Errors (draws, n) over all logs, which the noise of every signal alone makes of a run."""
     parts = []
+    rng = np.random.default_rng(0)  # a quadrature: nothing random; every log has noise of its own
     for one in logs:
         found = freed(plant, one, drive, starts(one, drive))
         if found is None:
             return None
-        rng = np.random.default_rng(0)  # a quadrature: nothing random
         draws = [noise_errors(plant, one, drive, found, rng) for _ in range(NOISE_DRAWS)]
         if any(r is None for r in draws):
             return None
