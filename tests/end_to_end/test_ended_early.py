@@ -18,6 +18,7 @@ DRIVER = """
 import os, signal, sys
 from workbench.cli import main
 from workbench.course import Course
+signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored where tests run in background
 at, asked, usual = {at}, [0], Course.keep_going
 def keep_going(self):
     asked[0] += 1
