@@ -68,12 +68,14 @@ CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
 LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
 VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
 
-# What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py).
+# What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
+SURE_OF_SHARE = 5.0  # deviations from 0 of a motor's force between the samples of a slower log
+SHARE_GAINS = 0.05  # of the square that the equation leaves, what that force has to explain
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well
 

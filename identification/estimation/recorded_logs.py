@@ -11,10 +11,12 @@ from identification.estimation.regression.equation_rows import (
     Fitted,
     MotionLog,
     actuator,
+    mechanical,
     motion_log,
     solve_rows,
     stacked,
 )
+from identification.estimation.regression.held_force import between_samples, share_between, unseen
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
@@ -22,13 +24,17 @@ from identification.progress import Halt
 from identification.signals.check import check_driven
 from identification.thresholds import LINEAR_ACTUATOR
 
+NO_NOISE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # the five of a body of 1 kg without friction
+
 
 @dataclass(frozen=True, eq=False)
 class RecordedLogs:
     """Logs of one machine with their motion.
 
     drive: what drives their runs; imposed: a rig leads the body along a path; halt: whether
-    whatever is made of them is to go on.
+    whatever is made of them is to go on; share: of the step of a motor's force to the next sample,
+    by which the mean between them is another than the logged one: it is in these logs, and `given`
+    puts it into others.
     """
 
     logs: tuple[MotionLog, ...]
@@ -36,6 +42,7 @@ class RecordedLogs:
     drive: Drive
     imposed: bool = False
     halt: Halt = field(default_factory=Halt)
+    share: float = 0.0
 
     @property
     def held(self) -> bool:
@@ -54,27 +61,47 @@ class RecordedLogs:
 
     @property
     def plain(self) -> tuple[Log, ...]:
-        """The logs as they were given."""
+        """The logs without their motion."""
         return tuple(one.log for one in self.logs)
 
     def record(self, log: Log) -> MotionLog:
         """Another log of the machine with its motion."""
         one = motion_log(
             log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
-            imposed=self.imposed,
+            imposed=self.imposed, between=unseen(log, self.share),
         )  # fmt: skip
         return replace(one, halt=self.halt)
+
+    def given(self, log: Log) -> MotionLog:
+        """A log as it was read, with its motion."""
+        return self.record(between_samples(log, self.share))
 
     def of(self, logs: Sequence[Log]) -> "RecordedLogs":
         """These logs recorded in the same way."""
         return replace(self, logs=tuple(self.record(log) for log in logs))
 
 
+def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
+    """Logs, recorded as they were read, with a motor's force between their samples."""
+    if share == 0.0:
+        return recorded
+    means = [between_samples(one.log, share) for one in recorded.logs]
+    return replace(recorded, share=share).of(means)
+
+
+def plain_share(recorded: RecordedLogs) -> float:
+    """Share of the force's step to the next sample, as far as a motor without effects shows it."""
+    if not recorded.held or any(not len(one.sliding.start) for one in recorded.logs):
+        return 0.0
+    first = solve_rows(stacked([mechanical(one, NO_NOISE) for one in recorded.logs])).theta
+    return share_between(recorded.logs, stacked([mechanical(one, first) for one in recorded.logs]))
+
+
 def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
     """The logs with their motion; drive: by default the command where an actuator follows it.
 
-    Raises BadLog where a signal is missing, or the asked drive is not to be had, NotIdentifiable
-    where nothing moves.
+    A motor's force is that between the samples, where they show it. Raises BadLog where a signal is
+    missing, or the asked drive is not to be had, NotIdentifiable where nothing moves.
     """
     for log in logs:
         check_driven(log)
@@ -85,7 +112,7 @@ def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> 
                 f"{one.log.name}: no motion above the noise of the velocity"
                 f" ({one.v_noise:.3g} m/s); record a run that moves"
             )
-    return found
+    return with_share(found, plain_share(found))
 
 
 def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:

@@ -17,6 +17,7 @@ from identification.tracing.model_errors import (
     carries,
     errors_of,
     noise_floor,
+    on_test,
     predicted,
     share_left,
 )
@@ -65,8 +66,11 @@ def judgement(
     slowest = choice.base[MECHANICAL].slowest
     errors_before = errors_of(plain, slowest, (), logs, seen, rows.drive)
     errors_after = errors_of(after, slowest, choice.steps, logs, seen, rows.drive)
-    noise = noise_floor(choice.base, logs)
-    share = share_left(errors_before, errors_after, noise)
+    noise = noise_floor(choice.base)
+    unseen = seen or logs
+    was = on_test(plain, errors_before["test"], unseen, rows.drive)
+    now = was if after is plain else on_test(after, errors_after["test"], unseen, rows.drive)
+    share = share_left(was, now, noise)
     doubts = _doubts(found, errors_before, errors_after, share, chosen.pieces, bool(changed))
     of_other_law = other_law(choice, left, share)
     headline = bool(choice.steps) and not doubts and not of_other_law and is_headline(share)
@@ -83,9 +87,7 @@ def judgement(
         *doubts,
         *map(_not_its_law, of_other_law),
     )
-    complete = verdict != "unknown" and predicted(
-        after, errors_after["test"], noise, seen or logs, rows.drive
-    )
+    complete = verdict != "unknown" and predicted(now, noise)
     return Judgement(
         verdict, errors_before, errors_after,
         left if verdict == "unknown" else NOTHING, tuple(changed), said,

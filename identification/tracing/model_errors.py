@@ -68,43 +68,60 @@ def carries(before: Mapping[str, Errors], after: Mapping[str, Errors]) -> bool:
 
 @dataclass(frozen=True)
 class NoiseFloor:
-    """What the sensors alone leave: of the equation of motion [N], of the run's position [m], of
-    the actuator's equation [N/s], None where there is none."""
+    """What the sensors alone leave: of the equation of motion [N] and of the actuator's [N/s], None
+    where there is none."""
 
     force_rms: float
-    position_rms: float
     actuator_rms: float | None
 
 
-def noise_floor(base: Mapping[str, RowFit], logs: Sequence[MotionLog]) -> NoiseFloor:
-    """What the sensors of these logs alone leave."""
-    noise_y = float(np.mean([one.noise_y for one in logs]))
-    return NoiseFloor(row_noise(base, MECHANICAL) or 0.0, noise_y, row_noise(base, ACTUATOR))
+def noise_floor(base: Mapping[str, RowFit]) -> NoiseFloor:
+    """What the sensors of these rows' logs alone leave."""
+    return NoiseFloor(row_noise(base, MECHANICAL) or 0.0, row_noise(base, ACTUATOR))
 
 
-def share_left(
-    before: Mapping[str, Errors], after: Mapping[str, Errors], noise: NoiseFloor
-) -> float:
+@dataclass(frozen=True)
+class OnTest:
+    """What a model leaves of the test logs: its errors, and the misfit of its free run.
+
+    misfit: None where no run is judged; 1 where noise alone is left.
+    """
+
+    errors: Errors
+    misfit: float | None
+
+
+def on_test(
+    model: FittedStructure, errors: Errors, logs: Sequence[MotionLog], drive: Drive
+) -> OnTest:
+    """What a model of these errors leaves of the logs."""
+    return OnTest(errors, None if model.imposed else misfit(model.plant, logs, drive))
+
+
+def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
-    Of squares, beyond what the sensors alone leave; 0 where nothing stood out of that. The
-    equations come first: one stop that a run loses by luck is more than all the rest of it.
+    Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. The equations
+    come first: one stop that a run loses by luck is more than all the rest of it. Of the run it is
+    the misfit's, which knows how far the noise of force and command walks.
     """
-    for name in ("force_rms", "actuator_rms", "position_rms"):
-        own, left, least = (getattr(x, name) for x in (before["test"], after["test"], noise))
+    for name in ("force_rms", "actuator_rms"):
+        own, left, least = (getattr(x, name) for x in (before.errors, after.errors, noise))
         if own is None or left is None or not least:
             continue
         if (own / least) ** 2 > SHOWN_FROM:
             return float(max(left**2 - least**2, 0.0) / (own**2 - least**2))
-    return 0.0
+    if before.misfit is None or after.misfit is None or before.misfit <= SHOWN_FROM:
+        return 0.0
+    return max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
 
 
-def predicted(model: FittedStructure, errors: Errors, noise: NoiseFloor,
-    logs: Sequence[MotionLog], drive: Drive) -> bool:  # fmt: skip
-    """Whether a model is complete: its errors on these logs are hardly more than noise."""
-    if errors.force_rms is not None and errors.force_rms**2 > ADEQUATE * noise.force_rms**2:
+def predicted(left: OnTest, noise: NoiseFloor) -> bool:
+    """Whether a model is complete: what it leaves of the test logs is hardly more than noise."""
+    force = left.errors.force_rms
+    if force is not None and force**2 > ADEQUATE * noise.force_rms**2:
         return False
-    return model.imposed or misfit(model.plant, logs, drive) <= ADEQUATE
+    return left.misfit is None or left.misfit <= ADEQUATE
 
 
 def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:

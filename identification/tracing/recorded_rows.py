@@ -12,6 +12,8 @@ from identification.estimation.recorded_logs import (
     commanded,
     left_by_actuator,
     left_share,
+    plain_share,
+    with_share,
 )
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
 from identification.estimation.regression.inertia import speed_ratios
@@ -50,17 +52,20 @@ class RecordedRows:
 
 
 def recorded_rows(
-    train: Sequence[Log], rig: Rig, library: Library, halt: Halt | None = None
-) -> RecordedRows:
+    train: Sequence[Log], rig: Rig, library: Library, halt: Halt | None = None,
+    share: float | None = None,
+) -> RecordedRows:  # fmt: skip
     """The training logs as rows; raises NotIdentifiable where too little of the motion slides.
 
-    halt: asked before whatever is made of them.
+    halt: asked before whatever is made of them; share: of a motor's force between the samples, by
+    default what a motor without effects shows of it.
     """
     remarks: list[str] = []
     driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
     drive: Drive = "command" if driven else "force"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
     recorded, refused = _told(recorded)
+    recorded = with_share(recorded, plain_share(recorded) if share is None else share)
     return RecordedRows(recorded, refused, tuple(remarks))
 
 

@@ -21,7 +21,7 @@ from identification.thresholds import COMPLETE
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
-from identification.tracing.recorded_rows import recorded_rows
+from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
@@ -30,6 +30,7 @@ from identification.tracing.structure_search import (
     refinement,
     selection,
     settled_plain,
+    share_beside,
 )
 from identification.tracing.verdict import (
     found_effect,
@@ -59,23 +60,35 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
-    begin, settle, choose = rng.spawn(3)
+    begin, settle = rng.spawn(2)
     halt = Halt(keep_going)
     report("recording", 0.0)
     rows = recorded_rows(train, rig, library, halt)
-    report("refining", 0.0)
-    plain = plain_model(rows, library, begin)
-    report("tracing", 0.0)
-    chosen = selection(plain, rig, choose, report)
+    chosen = _chosen(rows, rig, library, begin, report)
+    share = share_beside(chosen)
+    if share != 0.0:
+        rows = recorded_rows(train, rig, library, halt, share)
+        chosen = _chosen(rows, rig, library, begin, report)
     report("refitting", 0.0)
     found = refinement(chosen, report)
     report("settling", 0.0)
     chosen, found = settled_plain(chosen, found, settle, report)
     report("telling", 0.0)
     with halt.closing():
-        seen = [plain.rows.recorded.record(log) for log in test]
+        seen = [rows.recorded.given(log) for log in test]
         judged = judgement(chosen, found, seen, rig)
         return _told(chosen, found, judged, seen, halt.not_tried)
+
+
+def _chosen(
+    rows: RecordedRows, rig: Rig, library: Library, rng: np.random.Generator, report: Progress
+) -> Selection:
+    """The plain model of the rows, and the effects that the equations call for beside it."""
+    begin, choose = rng.spawn(2)
+    report("refining", 0.0)
+    plain = plain_model(rows, library, begin)
+    report("tracing", 0.0)
+    return selection(plain, rig, choose, report)
 
 
 def _told(

@@ -38,6 +38,7 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     Rows,
 )
+from identification.estimation.regression.held_force import told_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
@@ -69,7 +70,7 @@ from identification.tracing.free_run.backward_elimination import (
 )
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
-from identification.tracing.model_errors import NoiseFloor, carries, share_left
+from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.recorded_rows import told_by_speed
 from identification.tracing.regression.candidates import EffectCandidate, shaped
@@ -394,13 +395,18 @@ def test_imposed_left() -> None:
     assert too_much(choice("spring", first=101.0, base=1.0 + 37.5), run(np.inf, imposed=True))
 
 
-FLOOR = NoiseFloor(1.0, 1.0, None)  # of the sensors
+FLOOR = NoiseFloor(1.0, None)  # of the sensors
+
+
+def left_of(force: float) -> OnTest:
+    """What a model leaves of the test logs' force [N], without a run."""
+    return OnTest(Errors(force, None, None, None), None)
 
 
 def test_shown_from() -> None:
     """An error on the test logs is spoken of where it stands out of the sensors' noise."""
-    assert share_left(errors(1.0, np.sqrt(1.6)), errors(1.0, np.sqrt(1.3)), FLOOR) == 0.0
-    left = share_left(errors(1.0, np.sqrt(2.5)), errors(1.0, np.sqrt(1.75)), FLOOR)
+    assert share_left(left_of(np.sqrt(1.6)), left_of(np.sqrt(1.3)), FLOOR) == 0.0
+    left = share_left(left_of(np.sqrt(2.5)), left_of(np.sqrt(1.75)), FLOOR)
     assert left == pytest.approx(0.5)
 
 
@@ -586,6 +592,18 @@ def test_sure_of_walk() -> None:
     """A force that walks off its command by less than chance does not walk."""
     assert not shows(16.0)
     assert shows(25.0)
+
+
+def test_sure_of_share() -> None:
+    """A share of a motor's force that is no more than chance is none."""
+    assert told_share(0.4, 0.1, 1.0) == 0.0
+    assert told_share(0.4, 0.064, 1.0) == 0.4
+
+
+def test_share_gains() -> None:
+    """Nor is one that explains next to nothing."""
+    assert told_share(0.3, 0.01, 0.04) == 0.0
+    assert told_share(0.3, 0.01, 0.0625) == 0.3
 
 
 def smooth(size: float, at: int, length: int) -> Array:

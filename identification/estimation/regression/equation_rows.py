@@ -50,6 +50,7 @@ OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
 CALM_SHARE = 0.9  # of the samples, those that tell the controller
 OF_WALK = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
+FEWEST_ROWS = 20  # from which what they leave tells of noise
 QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
 
 
@@ -62,7 +63,8 @@ class MotionLog:
     plant that walks more must not be forgiven for it. rotary: y is an angle [rad]. imposed: a rig
     leads the body along a path. walk: by how much a sample more may take the force away from what
     the command makes of it [N], one sigma (0: the command is exact, or there is none). halt:
-    asked before every run along the log.
+    asked before every run along the log. between: the part of noise_F that no log shows, of a
+    loop faster than the log [N].
     """
 
     log: Log
@@ -81,6 +83,7 @@ class MotionLog:
     reference: Karnopp | None = None
     walk: float = 0.0
     halt: Halt = field(default_factory=Halt)
+    between: float = 0.0
 
     @property
     def gain(self) -> float:
@@ -91,8 +94,9 @@ class MotionLog:
         """The same of another log of this machine."""
         by_command = self.whole is not None
         other = motion_log(
-            log, held=self.held, by_command=by_command, rotary=self.rotary, imposed=self.imposed
-        )
+            log, held=self.held, by_command=by_command, rotary=self.rotary, imposed=self.imposed,
+            between=self.between,
+        )  # fmt: skip
         return replace(other, halt=self.halt)
 
     @cached_property
@@ -157,10 +161,12 @@ def quiet_part(third: Array) -> float:
 
 
 def motion_log(
-    log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False
-) -> MotionLog:
+    log: Log, *, held: bool, by_command: bool, rotary: bool = False, imposed: bool = False,
+    between: float = 0.0,
+) -> MotionLog:  # fmt: skip
     """A log with its motion and windows. held: the force is a command held over each period;
-    imposed: by a rig; the motion is then smoothed until most of it is sure of its direction."""
+    imposed: by a rig; the motion is then smoothed until most of it is sure of its direction.
+    between [N]: noise of the force beside what the log shows of it."""
     h = log.h
     motion = differentiate(log["y"], h)
     d = _direction(motion)
@@ -192,12 +198,14 @@ def motion_log(
     # A position that stands for a fifth of its log to the last digit hides its noise there.
     noise_y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
     noise_y = max(noise_y, EXACT_SHARE * float(np.ptp(log["y"])))
-    noise_F = _beside_control(log) if held else local_noise(log["F"])
+    noise_F = float(np.hypot(_beside_control(log), between)) if held else local_noise(log["F"])
     beyond = kinks(np.asarray(log["F"]), noise_F)
     one = MotionLog(
         log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
-        rotary, imposed,
+        rotary, imposed, between=between,
     )  # fmt: skip
+    if held:
+        return replace(one, noise_F=min(noise_F, _left_of_force(one)))
     if not by_command:
         return one
     noise_F = min(noise_F, _unexplained(one))
@@ -259,6 +267,20 @@ def _beside_control(log: Log) -> float:
     noise = quiet_part(b - X @ theta)
     least = max(OF_FILTER * quiet_part(third["F"]), OF_FORCE * float(np.std(log["F"])))
     return noise if noise > least else 0.0
+
+
+def _left_of_force(one: MotionLog) -> float:
+    """Noise of a motor's force [N] that would leave as much of the equation of motion as is left.
+
+    No more than that is noise: what its controller makes of a noise that no signal shows was given
+    to the motor too, and is none.
+    """
+    rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+    if len(rows.b) < FEWEST_ROWS:
+        return np.inf
+    rest = rows.b - rows.X @ np.linalg.lstsq(rows.X, rows.b, rcond=1e-12)[0]
+    mean = weights(one.sliding.length, one.log.h)[0]
+    return float(np.sqrt(np.mean(rest**2) / noise_gain(mean)))
 
 
 def _unexplained(one: MotionLog) -> float:

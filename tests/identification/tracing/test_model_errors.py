@@ -2,7 +2,7 @@
 
 import pytest
 
-from identification.tracing.model_errors import NoiseFloor, carries, share_left
+from identification.tracing.model_errors import NoiseFloor, OnTest, carries, predicted, share_left
 from identification.tracing.result import Errors
 
 
@@ -26,23 +26,40 @@ def test_a_structure_carries_over_or_stands_in_for_another(
     assert carries(of(before, before), of(train, test)) is expected
 
 
+def left_of(
+    force: float | None, actuator: float | None = None, misfit: float | None = None
+) -> OnTest:
+    """What a model leaves of the test logs: of force [N] and actuator [N/s], and in its run."""
+    return OnTest(Errors(force, None, None, actuator), misfit)
+
+
 def test_without_a_force_error_nothing_is_held_against_it() -> None:
     assert carries(of(None, None), of(None, None))
-    assert share_left(of(None, None), of(None, None), NoiseFloor(0.1, 1.0, None)) == 0.0
+    assert share_left(left_of(None), left_of(None), NoiseFloor(0.1, None)) == 0.0
 
 
-def test_the_share_left_is_that_of_the_test_logs() -> None:
-    """Beyond what the sensors leave alone."""
-    left = share_left(of(1.0, 2.0), of(0.1, 1.0), NoiseFloor(0.5, 1.0, None))
+def test_the_share_left_is_beyond_what_the_sensors_leave_alone() -> None:
+    left = share_left(left_of(2.0), left_of(1.0), NoiseFloor(0.5, None))
     assert left == pytest.approx((1.0 - 0.25) / (4.0 - 0.25))
 
 
 def test_the_share_is_that_of_the_first_error_that_stood_out() -> None:
-    """An effect of stops hardly shows in the equation of sliding."""
-    before = {"test": Errors(1.2, None, 50e-6, None)}
-    after = {"test": Errors(1.19, None, 5e-6, None)}
-    assert share_left(before, after, NoiseFloor(1.0, 5e-6, None)) == 0.0
-    # A stop lost by luck is not held against what explains the force.
-    before = {"test": Errors(9.0, None, 1e-3, None)}
-    after = {"test": Errors(1.0, None, 2e-3, None)}
-    assert share_left(before, after, NoiseFloor(1.0, 5e-6, None)) == 0.0
+    """An effect of stops hardly shows in the equation of sliding, but in the run."""
+    noise = NoiseFloor(1.0, 10.0)
+    assert share_left(left_of(1.2, 11.0, 21.0), left_of(1.19, 11.0, 2.0), noise) == 0.05
+    assert share_left(left_of(1.2, 11.0, 21.0), left_of(1.19, 11.0, 0.9), noise) == 0.0
+    # A stop lost by luck is not held against what explains the force, or the actuator.
+    assert share_left(left_of(9.0, None, 21.0), left_of(1.0, None, 40.0), noise) == 0.0
+    assert share_left(left_of(1.2, 90.0, 21.0), left_of(1.2, 10.0, 40.0), noise) == 0.0
+    # Where no run is judged, the equations alone count.
+    assert share_left(left_of(1.2, 11.0), left_of(1.1, 10.0), noise) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("force", "misfit", "expected"),
+    [(1.1, 1.2, True), (None, 1.2, True), (1.1, None, True), (1.4, 1.2, False), (1.1, 1.7, False)],
+)
+def test_a_model_is_complete_that_leaves_hardly_more_than_noise(
+    force: float | None, misfit: float | None, expected: bool
+) -> None:
+    assert predicted(left_of(force, None, misfit), NoiseFloor(1.0, None)) is expected

@@ -1,0 +1,83 @@
+"""A motor's force between the samples of a log that is slower than the drive's loop."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array, BoolArray
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.regression.held_force import between_samples, unseen
+from identification.log import Log, Rig
+
+H, SECONDS = 2e-3, 40.0  # of a sample, of a log [s]
+M, F_C, F_V = 2.0, 5.0, 10.0
+RIG = Rig("motor", force_per_command=1.0)
+
+
+def driven(R: int, chatter: float = 0.0, ripple: float = 0.0) -> tuple[Log, Array]:
+    """A body under a loop of R periods a sample, and its mean force over every sample.
+
+    chatter [N]: of the loop, white from period to period; ripple [N]: a force along the stroke.
+    The acceleration is constant over a period, so the motion is exact.
+    """
+    n, tick = round(SECONDS / H), H / R
+    t = tick * np.arange(n * R)
+    a = sum(
+        size * w * np.cos(w * t + phase)
+        for size, w, phase in ((0.2, 4.0, 0.3), (0.1, 11.0, 1.0), (0.06, 29.0, 2.0))
+    )
+    a = a + chatter / M * np.random.default_rng(R).standard_normal(len(t))
+    v = np.concatenate([[0.0], tick * np.cumsum(a - np.mean(a))])
+    y = np.concatenate([[0.0], np.cumsum(tick * (v[:-1] + 0.5 * np.diff(v)))])
+    middle = 0.5 * (v[1:] + v[:-1])
+    F = M * np.diff(v) / tick + F_C * np.sign(middle) + F_V * middle
+    F += ripple * np.sin(400.0 * y[:-1])
+    shown = y[:-1:R] + 3e-7 * np.random.default_rng(1).standard_normal(n)
+    signals = {"t": H * np.arange(n), "y": shown, "u": F[::R], "F": F[::R]}
+    return Log("driven", signals), F.reshape(n, R).mean(axis=1)
+
+
+def smooth(log: Log) -> BoolArray:
+    """Samples (n,) without a reversal near, at which friction jumps."""
+    turns = np.diff(np.sign(np.gradient(log["y"])), append=0.0) != 0
+    return ~np.convolve(turns, np.ones(9), "same").astype(bool)
+
+
+@pytest.mark.parametrize(("R", "share"), [(1, 0.0), (2, 0.25), (4, 0.375), (16, 0.46875)])
+def test_the_share_is_that_of_the_loops_periods_in_a_sample(R: int, share: float) -> None:
+    recorded = recorded_logs([driven(R)[0]], RIG)
+    assert recorded.share == pytest.approx(share, abs=0.03)
+
+
+@pytest.mark.parametrize("R", [2, 8])
+def test_the_logs_have_the_mean_force_until_the_next_sample(R: int) -> None:
+    log, mean = driven(R)
+    found = recorded_logs([log], RIG)
+    slides = smooth(log)
+    was = np.std((log["F"] - mean)[slides])
+    now = np.std((found.logs[0].log["F"] - mean)[slides])
+    assert now < 0.1 * was
+    # A log that is read later is taken in the same way, and no log is changed.
+    again = found.given(log)
+    assert np.array_equal(again.log["F"], found.logs[0].log["F"])
+    assert again.noise_F == found.logs[0].noise_F
+    assert log["F"][0] != again.log["F"][0]
+
+
+@pytest.mark.parametrize("R", [2, 4, 16])
+def test_what_the_loop_adds_between_the_samples_is_noise(R: int) -> None:
+    share = (R - 1) / (2 * R)
+    log, mean = driven(R, chatter=0.5)
+    means = between_samples(log, share)
+    true = float(np.std((means["F"] - mean)[smooth(log)]))
+    assert unseen(means, share) == pytest.approx(true, rel=0.15)
+    assert unseen(log, 0.0) == 0.0
+
+
+def test_where_an_effect_is_missing_the_commands_rate_is_no_share() -> None:
+    assert recorded_logs([driven(2, ripple=3.0)[0]], RIG).share == 0.0
+
+
+def test_a_measured_force_is_that_of_its_sample() -> None:
+    found = recorded_logs([driven(4)[0]], Rig("force"), "force")
+    assert found.share == 0.0
+    assert found.logs[0].between == 0.0
