@@ -71,7 +71,8 @@ def fit_plant(
     recorded = recorded_logs(logs, rig, drive)
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
-        return _with_effects(prior, recorded, settle, report)
+        fit = _with_effects(prior, recorded, settle, report)
+        return replace(fit, remarks=(*recorded.remarks, *fit.remarks))
     near, given = None, recorded
     set_aside = SetAside((), tuple(range(len(logs))))
     if prior is not None:
@@ -102,7 +103,8 @@ class SetAside:
         return SetAside((*self.bad, *made.bad), tuple(self.owner[i] for i in made.owner))
 
     def told(self, fit: KarnoppFit, given: RecordedLogs) -> KarnoppFit:
-        """The fit of all pieces as one of the given logs, that says what was set aside."""
+        """The fit of all pieces as one of the given logs, that says what became of them."""
+        fit = replace(fit, remarks=(*given.remarks, *fit.remarks))
         if not self.bad:
             return fit
         logs = []

@@ -16,15 +16,16 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
-from identification.estimation.regression.held_force import between_samples, share_between, unseen
+from identification.estimation.regression.held_command import between_samples, share_between, unseen
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt
 from identification.signals.check import check_driven
+from identification.signals.thin import at_needed_rate
 from identification.thresholds import LINEAR_ACTUATOR
 
-NO_NOISE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # the five of a body of 1 kg without friction
+NO_NOISE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # of a body of 1 kg without friction, k1 alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +33,9 @@ class RecordedLogs:
     """Logs of one machine with their motion.
 
     drive: what drives their runs; imposed: a rig leads the body along a path; halt: whether
-    whatever is made of them is to go on; share: of the step of a motor's force to the next sample,
-    by which the mean between them is another than the logged one: it is in these logs, and `given`
-    puts it into others.
+    whatever is made of them is to go on; share: of the step of the command to the next sample, by
+    which its mean between them is another than the logged one: it is in these logs, and `given`
+    puts it into others. remarks: what became of logs whose clock is faster than their motion.
     """
 
     logs: tuple[MotionLog, ...]
@@ -43,6 +44,7 @@ class RecordedLogs:
     imposed: bool = False
     halt: Halt = field(default_factory=Halt)
     share: float = 0.0
+    remarks: tuple[str, ...] = ()
 
     @property
     def held(self) -> bool:
@@ -68,44 +70,76 @@ class RecordedLogs:
         """Another log of the machine with its motion."""
         one = motion_log(
             log, held=self.held, by_command=self.by_command, rotary=self.rig.motion == "rotary",
-            imposed=self.imposed, between=unseen(log, self.share),
+            imposed=self.imposed, between=unseen(log, self.share) if self.held else 0.0,
         )  # fmt: skip
         return replace(one, halt=self.halt)
 
     def given(self, log: Log) -> MotionLog:
         """A log as it was read, with its motion."""
-        return self.record(between_samples(log, self.share))
+        (slower,) = needed([log], self.rig)
+        return self.record(between_samples(slower, self.share, self.held))
 
     def of(self, logs: Sequence[Log]) -> "RecordedLogs":
         """These logs recorded in the same way."""
         return replace(self, logs=tuple(self.record(log) for log in logs))
 
 
+def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
+    """The logs at the rates that their motion needs.
+
+    What a command does between its samples is in no mean: the stops and breakaways that it makes
+    there are others (true parameters on logs of `benchmarks/drives.py` at 2 and 4 kHz). So logs
+    with a command stay as they are.
+    """
+    if rig.kind == "motor" or commanded(logs):
+        return list(logs)
+    return [at_needed_rate(log) for log in logs]
+
+
+def slower_remarks(logs: Sequence[Log], slower: Sequence[Log]) -> tuple[str, ...]:
+    """A line on each log that was brought to a slower clock."""
+    return tuple(
+        f"{log.name}: of its samples every {log.h:.4g} s a mean was taken every {less.h:.4g} s:"
+        " nothing but noise lies between"
+        for log, less in zip(logs, slower, strict=True)
+        if less is not log
+    )
+
+
 def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
-    """Logs, recorded as they were read, with a motor's force between their samples."""
+    """Logs, recorded as they were read, with the command between their samples."""
     if share == 0.0:
         return recorded
-    means = [between_samples(one.log, share) for one in recorded.logs]
+    means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
     return replace(recorded, share=share).of(means)
 
 
 def plain_share(recorded: RecordedLogs) -> float:
-    """Share of the force's step to the next sample, as far as a motor without effects shows it."""
-    if not recorded.held or any(not len(one.sliding.start) for one in recorded.logs):
+    """Share of the command's step to the next sample, as a machine without effects shows it."""
+    if recorded.held:
+        if any(not len(one.sliding.start) for one in recorded.logs):
+            return 0.0
+        first = solve_rows(stacked([mechanical(one, NO_NOISE) for one in recorded.logs])).theta
+        rows = [mechanical(one, first) for one in recorded.logs]
+    elif recorded.by_command:
+        first = solve_rows(stacked([actuator(one, NO_NOISE[:3]) for one in recorded.logs])).theta
+        rows = [actuator(one, first) for one in recorded.logs]
+    else:
         return 0.0
-    first = solve_rows(stacked([mechanical(one, NO_NOISE) for one in recorded.logs])).theta
-    return share_between(recorded.logs, stacked([mechanical(one, first) for one in recorded.logs]))
+    return share_between(recorded.logs, stacked(rows))
 
 
 def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
     """The logs with their motion; drive: by default the command where an actuator follows it.
 
-    A motor's force is that between the samples, where they show it. Raises BadLog where a signal is
+    A command is its mean until the next sample, where they show it. Raises BadLog where a signal is
     missing, or the asked drive is not to be had, NotIdentifiable where nothing moves.
     """
     for log in logs:
         check_driven(log)
-    found = RecordedLogs((), rig, chosen_drive(logs, rig, drive)).of(logs)
+    slower = needed(logs, rig)
+    said = slower_remarks(logs, slower)
+    found = RecordedLogs((), rig, chosen_drive(slower, rig, drive), remarks=said).of(slower)
     for one in found.logs:
         if not np.any(one.signals["d"]):
             raise NotIdentifiable(

@@ -15,7 +15,9 @@ from scipy.stats import chi2
 from identification.arrays import Array
 from identification.thresholds import SURE_OF_WALK
 
-FILTER_GAINS = np.geomspace(1e-4, 0.97, 60)  # of the filter, that are tried beside 0
+# Of the filter, that are tried beside 0: beyond 1 where a step of the walk shows in two samples, as
+# where the command is taken between its samples.
+FILTER_GAINS = (np.geomspace(1e-4, 0.97, 60), np.linspace(1.03, 1.9, 15))
 LAGS = 12  # over which what is left is to be white
 CHANCE = 1e-4  # chance below which it is not
 COUNTED = 3000  # values as which a log counts: with more, a correlation of no account would show
@@ -36,14 +38,16 @@ def force_walk(F: Array, y: Array, impulse: Array, h: float, apart: float) -> fl
         return 0.0
     X = np.column_stack([impulse[::step], y[::step], np.arange(n) / n, np.ones(n)])
     X = X / np.maximum(np.linalg.norm(X, axis=0), 1e-300)
-    found = [_filtered(x, X, gain) for gain in (0.0, *FILTER_GAINS)]
-    costs = [n * np.log(float(np.mean(r**2))) for r in found]
-    best = int(np.argmin(costs))
-    if best == 0 or not shows(costs[0] - costs[best]) or not _white(found[best]):
-        return 0.0
-    # Of innovations of variance S the walk has g^2 S in each step.
-    gain = float(FILTER_GAINS[best - 1])
-    return gain * float(np.sqrt(np.mean(found[best] ** 2) / step))
+    plain = n * np.log(float(np.mean(_filtered(x, X, 0.0) ** 2)))
+    best: tuple[float, float] | None = None  # cost, and step of the walk
+    for gains in FILTER_GAINS:
+        found = [_filtered(x, X, float(gain)) for gain in gains]
+        costs = [n * np.log(float(np.mean(r**2))) for r in found]
+        i = int(np.argmin(costs))
+        if (best is None or costs[i] < best[0]) and shows(plain - costs[i]) and _white(found[i]):
+            # Of innovations of variance S the walk has g^2 S in each step.
+            best = costs[i], float(gains[i]) * float(np.sqrt(np.mean(found[i] ** 2)))
+    return 0.0 if best is None else best[1] / float(np.sqrt(step))
 
 
 def shows(gained: float) -> bool:

@@ -12,7 +12,9 @@ from identification.estimation.recorded_logs import (
     commanded,
     left_by_actuator,
     left_share,
+    needed,
     plain_share,
+    slower_remarks,
     with_share,
 )
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
@@ -60,7 +62,9 @@ def recorded_rows(
     halt: asked before whatever is made of them; share: of a motor's force between the samples, by
     default what a motor without effects shows of it.
     """
-    remarks: list[str] = []
+    slower = needed(train, rig)
+    remarks = list(slower_remarks(train, slower))
+    train = slower
     driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
     drive: Drive = "command" if driven else "force"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)

@@ -22,6 +22,7 @@ from identification.estimation.windowed_run.refinement import PERIOD_REACH, soft
 from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
 from identification.model.estimates import Drive
+from identification.signals.sampling import samples
 from identification.thresholds import (
     ASTRAY,
     COMPLETE,
@@ -296,7 +297,7 @@ def in_run(
         r = left_in_run(after.plant, one, drive, freed(after.plant, one, drive, begun))
         if r is None:
             return Dependence((), 0.0)
-        at = np.arange(0, len(one.log), THINNED)
+        at = np.arange(0, len(one.log), max(THINNED, samples(THINNED, one.log.h)))
         s = one.signals
         own = {k: v[at] for k, v in s.items() if k not in NOT_SIGNALS}
         own["t"] = s["t"][at] - s["t"][0]

@@ -6,7 +6,7 @@ import numpy as np
 
 from identification.estimation.fit import finished
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
-from identification.estimation.regression.held_force import share_between
+from identification.estimation.regression.held_command import share_between
 from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
 from identification.estimation.windowed_run.refinement import misfit
@@ -70,14 +70,17 @@ def selection(plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Pro
 
 
 def share_beside(chosen: Selection) -> float:
-    """Share of a motor's force between the samples, that shows first beside the effects chosen.
+    """Share of the command's step to the next sample, that shows first beside the effects chosen.
 
-    0 where the logs have it already, where no effect was chosen, and without a motor.
+    0 where the logs have it already, where no effect was chosen, and without a command.
     """
-    recorded, base = chosen.plain.rows.recorded, chosen.choice.base[MECHANICAL]
-    if not recorded.held or recorded.share != 0.0 or not chosen.choice.steps:
+    recorded, base = chosen.plain.rows.recorded, chosen.choice.base
+    of = MECHANICAL if recorded.held else ACTUATOR
+    if recorded.share != 0.0 or recorded.imposed or not chosen.choice.steps or of not in base:
         return 0.0
-    return share_between(recorded.logs, base.rows, base.slowest)
+    if not (recorded.held or recorded.by_command):
+        return 0.0
+    return share_between(recorded.logs, base[of].rows, base[of].slowest)
 
 
 def refinement(chosen: Selection, report: Progress) -> Refinement:

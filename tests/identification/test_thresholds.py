@@ -38,7 +38,7 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     Rows,
 )
-from identification.estimation.regression.held_force import told_share
+from identification.estimation.regression.held_command import told_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
@@ -595,15 +595,15 @@ def test_sure_of_walk() -> None:
 
 
 def test_sure_of_share() -> None:
-    """A share of a motor's force that is no more than chance is none."""
+    """A share of the command's step that is no more than chance is none."""
     assert told_share(0.4, 0.1, 1.0) == 0.0
     assert told_share(0.4, 0.064, 1.0) == 0.4
 
 
 def test_share_gains() -> None:
     """Nor is one that explains next to nothing."""
-    assert told_share(0.3, 0.01, 0.04) == 0.0
-    assert told_share(0.3, 0.01, 0.0625) == 0.3
+    assert told_share(0.3, 0.01, 0.008) == 0.0
+    assert told_share(0.3, 0.01, 0.0125) == 0.3
 
 
 def smooth(size: float, at: int, length: int) -> Array:

@@ -21,6 +21,7 @@ from identification.progress import Halt
 from identification.signals.differentiate import Motion, differentiate, resolution
 from identification.signals.force_walk import corrected_share, force_walk
 from identification.signals.intersample import kinks
+from identification.signals.noise import local_noise, quiet_part
 from identification.signals.weak_form import (
     WeakWindows,
     all_windows,
@@ -51,7 +52,6 @@ CALM_SHARE = 0.9  # of the samples, those that tell the controller
 OF_WALK = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
 FEWEST_ROWS = 20  # from which what they leave tells of noise
-QUIET = 0.2  # share of a log in which its force is taken to be free of fast content
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,26 +138,6 @@ class Fitted:
     theta: Array
     residual: Array
     cost: float
-
-
-def local_noise(x: Array) -> float:
-    """White noise of a signal (one sigma) from the quiet part of it; a fast input does not count.
-
-    Third differences in short stretches: motion and input raise most of them, noise is in all.
-    """
-    return quiet_part(np.diff(np.asarray(x, dtype=np.float64), 3))
-
-
-def quiet_part(third: Array) -> float:
-    """White noise (one sigma) of a signal from its third differences, by their quiet stretches."""
-    d3 = third / np.sqrt(20.0)
-    size = 25
-    count = len(d3) // size
-    if count < 4:
-        return float(np.sqrt(np.mean(d3**2)))
-    power = np.sort(np.mean(d3[: count * size].reshape(count, size) ** 2, axis=1))
-    # The mean of the lowest fifth of chi-squares with about 9 independent values.
-    return float(np.sqrt(np.mean(power[: max(1, int(QUIET * count))]) / 0.45))
 
 
 def motion_log(

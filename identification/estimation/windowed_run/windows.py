@@ -30,6 +30,7 @@ COARSE = 5e-4  # s, sub-step of a bristle: errs by a hundredth of the noise wher
 LEAST_REST = 24  # samples of 2 ms (as the next two: `sampling.samples`)
 CREEPS_FROM = 3.0  # deviations of the velocity from which a body creeps
 WIDEST_CREEP = 50  # samples on either side by which a creep is seen
+ON_ONE_COUNT = 0.3  # of the position's noise, that its samples scatter by where noise is white
 AROUND = 8  # samples of a rest whose mean is the position
 WHOLE = np.inf  # seconds of a window that is the whole log
 NOISE_RUNS = 6  # runs by which the walk of a measured force's noise is seen
@@ -75,11 +76,15 @@ def starts(
     index = np.array(at, dtype=np.int64)
     rest = np.isin(index, rests)
     around = samples(AROUND, h)
-    level = np.array([float(np.mean(y[max(k - around // 2, 0) : k + around // 2 + 1])) for k in at])
+    near = [y[max(k - around // 2, 0) : k + around // 2 + 1] for k in at]
+    level = np.array([float(np.mean(x)) for x in near])
+    # A body at rest on one count of its encoder is anywhere within it, however long.
+    counted = np.array([float(np.std(x)) < ON_ONE_COUNT * one.noise_y for x in near])
+    level_sd = np.where(counted, one.noise_y, one.noise_y / np.sqrt(around))
     sd_F = 0.0 if one.held or drive == "force" else one.noise_F
     sd = np.array(
         [
-            np.where(rest, one.noise_y / np.sqrt(around), one.noise_y),
+            np.where(rest, level_sd, one.noise_y),
             np.where(rest, 0.0, one.v_noise),
             np.full(len(at), sd_F),
         ]

@@ -1,11 +1,13 @@
 """Long logs: what a slower clock keeps, which part is taken, and that others are left alone."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from identification.log import Log
 from identification.signals import thin
-from identification.signals.thin import thinned
+from identification.signals.thin import at_needed_rate, thinned
 
 
 def oscillation(n: int, h: float) -> Log:
@@ -48,7 +50,7 @@ def test_means_take_out_noise(small: None) -> None:
     noise = 1e-3 * np.random.default_rng(0).standard_normal(len(log))
     found, _ = thinned(log.with_signals(y=log["y"] + noise))
     left = found["y"] - np.sin(2 * np.pi * 3.0 * found["t"])
-    assert np.std(left) == pytest.approx(1e-3 / np.sqrt(3), rel=0.05)
+    assert np.std(left) == pytest.approx(1e-3 / np.sqrt(9), rel=0.1)
 
 
 def test_of_a_slow_log_the_liveliest_part_is_taken(small: None) -> None:
@@ -58,3 +60,51 @@ def test_of_a_slow_log_the_liveliest_part_is_taken(small: None) -> None:
     assert len(found) == 10_000 and found.h == pytest.approx(2e-3)
     assert found["t"][0] >= 60.9 and found["t"][-1] <= 83.1
     assert f"from t = {found['t'][0]:.6g} s were used, where the body moves most" in remarks[0]
+
+
+def sensed(h: float, noise: float, jitter: float = 0.0, ring: float = 0.0) -> Log:
+    """20 s of a body to and fro under a held command, behind sensors of position and force.
+
+    jitter: of the clock, as a share of a sample; ring [m]: at 330 Hz.
+    """
+    rng = np.random.default_rng(4)
+    t = h * np.arange(round(20.0 / h), dtype=np.float64)
+    at = t + jitter * h * rng.standard_normal(len(t))
+    w = 2 * np.pi * 3.0
+    y = 0.02 * np.sin(w * at) + ring * np.sin(2 * np.pi * 330.0 * t)
+    F = 40.0 * np.cos(w * t)
+    signals = {"t": t, "y": y + noise * rng.standard_normal(len(t))}
+    signals["F"] = F + 0.1 * rng.standard_normal(len(t))
+    signals["u"] = np.floor(5.0 * np.cos(w * t))
+    return Log("fast", signals)
+
+
+@pytest.mark.parametrize(("h", "slow"), [(1e-4, 1e-3), (2.5e-4, 1e-3), (5e-4, 1e-3)])
+@pytest.mark.parametrize("jitter", [0.0, 0.05])
+def test_a_log_is_taken_as_slowly_as_its_motion_allows(
+    h: float, slow: float, jitter: float
+) -> None:
+    log = sensed(h, 2e-6, jitter)
+    found = at_needed_rate(log)
+    step = round(slow / h)
+    assert found.h == pytest.approx(slow)
+    w = 2 * np.pi * 3.0
+    left = found["y"] - 0.02 * np.sin(w * found["t"])
+    own = log["y"] - 0.02 * np.sin(w * log["t"])
+    assert np.std(left) < 1.15 * np.std(own) / np.sqrt(step)
+    assert abs(np.mean(left * found["y"])) < 3 * np.std(left) * 0.02 / np.sqrt(len(left))
+    # What moved the body until the next sample is what the command was over it.
+    at = np.searchsorted(log["t"], found["t"][10:14] - 0.5 * h)
+    for i, (low, high) in enumerate(pairwise(at)):
+        assert found["u"][10 + i] == pytest.approx(np.mean(log["u"][low:high]))
+
+
+def test_what_a_slower_clock_would_lose_is_kept() -> None:
+    """A usual rate as it is; of a ringing as much as shows it."""
+    usual = sensed(1e-3, 2e-6)
+    assert at_needed_rate(usual) is usual
+    assert at_needed_rate(sensed(5e-4, 1e-6, ring=1e-5)).h == pytest.approx(1e-3)
+    fast = sensed(1e-4, 1e-6, ring=1e-5)
+    assert at_needed_rate(fast).h < 0.5 / 330.0
+    short = Log("short", {key: x[:3000] for key, x in sensed(5e-4, 2e-6).signals.items()})
+    assert len(at_needed_rate(short)) >= 400

@@ -1,11 +1,11 @@
-"""A motor's force between the samples of a log that is slower than the drive's loop."""
+"""A command between the samples of a log that is slower than the drive's loop."""
 
 import numpy as np
 import pytest
 
 from identification.arrays import Array, BoolArray
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.regression.held_force import between_samples, unseen
+from identification.estimation.regression.held_command import between_samples, unseen
 from identification.log import Log, Rig
 
 H, SECONDS = 2e-3, 40.0  # of a sample, of a log [s]
@@ -67,7 +67,7 @@ def test_the_logs_have_the_mean_force_until_the_next_sample(R: int) -> None:
 def test_what_the_loop_adds_between_the_samples_is_noise(R: int) -> None:
     share = (R - 1) / (2 * R)
     log, mean = driven(R, chatter=0.5)
-    means = between_samples(log, share)
+    means = between_samples(log, share, held=True)
     true = float(np.std((means["F"] - mean)[smooth(log)]))
     assert unseen(means, share) == pytest.approx(true, rel=0.15)
     assert unseen(log, 0.0) == 0.0
@@ -81,3 +81,39 @@ def test_a_measured_force_is_that_of_its_sample() -> None:
     found = recorded_logs([driven(4)[0]], Rig("force"), "force")
     assert found.share == 0.0
     assert found.logs[0].between == 0.0
+
+
+def behind_valve(R: int, chatter: float = 0.0) -> Log:
+    """A cylinder whose force follows a command of R periods a sample, that steps between them."""
+    n, tick = round(SECONDS / H), H / R
+    t = tick * np.arange(n * R)
+    u = sum(np.sin(w * t + w) for w in (3.0, 8.0, 21.0))
+    u = u + chatter * np.random.default_rng(R).standard_normal(len(t))
+    y = 0.05 * np.sin(2.0 * t)
+    F = 900.0 * tick * np.concatenate([[0.0], np.cumsum(u)[:-1]]) - 4000.0 * (y - y[0])
+    rng = np.random.default_rng(2)
+    signals = {"t": t[::R], "u": u[::R], "F": F[::R] + 0.05 * rng.standard_normal(n)}
+    signals["y"] = y[::R] + 1e-6 * rng.standard_normal(n)
+    return Log("behind valve", signals)
+
+
+CYLINDER = Rig("electro-pneumatic", area_p=1e-3, area_n=1e-3, supply_pressure=6e5)
+
+
+@pytest.mark.parametrize(("R", "share"), [(1, 0.0), (2, 0.25), (8, 0.4375)])
+@pytest.mark.parametrize("chatter", [0.0, 0.05])
+def test_the_share_shows_behind_an_actuator_too(R: int, share: float, chatter: float) -> None:
+    log = behind_valve(R, chatter)
+    found = recorded_logs([log], CYLINDER, "command")
+    assert found.share == pytest.approx(share, abs=0.03)
+    assert np.array_equal(found.logs[0].log["F"], log["F"])  # that is measured
+
+
+@pytest.mark.parametrize("R", [1, 2, 8])
+def test_what_the_loop_adds_between_the_samples_walks(R: int) -> None:
+    """One sample of the command has been logged, and so many more were not."""
+    log = behind_valve(R, chatter=0.05)
+    found = recorded_logs([log], CYLINDER, "command").logs[0]
+    tick = H / R
+    unlogged = 900.0 * tick * 0.05 * np.sqrt((R - 1) + (R - 1) ** 2)
+    assert found.walk == pytest.approx(unlogged, rel=0.35, abs=2e-4)

@@ -1,0 +1,109 @@
+"""A command between the samples of a log that is slower than the drive's loop.
+
+What such a log has is the command of one period of the loop; until its next sample the machine was
+given the mean of several. Where the command changes smoothly that mean is the logged one and a
+share of the step to the next, (R - 1) / (2 R) for R periods a sample. The share is a coefficient in
+the equation of motion of a motor, whose force the command is, and in that of an actuator. What the
+loop adds from period to period (its encoder's counts) no log shows: it is noise of a motor's force.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.estimation.regression.equation_rows import MotionLog, Rows
+from identification.log import Log
+from identification.thresholds import SHARE_GAINS, SURE_OF_SHARE
+
+LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
+FAR_FASTER = 50.0  # periods a sample, as which any more count
+SURE_BEYOND = 2.0  # deviations by which a share may lie beyond the largest
+BLOCK = 25  # samples
+
+
+def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -> float:
+    """Share of the step to the next sample, by which what the machine was given is another command
+    than the logged.
+
+    rows: of the equation of motion of a motor, else of the actuator's, over all logs; slowest
+    [m/s]: of those that count. 0 where none shows beside what the rows leave: where an effect is
+    missing the command's rate may stand in for it, and that is no share.
+    """
+    by_motor = logs[0].held
+    rate = np.concatenate([_rate_column(one) for one in logs])
+    keep = rows.speed >= slowest
+    blocks = rows.block[keep]
+    X = (np.column_stack([rows.X, rate]) / rows.sd[:, np.newaxis])[keep]
+    b = (rows.b / rows.sd)[keep]
+    if len(b) < 4 * X.shape[1]:
+        return 0.0
+    theta, left = _least_squares(X, b)
+    without = _least_squares(X[:, :-1], b)[1]
+    if without <= 0.0:
+        return 0.0
+
+    def share_of(theta: Array) -> float:
+        # A motor's force stands on the left; an actuator's command is in the first column.
+        return float(-theta[-1] if by_motor else theta[-1] / (theta[0] or np.inf))
+
+    each = np.unique(blocks)
+    apart = np.array([share_of(_least_squares(X[blocks != k], b[blocks != k])[0]) for k in each])
+    n = len(each)
+    sd = float(np.sqrt((n - 1) / n * np.sum((apart - np.mean(apart)) ** 2)))
+    return told_share(share_of(theta), sd, 1.0 - left / without)
+
+
+def _rate_column(one: MotionLog) -> Array:
+    """What a whole step to the next sample would add to the rows of a log, (r,)."""
+    if one.held:
+        return np.asarray(one.sliding.held @ _steps(one.log["F"]))
+    assert one.whole is not None
+    return np.asarray(one.whole.first @ (one.log.h * one.log["u"]))
+
+
+def told_share(share: float, sd: float, gain: float) -> float:
+    """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
+    if share < SURE_OF_SHARE * sd or gain < SHARE_GAINS:
+        return 0.0
+    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + SURE_BEYOND * sd else 0.0
+
+
+def between_samples(log: Log, share: float, held: bool) -> Log:
+    """The log with the mean command until the next sample in place of the logged one.
+
+    held: a motor's, so that its force is that mean too.
+    """
+    if share == 0.0:
+        return log
+    keys = ("u", "F") if held else ("u",)
+    means = {key: log[key] + share * _steps(log[key]) for key in keys if key in log}
+    return log.with_signals(**means)
+
+
+def unseen(log: Log, share: float) -> float:
+    """Noise of a motor's force [N] that its loop adds between the samples of a log of means.
+
+    A white part of every period's force is in the mean of R of them, of which the log has had one.
+    """
+    if share == 0.0:
+        return 0.0
+    means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), [1.0 - share, share])
+    third = np.diff(np.asarray(log["F"]), 3)
+    count = len(third) // BLOCK
+    power = np.mean(third[: count * BLOCK].reshape(count, BLOCK) ** 2, axis=1)
+    white = float(np.median(power)) / float(means @ means)
+    R = min(1.0 / max(1.0 - 2.0 * share, 1e-9), FAR_FASTER)
+    return float(np.sqrt(white * ((R - 1.0) / R**2 + 2.0 * share**2)))
+
+
+def _steps(x: Array) -> Array:
+    """Step from each sample to the next, (n,)."""
+    return np.append(np.diff(np.asarray(x, dtype=np.float64)), 0.0)
+
+
+def _least_squares(X: Array, b: Array) -> tuple[Array, float]:
+    """Coefficients (k,) of b (r,) by X (r, k), and the square left."""
+    size = np.maximum(np.linalg.norm(X, axis=0), 1e-300)
+    theta = np.linalg.lstsq(X / size, b, rcond=1e-12)[0] / size
+    return theta, float(np.sum((b - X @ theta) ** 2))
