@@ -48,6 +48,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.signals.clock_jitter import jitters
 from identification.signals.force_walk import shows
 from identification.signals.frozen import frozen
 from identification.signals.steps import (
@@ -592,6 +593,12 @@ def test_sure_of_walk() -> None:
     """A force that walks off its command by less than chance does not walk."""
     assert not shows(16.0)
     assert shows(25.0)
+
+
+def test_jitter_from() -> None:
+    """A clock's jitter counts where it makes the position noisier than its sensor."""
+    assert not jitters(0.4)
+    assert jitters(0.625)
 
 
 def test_sure_of_share() -> None:

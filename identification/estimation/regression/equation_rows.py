@@ -18,6 +18,7 @@ from identification.errors import BadLog
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.progress import Halt
+from identification.signals.clock_jitter import position_noise
 from identification.signals.differentiate import Motion, differentiate, resolution
 from identification.signals.force_walk import corrected_share, force_walk
 from identification.signals.intersample import kinks
@@ -64,7 +65,7 @@ class MotionLog:
     leads the body along a path. walk: by how much a sample more may take the force away from what
     the command makes of it [N], one sigma (0: the command is exact, or there is none). halt:
     asked before every run along the log. between: the part of noise_F that no log shows, of a
-    loop faster than the log [N].
+    loop faster than the log [N]; jitter: of the instants of the samples [s], one sigma.
     """
 
     log: Log
@@ -84,6 +85,7 @@ class MotionLog:
     walk: float = 0.0
     halt: Halt = field(default_factory=Halt)
     between: float = 0.0
+    jitter: float = 0.0
 
     @property
     def gain(self) -> float:
@@ -98,6 +100,12 @@ class MotionLog:
             between=self.between,
         )  # fmt: skip
         return replace(other, halt=self.halt)
+
+    @cached_property
+    def position_sd(self) -> Array:
+        """Noise of every sample of the position [m], (n,): noise_y, and more in motion under a
+        jittering clock."""
+        return np.hypot(self.noise_y, self.jitter * self.signals["v"])
 
     @cached_property
     def in_motion(self) -> tuple[BoolArray, Mapping[str, Array]]:
@@ -177,12 +185,14 @@ def motion_log(
     quiet = max(local_noise(log["y"]), resolution(log["y"]) / np.sqrt(12.0))
     # A position that stands for a fifth of its log to the last digit hides its noise there.
     noise_y = min(motion.noise, quiet) if quiet > 0.0 else motion.noise
+    unsteady = position_noise(log["y"], motion.v)
+    noise_y = noise_y if unsteady is None else unsteady.at_rest
     noise_y = max(noise_y, EXACT_SHARE * float(np.ptp(log["y"])))
     noise_F = float(np.hypot(_beside_control(log), between)) if held else local_noise(log["F"])
     beyond = kinks(np.asarray(log["F"]), noise_F)
     one = MotionLog(
         log, signals, sliding, up, slowest, whole, noise_y, noise_F, held, motion.v_noise, beyond,
-        rotary, imposed, between=between,
+        rotary, imposed, between=between, jitter=0.0 if unsteady is None else unsteady.jitter,
     )  # fmt: skip
     if held:
         return replace(one, noise_F=min(noise_F, _left_of_force(one)))
@@ -220,7 +230,7 @@ def shortened(one: MotionLog, seconds: float, begin: int | None = None) -> Motio
     begin = min(max(begin, 0), len(one.log) - n)
     cut = Log(one.log.name, {key: x[begin : begin + n] for key, x in one.log.signals.items()})
     part = replace(one.again(cut), noise_y=one.noise_y, noise_F=one.noise_F, walk=one.walk)
-    return replace(part, reference=one.reference)
+    return replace(part, reference=one.reference, jitter=one.jitter)
 
 
 def _beside_control(log: Log) -> float:
@@ -288,7 +298,7 @@ def mechanical(one: MotionLog, theta: Array, y: Array | None = None, k1: float =
     mean, first, second, *_ = weights(w.length, one.log.h)
     spread = [
         one.noise_F**2 * noise_gain(mean)
-        + one.noise_y**2 * noise_gain(theta[0] * second + viscous * first)
+        + one.position_sd[w.middle] ** 2 * noise_gain(theta[0] * second + viscous * first)
         for viscous in (theta[3], theta[4])
     ]
     # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
@@ -308,12 +318,12 @@ def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | No
     reached = integral(one.log["u"], one.log.h) if u is None else u
     X = np.column_stack([w.first @ reached, -(w.first @ y), np.ones(len(w.start))])
     _, first, *_ = weights(w.length, one.log.h)
-    white = one.noise_F**2 + (theta[1] * one.noise_y) ** 2
+    white = one.noise_F**2 + (theta[1] * one.position_sd[w.middle]) ** 2
     walked = one.walk**2 * noise_gain(np.cumsum(first))
-    sd = float(np.sqrt(white * noise_gain(first) + walked))
+    sd = np.sqrt(white * noise_gain(first) + walked)
     r = len(w.start)
     return Rows(
-        w.first @ one.log["F"], X, np.full(r, sd), _blocks(w, len(one.log)), np.full(r, np.inf),
+        w.first @ one.log["F"], X, sd, _blocks(w, len(one.log)), np.full(r, np.inf),
         ("k1", "k2", "offset"),
     )  # fmt: skip
 
@@ -327,11 +337,12 @@ def column_noise(one: MotionLog, equation: str) -> Array:
     w = one.sliding if equation == MECHANICAL else one.whole
     assert w is not None
     _, first, second, *_ = weights(w.length, one.log.h)
+    square = one.position_sd[w.middle] ** 2
     none = np.zeros(len(w.start))
-    slow = none + one.noise_y**2 * noise_gain(first)
+    slow = square * noise_gain(first)
     if equation == ACTUATOR:
         return np.column_stack([none, slow, none])
-    fast = none + one.noise_y**2 * noise_gain(second)
+    fast = square * noise_gain(second)
     return np.column_stack([fast, none, none, slow * one.up, slow * ~one.up])
 
 

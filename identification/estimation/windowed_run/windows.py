@@ -84,7 +84,7 @@ def starts(
     sd_F = 0.0 if one.held or drive == "force" else one.noise_F
     sd = np.array(
         [
-            np.where(rest, level_sd, one.noise_y),
+            np.where(rest, level_sd, one.position_sd[index]),
             np.where(rest, 0.0, one.v_noise),
             np.full(len(at), sd_F),
         ]
@@ -279,18 +279,25 @@ def _sureness(
 ) -> Array:
     """Weights (k, n) of the errors: a run by a measured force walks with the force's noise.
 
-    By a few runs with as much noise once more (of fixed seeds: a quadrature, nothing random).
+    By a few runs with as much noise once more (of fixed seeds: a quadrature, nothing random). And
+    what a jittering clock shows of it is unsure in fast motion.
     """
-    if not walks(one, drive):
-        return np.ones(r.shape)
     square = np.zeros(r.shape)
-    square[0] = _walk(plant, one, drive, begun, base)
+    if walks(one, drive):
+        square[0] = _least_walk(plant, one, drive, begun, base)
+    square[0] += (one.jitter * one.signals["v"] / one.noise_y) ** 2
+    return np.asarray(1.0 / np.sqrt(1.0 + square))
+
+
+def _least_walk(plant: Plant, one: MotionLog, drive: Drive, begun: Starts, base: FreeRun) -> Array:
+    """As `_walk`, of the plant or of the reference, if that walks less."""
+    square = _walk(plant, one, drive, begun, base)
     if one.reference is not None:
         plain = Plant(one.reference, plant.actuator)
         run = window_run(plain, one, drive, begun)
         if run is not None:
-            square[0] = np.minimum(square[0], _walk(plain, one, drive, begun, run))
-    return np.asarray(1.0 / np.sqrt(1.0 + square))
+            square = np.minimum(square, _walk(plain, one, drive, begun, run))
+    return square
 
 
 def walks(one: MotionLog, drive: Drive) -> bool:
@@ -337,7 +344,7 @@ def noise_errors(
     run = window_run(plant, one, drive, found.begun, shift, noisy)
     if base is None or run is None:
         return None
-    y = one.log["y"] + one.noise_y * rng.standard_normal(len(one.log))
+    y = one.log["y"] + one.position_sd * rng.standard_normal(len(one.log))
     seen = replace(one, log=one.log.with_signals(y=y, F=noisy["F"]))
     return found(window_errors(run, seen, drive) - window_errors(base, one, drive))
 

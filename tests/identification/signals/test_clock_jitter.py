@@ -1,0 +1,52 @@
+"""The clock's jitter, told from a position whose noise grows with speed."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.arrays import Array
+from identification.signals.clock_jitter import position_noise
+
+NOISE = 2e-7  # m
+
+
+def swinging(h: float, jitter: float, seed: int, count: float = 0.0) -> tuple[Array, Array]:
+    """A position that swings at three rates, behind a sensor on a clock that jitters [s]."""
+    rng = np.random.default_rng(seed)
+    t = h * np.arange(20_000)
+    at = t + jitter * rng.standard_normal(len(t))
+    waves = ((0.05, 3.0), (0.02, 8.0), (0.01, 17.0))
+    y = sum(size * np.sin(w * at + w) for size, w in waves)
+    v = sum(size * w * np.cos(w * t + w) for size, w in waves)
+    y = y + NOISE * rng.standard_normal(len(t))
+    return (count * np.round(y / count) if count else y), np.asarray(v)
+
+
+@settings(max_examples=20, deadline=None)
+@given(
+    jitter=st.floats(3e-6, 1e-4), h=st.sampled_from([5e-4, 1e-3, 2e-3]), seed=st.integers(0, 999)
+)
+def test_the_jitter_is_found(jitter: float, h: float, seed: int) -> None:
+    found = position_noise(*swinging(h, jitter, seed))
+    assert found is not None
+    assert found.jitter == pytest.approx(jitter, rel=0.2)
+    assert found.at_rest < 0.1 * jitter + 2.0 * NOISE
+
+
+@pytest.mark.parametrize("count", [0.0, 2e-6, 2e-5])
+@pytest.mark.parametrize("h", [5e-4, 2e-3])
+def test_an_even_clock_has_none(h: float, count: float) -> None:
+    """Nor do an encoder's counts look like one, which slow motion seldom changes."""
+    for seed in range(5):
+        assert position_noise(*swinging(h, 0.0, seed, count)) is None
+
+
+def test_beside_coarse_counts_a_slight_jitter_is_of_no_account() -> None:
+    assert position_noise(*swinging(1e-3, 1e-6, 0, count=2e-5)) is None
+
+
+def test_a_short_log_and_one_without_noise_tell_none() -> None:
+    y, v = swinging(1e-3, 1e-4, 0)
+    assert position_noise(y[:500], v[:500]) is None
+    assert position_noise(np.zeros(20_000), np.zeros(20_000)) is None
