@@ -96,6 +96,16 @@ def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
     return [at_needed_rate(log) for log in logs]
 
 
+def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
+    """A line on each log whose clock jitters so that it shows."""
+    return tuple(
+        f"{one.log.name}: its clock jitters by {1e6 * one.jitter:.2g} us, so in motion the position"
+        " is unsure by that times its speed"
+        for one in logs
+        if one.jitter > 0.0
+    )
+
+
 def slower_remarks(logs: Sequence[Log], slower: Sequence[Log]) -> tuple[str, ...]:
     """A line on each log that was brought to a slower clock."""
     return tuple(
@@ -111,7 +121,11 @@ def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
     if share == 0.0:
         return recorded
     means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
-    return replace(recorded, share=share).of(means)
+    said = (
+        f"the command changes between the samples of {recorded.name}, as of a loop that is faster:"
+        f" taken as its mean until the next sample ({share:.2g} of the step to it)"
+    )
+    return replace(recorded, share=share, remarks=(*recorded.remarks, said)).of(means)
 
 
 def plain_share(recorded: RecordedLogs) -> float:
@@ -146,6 +160,7 @@ def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> 
                 f"{one.log.name}: no motion above the noise of the velocity"
                 f" ({one.v_noise:.3g} m/s); record a run that moves"
             )
+    found = replace(found, remarks=(*found.remarks, *clock_remarks(found.logs)))
     return with_share(found, plain_share(found))
 
 

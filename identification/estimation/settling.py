@@ -53,7 +53,7 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, Plant
+from identification.model.plant import Actuator, Plant, units_of
 from identification.progress import Progress
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
@@ -332,12 +332,25 @@ def _remarks(spread: Spread, recorded: RecordedLogs) -> Sequence[str]:
     out = []
     if not spread.adequate:
         out.append(
-            f"the model leaves {np.sqrt(spread.chi_square):.3g} times the sensors' noise:"
-            " an effect is missing, or the structure is wrong; intervals are widened for it"
+            f"{_off(spread, recorded)}: an effect is missing, or the structure is wrong; run"
+            " 'workbench trace' to find it; intervals are widened for it"
         )
     if recorded.drive == "force":
         out.append("driven by the measured force, in windows of 2 s from measured states")
     return out
+
+
+def _off(spread: Spread, recorded: RecordedLogs) -> str:
+    """By how much the model is off, in the units of the machine."""
+    factor, unit = (1.0, "rad") if recorded.rig.motion == "rotary" else (1e3, "mm")
+    force = units_of(recorded.rig.motion)["F_cp"]
+    y = [one.position_rms for one in spread.logs]
+    F = [one.force_rms for one in spread.logs if one.force_rms is not None]
+    said = f"the run is off by {factor * max(y):.3g} {unit} rms in position"
+    said += f" (sensor's noise {factor * spread.noise[0]:.2g} {unit})"
+    if F:
+        said += f" and {max(F):.3g} {force} in force (noise {spread.noise[1]:.2g} {force})"
+    return said
 
 
 def structure_estimates(

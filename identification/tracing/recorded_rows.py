@@ -9,6 +9,7 @@ from identification.effects._library import Library
 from identification.errors import NotIdentifiable
 from identification.estimation.recorded_logs import (
     RecordedLogs,
+    clock_remarks,
     commanded,
     left_by_actuator,
     left_share,
@@ -62,15 +63,17 @@ def recorded_rows(
     halt: asked before whatever is made of them; share: of a motor's force between the samples, by
     default what a motor without effects shows of it.
     """
+    remarks: list[str] = []
     slower = needed(train, rig)
-    remarks = list(slower_remarks(train, slower))
+    said = slower_remarks(train, slower)
     train = slower
     driven = rig.kind == "motor" or _by_command(train, rig, library, remarks)
     drive: Drive = "command" if driven else "force"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
     recorded, refused = _told(recorded)
+    recorded = replace(recorded, remarks=(*said, *clock_remarks(recorded.logs)))
     recorded = with_share(recorded, plain_share(recorded) if share is None else share)
-    return RecordedRows(recorded, refused, tuple(remarks))
+    return RecordedRows(recorded, refused, (*recorded.remarks, *remarks))
 
 
 def imposed_rows(rows: RecordedRows) -> RecordedRows:

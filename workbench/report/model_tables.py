@@ -81,7 +81,10 @@ def summary(model: Model) -> str:
         text += f" The logs do not tell {', '.join(model.assumed)}."
     if model.fit.adequate:
         return text + " The model leaves nothing but sensor noise."
-    return text + " The model leaves more than sensor noise: see the remarks."
+    return text + (
+        " The model leaves more than sensor noise: run 'workbench trace' to find what it lacks, and"
+        " see the remarks."
+    )
 
 
 def fit_lines(model: Model) -> list[str]:

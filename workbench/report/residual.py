@@ -67,5 +67,5 @@ def _caption(model: Model) -> str:
         return f"What is left is {how:.2f} times the sensors' noise: nothing is missing."
     return (
         f"What is left is {how:.3g} times the sensors' noise: the machine has an effect that the"
-        " model has not, or another structure."
+        " model has not, or another structure. The command workbench trace tells which."
     )
