@@ -131,22 +131,23 @@ def _of_log(
     if run is None or misfit > NEARLY_FOLLOWED:
         return log, found
     r = states(window_errors(run, one, drive))
-    y, off = _without_spikes(r[0], log["y"] / one.noise_y)
+    unsure = one.position_sd / one.noise_y
+    y, off = _without_spikes(r[0], log["y"] / one.noise_y, unsure)
     found += _told(log, "y", "spike", off, np.abs(r[0] - y) * one.noise_y)
     seen = log["y"] + (r[0] - y) * one.noise_y
-    jumped = _jumps(y, begun)
+    jumped = _jumps(y / unsure, begun)
     for k in jumped.tolist():
         size = -jump_size(y, k, _side(k, begun, len(y))) * one.noise_y
         seen_size = [jump_size(log["y"], k, side) for side in LINE_SIDES]
-        unsure = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise_y
-        if np.min(np.abs(seen_size - np.asarray(size))) > unsure:
+        apart = JUMP_SHOWN * abs(size) + JUMP_UNSURE * one.noise_y
+        if np.min(np.abs(seen_size - np.asarray(size))) > apart:
             continue
         seen = np.concatenate([seen[: k + 1], seen[k + 1 :] - size])
         t = float(log["t"][k + 1])
         found.append(BadSamples(log.name, "y", "jump", t, t, 1, abs(size), "offset removed"))
     log = log.with_signals(y=seen)
     if len(r) > 1:
-        F, off = _without_spikes(r[1], log["F"] / one.noise_F)
+        F, off = _without_spikes(r[1], log["F"] / one.noise_F, np.ones(len(log)))
         found += _told(log, "F", "spike", off, np.abs(r[1] - F) * one.noise_F)
         log = log.with_signals(F=log["F"] + (r[1] - F) * one.noise_F)
     return log, found
@@ -157,11 +158,12 @@ def _spread(r: Array) -> float:
     return max(float(np.median(np.abs(np.diff(r)))) / 0.954, LEAST_SPREAD)
 
 
-def _without_spikes(r: Array, seen: Array) -> tuple[Array, BoolArray]:
+def _without_spikes(r: Array, seen: Array, unsure: Array) -> tuple[Array, BoolArray]:
     """Errors (n,) of a run with the single ones put on the level around them, and where.
 
-    seen (n,): the signal in the same unit, which has to show the spike too: where it does not, the
-    run has stopped or set off a sample too late.
+    unsure (n,): how much noisier than at rest every sample is; seen (n,): the signal in the same
+    unit, which has to show the spike too: where it does not, the run has stopped or set off a
+    sample too late.
     """
     level = np.asarray(median_filter(r, MEDIAN_OVER, mode="nearest"))
     shown = np.zeros(len(r))
@@ -169,7 +171,7 @@ def _without_spikes(r: Array, seen: Array) -> tuple[Array, BoolArray]:
         height = deviations(seen, length)[0]
         for i in range(length):
             shown[i:] = np.maximum(shown[i:], height[: len(r) - i])
-    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r)
+    off = np.abs(r - level) > RUN_SPIKE_FROM * _spread(r / unsure) * unsure
     off &= shown > SIGNAL_SHOWN * np.abs(r - level)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], off.astype(np.int8), [0]))))
     for a, b in zip(edges[0::2].tolist(), edges[1::2].tolist(), strict=True):

@@ -14,6 +14,7 @@ WIDE_STEP = 1e-4  # of a parameter, by which the Jacobian is taken far from the 
 # Near it: what tells the scale common to masses and forces is a small difference of large columns.
 FINE_STEP = 1e-7
 DAMPING_TRIES = 6  # of the damping in one step
+ALIKE = 0.5  # of a derivative, by which those to either side may differ
 LAST_STEP = 1e-5  # share of the cost below which a step is the last
 LITTLE = 1e-3  # the same, where more than noise is left
 
@@ -38,7 +39,7 @@ class Minimum:
         stretches are independent, and what they pull x about by tells its deviation (Liang, Zeger,
         Biometrika 73 (1986) 13).
         """
-        J = jacobian(self.fun, self.x, None, FINE_STEP)
+        J = smooth_jacobian(self.fun, self.x)
         inverse = np.asarray(np.linalg.pinv(J.T @ J), dtype=np.float64)
         if cluster is None:
             return np.asarray(inverse * self.mean)
@@ -54,7 +55,7 @@ class Minimum:
 
     def covariance_by(self, noise: Array) -> Array:
         """Of x, (k, k), where draws of the first n residuals' noise are known: noise (draws, n)."""
-        J = jacobian(self.fun, self.x, None, FINE_STEP)
+        J = smooth_jacobian(self.fun, self.x)
         inverse = np.linalg.pinv(J.T @ J)
         moved = noise @ J[: noise.shape[1]] @ inverse
         return np.asarray(moved.T @ moved / len(noise), dtype=np.float64)
@@ -126,3 +127,18 @@ def jacobian(
 
     with ThreadPoolExecutor(2) as pool:
         return np.column_stack(list(pool.map(column, range(len(x)))))
+
+
+def smooth_jacobian(fun: Callable[[Array], Array], x: Array) -> Array:
+    """Derivatives of `fun` (n, k) at x where it is smooth.
+
+    A run that loses a stop within the step jumps: over the step that would be a derivative beyond
+    all others, and a parameter surer than it is. It does so to one side; the run goes on smoothly
+    to the other.
+    """
+    here = fun(x)
+    down, up = (-jacobian(lambda at: fun(2.0 * x - at), x, here, FINE_STEP),
+                jacobian(fun, x, here, FINE_STEP))  # fmt: skip
+    alike = np.abs(up - down) <= ALIKE * np.maximum(np.abs(up), np.abs(down))
+    least = np.where(np.abs(up) <= np.abs(down), up, down)
+    return np.where(alike, 0.5 * (up + down), least)

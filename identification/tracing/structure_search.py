@@ -74,13 +74,13 @@ def share_beside(chosen: Selection) -> float:
 
     0 where the logs have it already, where no effect was chosen, and without a command.
     """
-    recorded, base = chosen.plain.rows.recorded, chosen.choice.base
+    recorded, base, logs = chosen.plain.rows.recorded, chosen.choice.base, chosen.choice.end.logs
     of = MECHANICAL if recorded.held else ACTUATOR
     if recorded.share != 0.0 or recorded.imposed or not chosen.choice.steps or of not in base:
         return 0.0
     if not (recorded.held or recorded.by_command):
         return 0.0
-    return share_between(recorded.logs, base[of].rows, base[of].slowest)
+    return share_between(logs, base[of].rows, base[of].slowest)
 
 
 def refinement(chosen: Selection, report: Progress) -> Refinement:

@@ -1,0 +1,41 @@
+"""Deviations of a minimum: those of the smooth run, whatever jumps near it."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.estimation.gauss_newton import FINE_STEP, Minimum, jacobian, smooth_jacobian
+
+RNG = np.random.default_rng(0)
+X = RNG.standard_normal((400, 3))
+AT = np.array([1.0, 2.0, 3.0])
+
+
+def smooth(x: Array) -> Array:
+    """Residuals that bend a little with each parameter."""
+    return np.asarray(X @ (x - AT) + 0.1 * X**2 @ (x - AT) ** 2)
+
+
+def jumping(x: Array) -> Array:
+    """The same of a run that loses a stop as soon as the first parameter grows at all."""
+    lost = np.zeros(400)
+    lost[100:160] = 5.0 * (x[0] > AT[0] + 1e-9)
+    return smooth(x) + lost
+
+
+def test_a_stop_lost_within_the_step_is_no_derivative() -> None:
+    assert np.max(np.abs(jacobian(jumping, AT, None, FINE_STEP))) > 1e6
+    for fun in (smooth, jumping):
+        np.testing.assert_allclose(smooth_jacobian(fun, AT), X, atol=1e-6)
+
+
+@pytest.mark.parametrize("fun", [smooth, jumping])
+def test_the_covariance_is_that_of_noise(fun: Callable[[Array], Array]) -> None:
+    noise = RNG.standard_normal((4000, 400))
+    expected = np.linalg.inv(X.T @ X)
+    found = Minimum(fun, AT, 1.0)
+    np.testing.assert_allclose(found.covariance(), expected, rtol=1e-4, atol=1e-8)
+    spread = np.sqrt(np.diag(found.covariance_by(noise)))
+    np.testing.assert_allclose(spread, np.sqrt(np.diag(expected)), rtol=0.1)
