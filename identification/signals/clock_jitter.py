@@ -13,10 +13,13 @@ from identification.arrays import Array
 from identification.signals.differentiate import resolution
 from identification.thresholds import JITTER_FROM
 
-ORDER, GAIN = 5, 252.0  # of the differences, and the square that they make of white noise of 1
-STRETCH, BINS = 25, 8  # samples whose noise is one value, and groups of these by speed
-FAST = 2  # groups from the fastest, whose speed tells whether the jitter matters
-ROUNDS = 4  # in which the weights of the line settle
+DIFFERENCES, OF_WHITE = (
+    5,
+    252.0,
+)  # of the differences, and the square that they make of white noise of 1
+STRETCH, GROUPS = 25, 8  # samples whose noise is one value, and groups of these by speed
+QUICK_GROUP = 2  # groups from the fastest, whose speed tells whether the jitter matters
+WEIGHINGS = 4  # in which the weights of the line settle
 LEAST_OF_SQUARE = 0.05  # of a group's square, as which the line counts there at least
 
 
@@ -30,28 +33,28 @@ class PositionNoise(NamedTuple):
 def position_noise(y: Array, v: Array) -> PositionNoise | None:
     """Noise of a position y (n,) [m] at speeds v (n,) [m/s]; None where no jitter shows."""
     y = np.asarray(y, dtype=np.float64)
-    fifth = np.diff(y, ORDER)
+    fifth = np.diff(y, DIFFERENCES)
     count = len(fifth) // STRETCH
-    if count < 4 * BINS:
+    if count < 4 * GROUPS:
         return None
-    whole = slice(ORDER // 2, ORDER // 2 + count * STRETCH)
-    power = np.mean(fifth[: count * STRETCH].reshape(count, STRETCH) ** 2, axis=1) / GAIN
+    whole = slice(DIFFERENCES // 2, DIFFERENCES // 2 + count * STRETCH)
+    power = np.mean(fifth[: count * STRETCH].reshape(count, STRETCH) ** 2, axis=1) / OF_WHITE
     speed = np.mean(np.asarray(v)[whole].reshape(count, STRETCH) ** 2, axis=1)
-    groups = np.array_split(np.argsort(speed), BINS)
+    groups = np.array_split(np.argsort(speed), GROUPS)
     x = np.array([np.mean(speed[one]) for one in groups])
     # An encoder's counts are as coarse in slow motion, where they seldom change.
     z = np.maximum([np.median(power[one]) for one in groups], resolution(y) ** 2 / 12.0)
     if not np.all(z > 0.0):
         return None
-    X, line = np.column_stack([np.ones(BINS), x / max(float(x[-1]), 1e-300)]), z
-    for _ in range(ROUNDS):
+    X, line = np.column_stack([np.ones(GROUPS), x / max(float(x[-1]), 1e-300)]), z
+    for _ in range(WEIGHINGS):
         weight = 1.0 / np.maximum(line, LEAST_OF_SQUARE * z)
         rest, slope = np.linalg.lstsq(X * weight[:, np.newaxis], z * weight, rcond=None)[0]
         line = X @ np.array([rest, slope])
     rest = max(float(rest), LEAST_OF_SQUARE * float(z[0]))
     jitter = float(np.sqrt(max(slope, 0.0) / max(float(x[-1]), 1e-300)))
     found = PositionNoise(float(np.sqrt(rest)), jitter)
-    return found if jitters(jitter * float(np.sqrt(x[-FAST])) / found.at_rest) else None
+    return found if jitters(jitter * float(np.sqrt(x[-QUICK_GROUP])) / found.at_rest) else None
 
 
 def jitters(ratio: float) -> bool:

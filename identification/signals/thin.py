@@ -34,7 +34,7 @@ LEAST_TAKEN = 400
 MORE_THAN_NOISE = 1.1
 """Square in units of the noise's, from which more than noise lies between the samples taken."""
 
-HELD = "u"
+ON_HOLD = "u"
 
 
 class Thinned(NamedTuple):
@@ -124,7 +124,7 @@ def _slower(log: Log, step: int) -> Log:
     for key, x in log.signals.items():
         if key == "t" or np.all((x == x.min()) | (x == x.max())):
             signals[key] = x[at]
-        elif key == HELD:
+        elif key == ON_HOLD:
             whole = np.concatenate([[0.0], np.cumsum(x - x[0])])
             signals[key] = x[0] + (whole[at + step] - whole[at]) / step
         else:

@@ -38,8 +38,12 @@ def test_data_card_says_source_licence_and_bytes(name: str) -> None:
     assert card.about.citation
     assert all(entry.url and entry.sha256 for entry in card.files)
     assert len({entry.sha256 for entry in card.files}) == len(card.files)
-    split = [file for group in card.split.values() for file in group]
-    assert sorted(split) == sorted(entry.name for entry in card.files)
+    split = {file for group in card.split.values() for file in group}
+    assert split == {entry.name for entry in card.files}
+    for group, files in card.split.items():
+        assert len(set(files)) == len(files)
+        other = group.replace("train_for", "test_at")  # a seal is held out at either pressure
+        assert other == group or not set(files) & set(card.split[other])
     assert card.split["train"]
     assert card.split["test"]
 

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
+from workbench.logs.fetch import card_path
 
 
 @pytest.fixture
@@ -59,8 +60,10 @@ def test_imposed_motion_gives_friction_but_no_design(
 
 def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) -> None:
     logs = [str(data / "pneumatic_seals" / f"PK_{bar}bar.csv") for bar in (1, 5, 7)]
-    out = tmp_path / "id"
-    assert main(["identify", *logs, "--card", "pneumatic_seals", "--out", str(out)]) == 0
+    card, out = tmp_path / "card.toml", tmp_path / "id"
+    text = card_path("pneumatic_seals").read_text(encoding="utf-8")
+    card.write_text(text.replace("4.908739e-4", "5.187477e-4"), encoding="utf-8")  # a wrong bore
+    assert main(["identify", *logs, "--card", str(card), "--out", str(out)]) == 0
     friction = read(out / "model.json")["friction"]
     assert isinstance(friction, dict)
     assert friction["F_cp"]["value"] is None  # a constant force is beside the seal's friction

@@ -52,7 +52,7 @@ OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
 CALM_SHARE = 0.9  # of the samples, those that tell the controller
 OF_WALK = 6.0 / 20.0  # of its steps' variance, that third differences count as noise
 LEAST_PART_OF_NOISE = 0.1  # of that variance, which is the sensor's at least
-FEWEST_ROWS = 20  # from which what they leave tells of noise
+FEWEST_LEFT = 20  # from which what they leave tells of noise
 
 
 @dataclass(frozen=True, eq=False)
@@ -266,7 +266,7 @@ def _left_of_force(one: MotionLog) -> float:
     to the motor too, and is none.
     """
     rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
-    if len(rows.b) < FEWEST_ROWS:
+    if len(rows.b) < FEWEST_LEFT:
         return np.inf
     rest = rows.b - rows.X @ np.linalg.lstsq(rows.X, rows.b, rcond=1e-12)[0]
     mean = weights(one.sliding.length, one.log.h)[0]

@@ -19,7 +19,7 @@ from identification.thresholds import SHARE_GAINS, SURE_OF_SHARE
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
 FAR_FASTER = 50.0  # periods a sample, as which any more count
 SURE_BEYOND = 2.0  # deviations by which a share may lie beyond the largest
-BLOCK = 25  # samples
+STRETCH_OF_LOOP = 25  # samples
 
 
 def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -> float:
@@ -90,8 +90,8 @@ def unseen(log: Log, share: float) -> float:
         return 0.0
     means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), [1.0 - share, share])
     third = np.diff(np.asarray(log["F"]), 3)
-    count = len(third) // BLOCK
-    power = np.mean(third[: count * BLOCK].reshape(count, BLOCK) ** 2, axis=1)
+    count = len(third) // STRETCH_OF_LOOP
+    power = np.mean(third[: count * STRETCH_OF_LOOP].reshape(count, STRETCH_OF_LOOP) ** 2, axis=1)
     white = float(np.median(power)) / float(means @ means)
     R = min(1.0 / max(1.0 - 2.0 * share, 1e-9), FAR_FASTER)
     return float(np.sqrt(white * ((R - 1.0) / R**2 + 2.0 * share**2)))
