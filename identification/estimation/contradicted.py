@@ -26,7 +26,7 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.log import Log
 from identification.model.estimates import Drive
-from identification.model.plant import Motor, Plant
+from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples, Kind
 from identification.signals.steps import (
     LINE_SIDES,
@@ -56,6 +56,7 @@ MOST_SPIKES = 0.05  # share of a signal, beyond which these are no single sample
 MOST_CANDIDATES = 16  # samples of a drive that are tried without
 # Times the drive's own roughness, from which one is tried; of a measured one, which has kinks
 SEEN_FROM, MEASURED_SEEN_FROM = 2.0, 8.0
+WALKS_OVER = 0.5  # s, over which what a command's noise adds up to passes for one bad sample
 SHIFT_STEPS = 3  # to the likeliest value in place of a bad one
 FARTHEST_SHIFT = 20.0  # times the drive's roughness, the longest of these steps
 SHORTEST_PIECE, LEAST_PIECE = 1.0, 250  # s, and samples, of a piece of a log that is cut
@@ -230,6 +231,15 @@ class _Driven:
         """The signal that drives the run."""
         return "F" if self.drive == "force" else "u"
 
+    @property
+    def usual(self) -> float:
+        """Error of one sample of an actuator's command, that its own noise adds up to at times."""
+        one, actuator = self.one, self.plant.actuator
+        if not isinstance(actuator, Actuator):
+            return 0.0
+        noise = one.walk / (actuator.k1 * one.log.h)
+        return RUN_JUMP_FROM * noise * float(np.sqrt(max(1.0, WALKS_OVER / one.log.h)))
+
     def by(self, x: Array) -> Log:
         """The log with this drive (n,)."""
         log = self.one.log.with_signals(**{self.name: x})
@@ -300,6 +310,8 @@ def _without_drive_spikes(driven: _Driven, gains: float) -> tuple[Log, list[BadS
                 continue
         without, after = driven.likeliest(without, own, rough)
         if before - after <= (gains if length > 0 else KICK_GAINS * gains):
+            continue
+        if driven.drive == "command" and np.max(np.abs(x - without)[own]) < driven.usual:
             continue
         now, before = without, after
         near[max(first - RUN_SIDES[0], 0) : first + RUN_SIDES[0]] = True
