@@ -11,6 +11,7 @@ from identification.estimation.ensemble import ensemble
 from identification.estimation.plain_search.likely_sets import granted_samples, log_cost, reweighed
 from identification.estimation.plain_search.local_search import pack, refine
 from identification.estimation.plain_search.problem import pose
+from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Actuator
@@ -60,7 +61,7 @@ def sample_posterior(
     The walkers start around the fit. Where the fit leaves more than noise, a set's likelihood is
     that of as many independent samples as the residual's correlation leaves.
     """
-    problem = pose(logs, rig, fit.drive)
+    problem = pose(recorded_logs(logs, rig, fit.drive).plain, rig, fit.drive)
     k1, k2 = 0.0, float(problem.row[K2])
     if problem.drive == "command":
         assert isinstance(fit.actuator, Actuator)
