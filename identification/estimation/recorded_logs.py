@@ -96,6 +96,18 @@ def needed(logs: Sequence[Log], rig: Rig) -> list[Log]:
     return [at_needed_rate(log) for log in logs]
 
 
+def with_clocks(
+    recorded: RecordedLogs, said: Sequence[str], share: float | None = None
+) -> RecordedLogs:
+    """Logs, recorded as they were read, with what is known and said of their clocks.
+
+    said: of their rates; share: of the command's step to the next sample, by default what a machine
+    without effects shows of it.
+    """
+    recorded = replace(recorded, remarks=(*said, *clock_remarks(recorded.logs)))
+    return with_share(recorded, plain_share(recorded) if share is None else share)
+
+
 def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
     """A line on each log whose clock jitters so that it shows."""
     return tuple(
@@ -152,16 +164,14 @@ def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> 
     for log in logs:
         check_driven(log)
     slower = needed(logs, rig)
-    said = slower_remarks(logs, slower)
-    found = RecordedLogs((), rig, chosen_drive(slower, rig, drive), remarks=said).of(slower)
+    found = RecordedLogs((), rig, chosen_drive(slower, rig, drive)).of(slower)
     for one in found.logs:
         if not np.any(one.signals["d"]):
             raise NotIdentifiable(
                 f"{one.log.name}: no motion above the noise of the velocity"
                 f" ({one.v_noise:.3g} m/s); record a run that moves"
             )
-    found = replace(found, remarks=(*found.remarks, *clock_remarks(found.logs)))
-    return with_share(found, plain_share(found))
+    return with_clocks(found, slower_remarks(logs, slower))
 
 
 def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:

@@ -9,14 +9,12 @@ from identification.effects._library import Library
 from identification.errors import NotIdentifiable
 from identification.estimation.recorded_logs import (
     RecordedLogs,
-    clock_remarks,
     commanded,
     left_by_actuator,
     left_share,
     needed,
-    plain_share,
     slower_remarks,
-    with_share,
+    with_clocks,
 )
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
 from identification.estimation.regression.inertia import speed_ratios
@@ -60,8 +58,8 @@ def recorded_rows(
 ) -> RecordedRows:  # fmt: skip
     """The training logs as rows; raises NotIdentifiable where too little of the motion slides.
 
-    halt: asked before whatever is made of them; share: of a motor's force between the samples, by
-    default what a motor without effects shows of it.
+    halt: asked before whatever is made of them; share: of the command's step to the next sample, by
+    default what a machine without effects shows of it.
     """
     remarks: list[str] = []
     slower = needed(train, rig)
@@ -71,8 +69,7 @@ def recorded_rows(
     drive: Drive = "command" if driven else "force"
     recorded = RecordedLogs((), rig, drive, halt=halt or Halt()).of(train)
     recorded, refused = _told(recorded)
-    recorded = replace(recorded, remarks=(*said, *clock_remarks(recorded.logs)))
-    recorded = with_share(recorded, plain_share(recorded) if share is None else share)
+    recorded = with_clocks(recorded, said, share)
     return RecordedRows(recorded, refused, (*recorded.remarks, *remarks))
 
 

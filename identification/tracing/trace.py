@@ -75,7 +75,7 @@ def trace(
     chosen, found = settled_plain(chosen, found, settle, report)
     report("telling", 0.0)
     with halt.closing():
-        seen = [rows.recorded.given(log) for log in test]
+        seen = [chosen.plain.rows.recorded.given(log) for log in test]
         judged = judgement(chosen, found, seen, rig)
         return _told(chosen, found, judged, seen, halt.not_tried)
 
