@@ -76,6 +76,7 @@ LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 SURE_OF_SHARE = 6.0  # deviations from 0 of a command's change between the samples of a slow log
 SHARE_GAINS = 0.01  # of the square that the equation leaves, what that change has to explain
+SHARE_BEYOND = 2.0  # deviations by which that change may be larger than of any faster loop
 JITTER_FROM = 0.5  # times the position's noise at rest, that of a jittering clock in fast motion
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well

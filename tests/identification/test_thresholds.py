@@ -613,6 +613,12 @@ def test_share_gains() -> None:
     assert told_share(0.3, 0.01, 0.0125) == 0.3
 
 
+def test_share_beyond() -> None:
+    """One larger than any faster loop makes is something else, unless it is so by chance."""
+    assert told_share(0.5 + 1.6 * 0.04, 0.04, 1.0) == 0.5
+    assert told_share(0.5 + 2.5 * 0.04, 0.04, 1.0) == 0.0
+
+
 def smooth(size: float, at: int, length: int) -> Array:
     """A motion behind a sensor of noise 1, off by this much from a sample on."""
     t = np.arange(4000.0)

@@ -14,11 +14,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog, Rows
 from identification.log import Log
-from identification.thresholds import SHARE_GAINS, SURE_OF_SHARE
+from identification.thresholds import SHARE_BEYOND, SHARE_GAINS, SURE_OF_SHARE
 
 LARGEST_SHARE = 0.5  # of a loop that is far faster than its log
 FAR_FASTER = 50.0  # periods a sample, as which any more count
-SURE_BEYOND = 2.0  # deviations by which a share may lie beyond the largest
 STRETCH_OF_LOOP = 25  # samples
 
 
@@ -66,7 +65,7 @@ def told_share(share: float, sd: float, gain: float) -> float:
     """The share (with its deviation), 0 where it is none; gain: part of the square it explains."""
     if share < SURE_OF_SHARE * sd or gain < SHARE_GAINS:
         return 0.0
-    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + SURE_BEYOND * sd else 0.0
+    return min(share, LARGEST_SHARE) if share <= LARGEST_SHARE + SHARE_BEYOND * sd else 0.0
 
 
 def between_samples(log: Log, share: float, held: bool) -> Log:

@@ -1,9 +1,17 @@
 """A fit of a log with one bad sample is that of the log without it, and says when it was."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from benchmarks.bad_samples import fitted, motor, moved
+from identification.estimation.contradicted import _Driven
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.windowed_run.windows import freed, starts
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.thresholds import RUN_JUMP_FROM
 
 
 @pytest.mark.parametrize(
@@ -22,3 +30,22 @@ def test_one_bad_sample_moves_no_parameter(signal: str, at: int, size: float, ki
     assert fit.bad[0].first == pytest.approx(machine.log["t"][at], abs=3 * machine.log.h)
     assert len(fit.logs) == 1
     assert "since the run contradicts it" in said
+
+
+def test_what_an_actuators_noisy_command_adds_up_to_is_no_bad_sample() -> None:
+    """Over half a second, in which the noise of many samples passes for one."""
+    machine = motor(0)
+    one = replace(recorded_logs([machine.log], machine.rig).logs[0], walk=0.2)
+    begun = starts(one, "command")
+    nine = Karnopp(5.0, 10.0, 10.0, 20.0, 20.0, 0.01, -0.01, 14.0, -14.0)
+
+    def usual(actuator: Actuator | Motor) -> float:
+        plant = Plant(nine, actuator)
+        states = freed(plant, one, "command", begun)
+        assert states is not None
+        return _Driven(plant, one, "command", states).usual
+
+    noise = 0.2 / (2000.0 * one.log.h)  # of one sample of the command [V]
+    expected = RUN_JUMP_FROM * noise * np.sqrt(0.5 / one.log.h)
+    assert usual(Actuator(2000.0, 100.0)) == pytest.approx(expected)
+    assert usual(Motor(30.0)) == 0.0

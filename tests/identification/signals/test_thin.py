@@ -62,16 +62,18 @@ def test_of_a_slow_log_the_liveliest_part_is_taken(small: None) -> None:
     assert f"from t = {found['t'][0]:.6g} s were used, where the body moves most" in remarks[0]
 
 
-def sensed(h: float, noise: float, jitter: float = 0.0, ring: float = 0.0) -> Log:
+def sensed(
+    h: float, noise: float, jitter: float = 0.0, ring: float = 0.0, rate: float = 330.0
+) -> Log:
     """20 s of a body to and fro under a held command, behind sensors of position and force.
 
-    jitter: of the clock, as a share of a sample; ring [m]: at 330 Hz.
+    jitter: of the clock, as a share of a sample; ring [m]: at this rate [Hz].
     """
     rng = np.random.default_rng(4)
     t = h * np.arange(round(20.0 / h), dtype=np.float64)
     at = t + jitter * h * rng.standard_normal(len(t))
     w = 2 * np.pi * 3.0
-    y = 0.02 * np.sin(w * at) + ring * np.sin(2 * np.pi * 330.0 * t)
+    y = 0.02 * np.sin(w * at) + ring * np.sin(2 * np.pi * rate * t)
     F = 40.0 * np.cos(w * t)
     signals = {"t": t, "y": y + noise * rng.standard_normal(len(t))}
     signals["F"] = F + 0.1 * rng.standard_normal(len(t))
@@ -106,5 +108,9 @@ def test_what_a_slower_clock_would_lose_is_kept() -> None:
     assert at_needed_rate(sensed(5e-4, 1e-6, ring=1e-5)).h == pytest.approx(1e-3)
     fast = sensed(1e-4, 1e-6, ring=1e-5)
     assert at_needed_rate(fast).h < 0.5 / 330.0
+    hidden = sensed(2.5e-4, 2e-6, ring=6e-7, rate=700.0)
+    assert at_needed_rate(hidden).h == pytest.approx(1e-3)
+    shown = sensed(2.5e-4, 2e-6, ring=2.4e-6, rate=700.0)
+    assert at_needed_rate(shown).h < 0.9e-3
     short = Log("short", {key: x[:3000] for key, x in sensed(5e-4, 2e-6).signals.items()})
     assert len(at_needed_rate(short)) >= 400

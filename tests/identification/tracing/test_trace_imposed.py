@@ -102,6 +102,13 @@ def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
         )  # fmt: skip
 
 
+def test_test_logs_are_recorded_as_the_training_logs_are() -> None:
+    one = strokes(1, [1.5e-3] * 4, 1, stroke=0.005)  # sure of its direction only as a rig's
+    found = traced([one], [one])
+    sizes = (found.before["train"].force_rms, found.before["test"].force_rms)
+    assert sizes[0] is not None and sizes[0] == pytest.approx(sizes[1])
+
+
 def test_runs_of_one_file_are_left_out_together() -> None:
     def error(*names: str) -> float:
         logs = [strokes(bar, [9e-3] * 3, bar) for bar in (1, 5, 5)]

@@ -42,6 +42,17 @@ def test_a_body_that_creeps_does_not_rest() -> None:
     assert np.all(begun.v != 0.0)
 
 
+def test_at_rest_on_one_count_a_body_is_anywhere_within_it() -> None:
+    white = starts(seen(made(1)), "command")
+    log, count = made(1), 3e-4
+    counted = seen(log.with_signals(y=count * np.round(log["y"] / count)))
+    begun = starts(counted, "command")
+    still = begun.sd[1] == 0.0
+    assert np.sum(still) > 4
+    assert np.mean(begun.sd[0][still] == counted.noise_y) > 0.7  # else noise flips it
+    assert np.all(white.sd[0][white.sd[1] == 0.0] < 0.5 * NOISE)
+
+
 def test_the_true_plant_leaves_noise_alone_in_windows_and_over_all() -> None:
     one = seen(made(2))
     for seconds in (0.5, RUN_WINDOW, WHOLE):
