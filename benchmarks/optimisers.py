@@ -2,7 +2,7 @@
 
     python benchmarks/optimisers.py [--first 300] [--seeds 8]
 
-Local: the residual of runs in windows (`estimation/windowed_run/refinement.judge`) from a plant
+Local: the residual of runs in windows (`estimation/windowed_run/run_errors.judge`) from a plant
 that is 1 to 5 % off, by our Gauss-Newton with differences for slopes and by scipy's least_squares
 ("trf" with the same differences, "lm"); all take the same function of the same unknowns. Global:
 the cost of many plants at once (`estimation/plain_search`) over the search's box, by our
@@ -25,14 +25,13 @@ from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.fitted_runs import total_cost
 from identification.estimation.plain_search.problem import pose
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.windowed_run.refinement import (
-    judge,
+from identification.estimation.windowed_run.parameters import (
     names_of,
     plant_with,
-    soft,
     units_in,
     values_of,
 )
+from identification.estimation.windowed_run.run_errors import judge, soft
 from identification.log import Log
 from identification.model.plant import Plant
 

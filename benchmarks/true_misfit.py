@@ -12,7 +12,7 @@ import argparse
 
 from benchmarks.drives_rig import FAMILIES, make
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.windowed_run.refinement import misfit
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.model.estimates import Drive
 from identification.model.plant import Actuator, Motor, Plant
 

@@ -11,7 +11,7 @@ from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import recorded_logs
-from identification.estimation.windowed_run.refinement import values_of
+from identification.estimation.windowed_run.parameters import values_of
 from identification.log import Log
 from identification.model.estimates import KarnoppFit
 from identification.model.plant import Plant

@@ -15,7 +15,7 @@ from scipy.ndimage import maximum_filter1d, median_filter
 from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.windowed_run.refinement import NOISE_LOSS, loss
+from identification.estimation.windowed_run.run_errors import NOISE_LOSS, loss
 from identification.estimation.windowed_run.windows import (
     Freed,
     Starts,

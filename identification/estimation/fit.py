@@ -31,7 +31,8 @@ from identification.estimation.structure_fit import (
     search_is_hopeless,
     searched,
 )
-from identification.estimation.windowed_run.refinement import RESCUES, Refit, even, refit
+from identification.estimation.windowed_run.parameters import even
+from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant

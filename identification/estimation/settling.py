@@ -37,14 +37,9 @@ from identification.estimation.plain_search.problem import (
 from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.walking_residual import walk_size, widened
-from identification.estimation.windowed_run.refinement import (
-    CANNOT_BE_FOLLOWED,
-    Refit,
-    even,
-    names_of,
-    refit,
-    values_of,
-)
+from identification.estimation.windowed_run.parameters import even, names_of, values_of
+from identification.estimation.windowed_run.refinement import Refit, refit
+from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED
 from identification.estimation.windowed_run.windows import (
     position_errors,
     starts,

@@ -37,18 +37,17 @@ from identification.estimation.windowed_run.nudged_search import (
     closest,
     loaded,
 )
+from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import (
     RESCUES,
     Effort,
     HaltedRefit,
     Refit,
-    even,
-    loose,
-    misfit,
-    on_bristle,
     onward,
     refit,
 )
+from identification.estimation.windowed_run.run_errors import misfit
+from identification.estimation.windowed_run.stick_search import WIDEST_BAND, stick_search
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
@@ -58,7 +57,6 @@ from identification.thresholds import ADEQUATE, COMPLETE, INERT, MUCH
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
 OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
-WIDEST_BAND = 0.4  # of the median speed of sliding, that the band can be at most
 EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none
 SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
@@ -119,13 +117,16 @@ def fitted_structure(
     hopeless = missing and (bool(effects) or rough(outcomes))
     done: Refit | None = None
     try:
-        done = _refined(told, logs, drive, near, "rough" if hopeless else "whole")
-        free = loose(plant, drive)
+        free, followed = loose(plant, drive), ADEQUATE if effects else COMPLETE
+        if free and not (missing or on_bristle(plant)):
+            done = _stops_searched(told, recorded, rng)
+            if done.misfit <= followed:
+                return FittedStructure(stage, outcomes, done.plant, done.sd, False, done.misfit)
+        done = _refined(told, logs, drive, near, "rough" if hopeless else "whole", done)
         smooth = not on_bristle(plant) and (free or bool(even(done.plant)))
         if smooth and done.misfit > COMPLETE and not hopeless:
             again = replace(onward(done.plant, logs, drive), prior=prior)
             done = again if again.misfit < done.misfit else done
-        followed = ADEQUATE if effects else COMPLETE
         if free and done.misfit > followed and not hopeless:
             banded = BREAKAWAY in outcomes and not missing
             done = _closest(told, recorded, rng, (near, missing, banded), done)
@@ -172,13 +173,22 @@ def _best_so_far(
     return min(found, key=lambda one: one[1])
 
 
+def _stops_searched(told: _Regressed, recorded: RecordedLogs, rng: np.random.Generator) -> Refit:
+    """The regression's plant, its stops searched by themselves, refined on the free run."""
+    logs, drive = recorded.logs, recorded.drive
+    plant = stick_search(told.plant, logs, drive, rng)
+    return refit(plant, logs, drive, prior=dict(told.prior), effort="near")
+
+
 def _refined(
-    told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None, effort: Effort
-) -> Refit:
+    told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None, effort: Effort,
+    before: Refit | None,
+) -> Refit:  # fmt: skip
     """The regression's plant refined on the free run, from another band and on a piece first where
-    that leaves more than noise."""
+    that leaves more than noise; or one of before, if that is better."""
     plant, prior = told.plant, dict(told.prior)
     done = refit(plant, logs, drive, band=max(told.slow, 1e-4), prior=prior, effort=effort)
+    done = done if before is None or done.misfit <= before.misfit else before
     try:
         return _rebegun(done, told, logs, drive, near, effort)
     except Halted:

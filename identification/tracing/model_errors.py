@@ -15,7 +15,7 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.row_fit import RowFit, rms
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.refinement import misfit
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
 from identification.thresholds import ADEQUATE, CARRIED, ROUGH_LEFT, SHOWN_FROM

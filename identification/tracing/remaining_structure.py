@@ -18,7 +18,8 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.row_fit import RowFit, mean_square, rms
 from identification.estimation.structure_fit import FittedStructure, band
-from identification.estimation.windowed_run.refinement import PERIOD_REACH, soft
+from identification.estimation.windowed_run.parameters import PERIOD_REACH
+from identification.estimation.windowed_run.run_errors import soft
 from identification.estimation.windowed_run.windows import freed, position_rms, starts, window_of
 from identification.estimation.windowed_run.windows import window_residual as left_in_run
 from identification.model.estimates import Drive

@@ -9,7 +9,7 @@ from identification.estimation.regression.equation_rows import ACTUATOR, MECHANI
 from identification.estimation.regression.held_command import share_between
 from identification.estimation.regression.row_fit import mean_square
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
-from identification.estimation.windowed_run.refinement import misfit
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant
 from identification.progress import Progress
@@ -28,6 +28,15 @@ from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import before_pieces, in_pieces
 
 INTERVALS = "the last step of the plain model's fit, with its intervals"
+
+
+@dataclass(frozen=True, eq=False)
+class FirstEffect:
+    """The plain model, and the choice of the effect that its equations call for first, if any."""
+
+    plain: PlainModel
+    setting: Setting
+    choice: Choice
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,30 +62,38 @@ class Refinement:
     model: FittedStructure
 
 
-def selection(plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Progress) -> Selection:
-    """The effects that the equations call for, one after the other."""
+def first_effect(
+    plain: PlainModel, rig: Rig, rng: np.random.Generator, report: Progress
+) -> FirstEffect:
+    """The effect that the equations call for first."""
     rows, start, first, library = plain.rows, plain.start, plain.first, plain.library
     logs = list(rows.logs)
     setting = Setting(
         logs, logs, rows.drive, rig, library, start, first, plain.model, rng.spawn(1)[0]
     )
-    choice = begun = choose(start, first, library, rng, report, most=1)
+    return FirstEffect(plain, setting, choose(start, first, library, rng, report, most=1))
+
+
+def selection(begin: FirstEffect, rng: np.random.Generator, report: Progress) -> Selection:
+    """The effects that the equations call for, one after the other."""
+    plain, setting = begin.plain, begin.setting
+    choice = begun = begin.choice
     alone = first_alone(begun, setting)
     if begun.steps and not suffices(alone, begun, setting):
-        choice = choose(start, first, library, rng, report, begun)
+        choice = choose(plain.start, plain.first, plain.library, rng, report, begun)
     pieces = not plain.model.imposed and in_pieces(choice)
     choice = before_pieces(choice) if pieces else choice
     return Selection(plain, setting, begun, alone, choice, pieces)
 
 
-def share_beside(chosen: Selection) -> float:
+def share_beside(plain: PlainModel, choice: Choice) -> float:
     """Share of the command's step to the next sample, that shows first beside the effects chosen.
 
     0 where the logs have it already, where no effect was chosen, and without a command.
     """
-    recorded, base, logs = chosen.plain.rows.recorded, chosen.choice.base, chosen.choice.end.logs
+    recorded, base, logs = plain.rows.recorded, choice.base, choice.end.logs
     of = MECHANICAL if recorded.held else ACTUATOR
-    if recorded.share != 0.0 or recorded.imposed or not chosen.choice.steps or of not in base:
+    if recorded.share != 0.0 or recorded.imposed or not choice.steps or of not in base:
         return 0.0
     if not (recorded.held or recorded.by_command):
         return 0.0

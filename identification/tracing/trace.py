@@ -25,8 +25,10 @@ from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
+    FirstEffect,
     Refinement,
     Selection,
+    first_effect,
     refinement,
     selection,
     settled_plain,
@@ -60,15 +62,9 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
-    begin, settle = rng.spawn(2)
+    begin, choose, settle = rng.spawn(3)
     halt = Halt(keep_going)
-    report("recording", 0.0)
-    rows = recorded_rows(train, rig, library, halt)
-    chosen = _chosen(rows, rig, library, begin, report)
-    share = share_beside(chosen)
-    if share != 0.0:
-        rows = recorded_rows(train, rig, library, halt, share)
-        chosen = _chosen(rows, rig, library, begin, report)
+    chosen = _chosen(train, rig, library, (begin, choose), report, halt)
     report("refitting", 0.0)
     found = refinement(chosen, report)
     report("settling", 0.0)
@@ -81,14 +77,35 @@ def trace(
 
 
 def _chosen(
+    train: Sequence[Log], rig: Rig, library: Library,
+    rngs: tuple[np.random.Generator, np.random.Generator], report: Progress, halt: Halt,
+) -> Selection:  # fmt: skip
+    """The effects that the equations call for, on logs whose command is known between its samples.
+
+    rngs: of the plain model and the first effect, and of the choice of the others.
+    """
+    begin, choose = rngs
+    report("recording", 0.0)
+    first = _first(recorded_rows(train, rig, library, halt), rig, library, begin, report)
+    share = share_beside(first.plain, first.choice)
+    if share == 0.0:
+        chosen = selection(first, choose, report)
+        share = share_beside(chosen.plain, chosen.choice)
+        if share == 0.0:
+            return chosen
+    rows = recorded_rows(train, rig, library, halt, share)
+    return selection(_first(rows, rig, library, begin, report), choose, report)
+
+
+def _first(
     rows: RecordedRows, rig: Rig, library: Library, rng: np.random.Generator, report: Progress
-) -> Selection:
-    """The plain model of the rows, and the effects that the equations call for beside it."""
+) -> FirstEffect:
+    """The plain model of the rows, and the effect that the equations call for first beside it."""
     begin, choose = rng.spawn(2)
     report("refining", 0.0)
     plain = plain_model(rows, library, begin)
     report("tracing", 0.0)
-    return selection(plain, rig, choose, report)
+    return first_effect(plain, rig, choose, report)
 
 
 def _told(

@@ -30,22 +30,17 @@ from identification.estimation.regression.equation_rows import (
     shortened,
 )
 from identification.estimation.regression.standstill import rest_stretches
-from identification.estimation.windowed_run.refinement import (
-    SHORT_WINDOW,
-    Judge,
-    Refit,
+from identification.estimation.windowed_run.parameters import (
     even,
-    judge,
-    loss,
     names_of,
     on_bristle,
-    onward,
     plant_with,
-    refit,
-    start_band,
     values_of,
     wide,
 )
+from identification.estimation.windowed_run.refinement import Refit, onward, refit
+from identification.estimation.windowed_run.run_errors import Judge, judge, loss
+from identification.estimation.windowed_run.stick_search import SHORT_WINDOW, start_band
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Motor, Plant
@@ -278,7 +273,7 @@ def more_load(plant: Plant) -> Plant:
 
 
 def judge_nudged(plant: Plant, logs: Sequence[MotionLog], drive: Drive, share: float) -> Judge:
-    """Errors of a plant like this one nudged by a share of the damping (`refinement.judge`)."""
+    """Errors of a plant like this one nudged by a share of the damping (`run_errors.judge`)."""
     damping = share * nudging(plant, logs)
     if damping == 0.0:
         return judge(plant, logs, drive, SHORT_WINDOW)

@@ -41,19 +41,10 @@ from identification.estimation.windowed_run.nudged_search import (
     nearer,
     nudged_search,
 )
-from identification.estimation.windowed_run.refinement import (
-    Refit,
-    briefly,
-    even,
-    judge,
-    loose,
-    loss,
-    misfit,
-    on_bristle,
-    onward,
-    refit,
-    start_band,
-)
+from identification.estimation.windowed_run.parameters import even, loose, on_bristle
+from identification.estimation.windowed_run.refinement import Refit, briefly, onward, refit
+from identification.estimation.windowed_run.run_errors import judge, loss, misfit
+from identification.estimation.windowed_run.stick_search import start_band
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     freed,

@@ -13,7 +13,7 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import BREAKAWAY, FIVE, REST, MotionLog
 from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
 from identification.estimation.structure_fit import FittedStructure, inside
-from identification.estimation.windowed_run.refinement import loose
+from identification.estimation.windowed_run.parameters import loose
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without
 from identification.tracing.regression.candidates import EffectCandidate, best_of

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from identification.estimation.regression.equation_rows import motion_log
-from identification.estimation.windowed_run.refinement import misfit
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Plant

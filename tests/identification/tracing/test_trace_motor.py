@@ -13,7 +13,8 @@ from identification.estimation.regression.effect_rows import UNEXPLAINED, with_e
 from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
 from identification.estimation.regression.row_fit import base_fits, first_stage
 from identification.estimation.structure_fit import _limit, fitted_structure
-from identification.estimation.windowed_run.refinement import Refit, misfit, refit
+from identification.estimation.windowed_run.refinement import Refit, refit
+from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import starts, walks
 from identification.log import Log, Rig
 from identification.model.plant import Plant

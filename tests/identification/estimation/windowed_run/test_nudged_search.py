@@ -26,15 +26,9 @@ from identification.estimation.windowed_run.nudged_search import (
     nudged_search,
     nudging,
 )
-from identification.estimation.windowed_run.refinement import (
-    even,
-    judge,
-    loss,
-    misfit,
-    names_of,
-    refit,
-    values_of,
-)
+from identification.estimation.windowed_run.parameters import even, names_of, values_of
+from identification.estimation.windowed_run.refinement import refit
+from identification.estimation.windowed_run.run_errors import judge, loss, misfit
 from identification.estimation.windowed_run.windows import FAST_SHARE, starts
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp

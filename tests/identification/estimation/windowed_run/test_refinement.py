@@ -8,16 +8,15 @@ import pytest
 
 from identification.arrays import Array
 from identification.estimation.gauss_newton import WIDE_STEP, Minimum, gauss_newton
-from identification.estimation.windowed_run.refinement import (
+from identification.estimation.windowed_run.parameters import (
     even,
-    mean_loss,
     names_of,
-    onward,
     plant_with,
-    refit,
     units_in,
     values_of,
 )
+from identification.estimation.windowed_run.refinement import onward, refit
+from identification.estimation.windowed_run.run_errors import mean_loss
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from tests.identification.motor_logs import NINE, made, plant, seen

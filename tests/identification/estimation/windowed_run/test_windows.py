@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.windowed_run import windows as module
-from identification.estimation.windowed_run.refinement import judge, misfit
+from identification.estimation.windowed_run.run_errors import judge, misfit
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     WHOLE,

@@ -11,7 +11,7 @@ from identification.estimation.regression.equation_rows import MotionLog, shorte
 from identification.estimation.regression.row_fit import first_stage, mean_square
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.estimation.windowed_run.nudged_search import less_load
-from identification.estimation.windowed_run.refinement import even
+from identification.estimation.windowed_run.parameters import even
 from identification.log import Rig
 from identification.thresholds import COMPLETE, MUCH_IS_LEFT
 from identification.tracing.free_run.backward_elimination import Setting

@@ -1,0 +1,101 @@
+"""What a plant's free run in windows leaves of the logs, and the robust costs made of it."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray, IntArray
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.parameters import loose
+from identification.estimation.windowed_run.windows import (
+    COARSE,
+    RUN_WINDOW,
+    WHOLE,
+    freed,
+    starts,
+    walks,
+    window_of,
+    window_residual,
+)
+from identification.model.estimates import Drive
+from identification.model.plant import Plant
+
+NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
+LUCKY_WINDOWS = 0.15  # of the windows, that luck may have spoilt
+CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
+ROBUST_FROM = 3.0  # residual in noise units from which it counts less
+Judge = Callable[[Plant], Array]
+
+
+def judge(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, seconds: float, bristle: float = COARSE
+) -> Judge:
+    """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
+    force) over all logs, less what the windows' unsure states account for.
+
+    bristle [s]: longest sub-step of one.
+    """
+    free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
+    sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
+
+    def errors_of(tried: Plant) -> Array:
+        parts = []
+        for one, own, size in zip(logs, free, sizes, strict=True):
+            r = window_residual(tried, one, drive, own)
+            if r is None or not np.all(np.isfinite(r)):
+                parts.append(np.full(size, CANNOT_BE_FOLLOWED))
+                continue
+            parts.append(np.clip(r, -CANNOT_BE_FOLLOWED, CANNOT_BE_FOLLOWED).ravel())
+        return np.concatenate(parts)
+
+    return errors_of
+
+
+def loss(r: Array) -> float:
+    """Robust cost."""
+    return float(np.sum(np.log1p((r / ROBUST_FROM) ** 2)) * ROBUST_FROM**2)
+
+
+def soft(r: Array, far: float = ROBUST_FROM) -> Array:
+    """Errors whose square sum is a robust cost: those beyond `far` count ever less."""
+    return np.asarray(np.sign(r) * np.sqrt(np.log1p((r / far) ** 2)) * far)
+
+
+def misfit(
+    plant: Plant, logs: Sequence[MotionLog], drive: Drive, bristle: float = COARSE, *,
+    every: bool = False,
+) -> float:  # fmt: skip
+    """What the free run leaves of that signal of that log which it follows worst.
+
+    Robust mean square in units of the sensors' noise: 1 where noise alone is left; bristle [s]:
+    longest sub-step of one. Where nothing brings the position back, a breakaway that the force only
+    just reaches is a matter of luck and takes its window with it: the worst windows do not count,
+    unless every one is to.
+    """
+    worst = 0.0
+    free = loose(plant, drive) and not every
+    for one in logs:
+        least = CANNOT_BE_FOLLOWED  # a short window may begin badly, a long one lose a stop
+        whole = drive == "command" and not walks(one, drive)
+        for seconds in (RUN_WINDOW, WHOLE) if whole else (RUN_WINDOW,):
+            begun = starts(one, drive, seconds, bristle)
+            r = window_residual(plant, one, drive, freed(plant, one, drive, begun))
+            if r is not None:
+                window = window_of(begun, len(one.log)) if free else None
+                moves = one.signals["d"] != 0
+                least = min(least, max(mean_loss(own, window, moves) for own in r))
+        worst = max(worst, least)
+    return worst
+
+
+def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None = None) -> float:
+    """Robust mean square of errors (n,), 1 for noise; window (n,): numbers of the stretches of
+    which the worst do not count, of those in which the body moves (n,) at all, so many of them."""
+    if window is None:
+        return loss(r) / len(r) / NOISE_LOSS
+    square = np.log1p((r / ROBUST_FROM) ** 2) * ROBUST_FROM**2 / NOISE_LOSS
+    size = np.bincount(window)
+    each = np.bincount(window, square) / np.maximum(size, 1)
+    told = len(size) if moves is None else np.count_nonzero(np.bincount(window, moves))
+    kept = np.argsort(each)[: max(1, len(size) - int(LUCKY_WINDOWS * told))]
+    return float(np.average(each[kept], weights=size[kept]))
