@@ -18,7 +18,7 @@ from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms
 from identification.model.estimates import Drive
-from identification.thresholds import ADEQUATE, CARRIED, ROUGH_LEFT, SHOWN_FROM
+from identification.thresholds import ADEQUATE, CARRIED, MUCH, ROUGH_LEFT, SHOWN_FROM
 from identification.tracing.regression.cross_validation import left_out_residual, row_residual
 from identification.tracing.regression.stepwise import Step, absorb
 from identification.tracing.result import Errors
@@ -101,19 +101,26 @@ def on_test(
 def share_left(before: OnTest, after: OnTest, noise: NoiseFloor) -> float:
     """Share of what was missing on the test logs that is left, of the first error that stood out.
 
-    Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. The equations
-    come first: one stop that a run loses by luck is more than all the rest of it. Of the run it is
-    the misfit's, which knows how far the noise of force and command walks.
+    Of squares, beyond what noise alone leaves; 0 where nothing stood out of that. An equation that
+    lacks much comes first: one stop that a run loses by luck is more than all the rest of it. Then
+    the run, by its misfit, which knows how far the noise of force and command walks.
     """
+    by_equations = [_equation_share(before, after, noise, least) for least in (MUCH**2, SHOWN_FROM)]
+    by_run = None
+    if before.misfit is not None and after.misfit is not None and before.misfit > SHOWN_FROM:
+        by_run = max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
+    told = (share for share in (by_equations[0], by_run, by_equations[1]) if share is not None)
+    return next(told, 0.0)
+
+
+def _equation_share(before: OnTest, after: OnTest, noise: NoiseFloor, least: float) -> float | None:
+    """As `share_left`, of the first equation of which more than `least` times the noise's square
+    was missing; None without one."""
     for name in ("force_rms", "actuator_rms"):
-        own, left, least = (getattr(x, name) for x in (before.errors, after.errors, noise))
-        if own is None or left is None or not least:
-            continue
-        if (own / least) ** 2 > SHOWN_FROM:
-            return float(max(left**2 - least**2, 0.0) / (own**2 - least**2))
-    if before.misfit is None or after.misfit is None or before.misfit <= SHOWN_FROM:
-        return 0.0
-    return max(after.misfit - 1.0, 0.0) / (before.misfit - 1.0)
+        own, left, floor = (getattr(x, name) for x in (before.errors, after.errors, noise))
+        if own is not None and left is not None and floor and (own / floor) ** 2 > least:
+            return float(max(left**2 - floor**2, 0.0) / (own**2 - floor**2))
+    return None
 
 
 def predicted(left: OnTest, noise: NoiseFloor) -> bool:

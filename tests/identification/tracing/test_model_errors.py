@@ -55,6 +55,13 @@ def test_the_share_is_that_of_the_first_error_that_stood_out() -> None:
     assert share_left(left_of(1.2, 11.0), left_of(1.1, 10.0), noise) == 0.0
 
 
+def test_a_run_that_lacks_much_comes_before_an_equation_that_lacks_little() -> None:
+    noise = NoiseFloor(1.0, None)
+    assert share_left(left_of(1.5, None, 21.0), left_of(1.5, None, 6.0), noise) == 0.25
+    assert share_left(left_of(2.5, None, 21.0), left_of(2.5, None, 6.0), noise) == 1.0
+    assert share_left(left_of(1.5, None, 1.9), left_of(1.5, None, 1.0), noise) == 1.0
+
+
 @pytest.mark.parametrize(
     ("force", "misfit", "expected"),
     [(1.1, 1.2, True), (None, 1.2, True), (1.1, None, True), (1.4, 1.2, False), (1.1, 1.7, False)],
