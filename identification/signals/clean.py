@@ -301,20 +301,26 @@ def _is_even(t: Array) -> bool:
 
 
 def _resample(log: Log, h: float) -> Log:
-    from scipy.interpolate import PchipInterpolator
-
     t = log["t"]
     grid = t[0] + h * np.arange(int(np.floor((t[-1] - t[0]) / h + 1e-6)) + 1)
-    held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
-    signals: dict[str, Array] = {"t": grid}
-    for name, values in log.signals.items():
-        if name == "t":
-            continue
-        if name == "u" or np.all((values == values.min()) | (values == values.max())):
-            signals[name] = values[held]
-        else:
-            signals[name] = np.asarray(PchipInterpolator(t, values)(np.minimum(grid, t[-1])))
-    return Log(log.name, signals)
+    others = {name: values for name, values in log.signals.items() if name != "t"}
+    signals = {name: at_times(name, t, values, grid, h) for name, values in others.items()}
+    return Log(log.name, {"t": grid, **signals})
+
+
+def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array:
+    """The signal `name` at the times `grid` [s], which are h [s] apart, from its samples at `t`.
+
+    The command `u` and a signal of two values are held (the last value at the middle of the new
+    period), any other follows a piecewise cubic. Before the first and after the last sample their
+    values stand.
+    """
+    from scipy.interpolate import PchipInterpolator
+
+    if name == "u" or np.all((values == values.min()) | (values == values.max())):
+        held = np.searchsorted(t, grid + 0.5 * h, side="right") - 1
+        return values[np.maximum(held, 0)]
+    return np.asarray(PchipInterpolator(t, values)(np.clip(grid, t[0], t[-1])))
 
 
 def applied_force(log: Log, rig: Rig) -> Array | None:

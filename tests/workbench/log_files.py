@@ -11,6 +11,13 @@ import pyarrow.parquet as pq
 import scipy.io
 
 from identification.arrays import Array
+from tests.workbench.channel_files import (
+    write_mcap,
+    write_mdf,
+    write_tdms,
+    write_ulog,
+    write_xlsx,
+)
 from workbench.cards.card import Card, load_card
 
 Signals = Mapping[str, Array]
@@ -89,4 +96,9 @@ WRITERS = {
     "a73.mat": write_mat73,
     "a.h5": write_hdf5,
     "a.json": write_json,
+    "a.tdms": write_tdms,
+    "a.mf4": write_mdf,
+    "a.mcap": write_mcap,
+    "a.ulg": write_ulog,
+    "a.xlsx": write_xlsx,
 }

@@ -3,11 +3,13 @@
 Beyond the contract's example a card may say (all optional, all additive):
 
     [card]   title, licence, citation, url, notes = ["a trap", ...]
-    [file]   format = "csv" | "parquet" | "mat" | "hdf5" | "json"   # default: by content
+    [file]   format = "csv" | "parquet" | "mat" | "hdf5" | "json" | "tdms" | "mdf" | "mcap" |
+             "ulog" | "excel"    # default: by content
              header = false      # csv; default: a first line that is not all numbers is one
              skip_rows = 15      # rows dropped before the header, or before the data without one
              delimiter, decimal, comment = "#", encoding = "utf-8"  # default: found by looking
-             rows = "data"       # json key, HDF5 group or MAT struct ("a.b") that holds the signals
+             rows = "data"       # json key, HDF5 group, MAT struct ("a.b"), sheet, or group of
+                                 # channels (TDMS, MDF), topic or message that holds the signals
     [signals] a column number counts from 0; column = gain * signal + offset, the offset in the
              column's unit; gain = "80 V/m" beside the column's unit = "V", or a number: see
              workbench/cards/sensors.py; bits = 16, signed = true reads a column logged as
@@ -37,7 +39,7 @@ from workbench.cards.sensors import column_scale, parse_gain
 from workbench.cards.units import Motion, Scale, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
-Format = Literal["csv", "parquet", "mat", "hdf5", "json"]
+Format = Literal["csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel"]
 
 _NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
     "electro-pneumatic": ("t", "y", "p_p", "p_n"),

@@ -18,7 +18,10 @@ from identification.signals.clean import Prepared, Repaired, applied_force, chec
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card, SignalSpec
 from workbench.files import ABSURD
-from workbench.logs.tables import damaged, read_table
+from workbench.logs.clocks import on_one_clock
+from workbench.logs.table import Table, damaged
+from workbench.logs.tables import read_table
+from workbench.logs.times import seconds
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
@@ -37,6 +40,15 @@ class Fingerprint:
         return asdict(self)
 
 
+@dataclass(frozen=True)
+class _Raw:
+    """Signals as they stand in a file, the number of their first row, and what was done to them."""
+
+    log: Log
+    first_row: int
+    remarks: tuple[str, ...]
+
+
 def read_log(path: Path, card: Card) -> Log:
     """The run in the file, in SI, on its own clock, checked; `F` is the applied force F_e.
 
@@ -44,31 +56,32 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw, first_row = _read_signals(path, card)
-    log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
-    check(log, card.rig(path.name), first_row)
+    raw = _read_signals(path, card)
+    log = _with_force(_repaired(raw, path, card).log, path, card)
+    check(log, card.rig(path.name), raw.first_row)
     return log
 
 
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
-    raw, first_row = _read_signals(path, card)
-    repaired = _repaired(raw, first_row, path, card)
+    raw = _read_signals(path, card)
+    first_row, read = raw.first_row, raw.remarks
+    repaired = _repaired(raw, path, card)
     del raw  # of a long log a gigabyte
     rig = card.rig(path.name)
     if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
     prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
-    remarks = (*repaired.remarks, *thin.remarks, *prepared.remarks)
+    remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     return Prepared(
         prepared.runs, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
     )  # fmt: skip
 
 
-def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:
-    return repair(raw, first_row, rotary=card.rig(path.name).motion == "rotary")
+def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:
+    return repair(raw.log, raw.first_row, rotary=card.rig(path.name).motion == "rotary")
 
 
 def fingerprint(path: Path, log: Log) -> Fingerprint:
@@ -93,26 +106,52 @@ def _with_force(log: Log, path: Path, card: Card) -> Log:
     return log.with_signals(F=F)
 
 
-def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
-    """The card's signals in SI as they stand in the file, and the number of the first row."""
+def _read_signals(path: Path, card: Card) -> _Raw:
+    """The card's signals in SI as they stand in the file, on the clock of `t`."""
     if not card.signals:
         raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
     table = read_table(path, card.file)
-    signals = {}
+    signals, groups = dict[str, Array](), dict[str, str]()
     for name, spec in card.signals.items():
-        where = f"{path}, signals.{name}"
-        try:
-            raw = table.column(spec.column, where)
-        except BadLog:
-            raise
-        except Exception as error:  # columns are read late, so damage may show only here
-            raise damaged(path, card.file.format or "data", error) from error
-        numbers = _numbers(raw, f"{path}: column {spec.column!r}", table.first_row)
-        with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
-            signals[name] = _to_si(numbers, name, spec, card, path)
+        number = table.number(spec.column, f"{path}, signals.{name}")
+        signals[name] = _signal(table, number, name, card, path)
         _refuse_absurd(signals[name], name, path, table.first_row)
-        signals[name] = frozen(signals[name])
-    return Log(shown_name(path), _same_length(signals, path)), table.first_row
+        if table.groups:
+            groups[name] = table.groups[number]
+    if not groups:
+        same = _same_length(signals, path)
+        return _Raw(Log(shown_name(path), same), table.first_row, ())
+
+    def clock(group: str) -> Array:
+        wanted = table.names[table.number(card.signals["t"].column, f"{path}, signals.t")]
+        number = table.number(f"{group}/{wanted}", f"{path}, the clock of group {group!r}")
+        return _signal(table, number, "t", card, path)
+
+    found = on_one_clock(signals, groups, clock, shown_name(path))
+    log = Log(shown_name(path), _same_length(found.signals, path))
+    return _Raw(log, table.first_row + found.first, found.remarks)
+
+
+def _signal(table: Table, number: int, name: str, card: Card, path: Path) -> Array:
+    """A column of the table in SI, as the signal `name` of the card."""
+    spec = card.signals[name]
+    try:
+        raw = table.fetch(number)
+    except BadLog:
+        raise
+    except Exception as error:  # columns are read late, so damage may show only here
+        raise damaged(path, card.file.format or "data", error) from error
+    where = f"{path}: column {spec.column!r}"
+    numbers = seconds(raw, where, table.first_row) if name == "t" else None
+    if numbers is None:
+        numbers = _numbers(raw, where, table.first_row)
+    elif spec.unit != "s":
+        raise BadLog(
+            f"{where} holds times of day, dates or durations, which are read in seconds; write"
+            f' unit = "s" for signals.t, not {spec.unit!r}'
+        )
+    with np.errstate(over="ignore", invalid="ignore"):  # infinite values are refused later
+        return frozen(_to_si(numbers, name, spec, card, path))
 
 
 def _numbers(raw: NDArray[Any], where: str, first_row: int) -> Array:

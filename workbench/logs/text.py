@@ -13,32 +13,25 @@ from numpy.typing import NDArray
 from identification.errors import BadLog
 from workbench.cards.card import FileSpec
 from workbench.files import refuse_larger
+from workbench.logs.layout import Layout, find_layout, is_number
+from workbench.logs.table import Table
 
-_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 _DELIMITERS = (";", "\t", ",", " ", "|")
+_COMPARED = 40  # lines of which the delimiter is told
+_END = "EOF"  # the last line of some scopes'
 MANY = 10  # rows of a wrong length that make the header suspect instead
 TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
-_LOOK = 65536  # characters looked at to find the layout
+_LOOK = 262_144  # characters looked at to find the layout
 
 
 @dataclass(frozen=True)
-class TextTable:
-    """Columns of a text file, as `tables.Table` has them."""
-
-    names: tuple[str, ...]
-    fetch: Callable[[int], NDArray[Any]]
-    first_row: int
-    headed: bool
-
-
-@dataclass(frozen=True)
-class _Layout:
+class _Marks:
     delimiter: str
     decimal: str
 
 
-def read_text_table(path: Path, spec: FileSpec) -> TextTable:
+def read_text_table(path: Path, spec: FileSpec) -> Table:
     """The columns of a text file, its layout as the card says, else as the file looks.
 
     Raises BadLog where the file is not text, has no rows, or a row has the wrong number of fields.
@@ -52,23 +45,34 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
     lines = lines[start:] if len(text) <= _LOOK else lines[start:-1]
     if not lines:
         raise BadLog(f"{path}: no rows after line {start}; check skip_rows in the card")
-    layout = _layout([line for line in lines[1:40] if not _skipped(line, spec.comment)], spec)
-    if spec.header is None:
-        _check_first_line(path, lines, layout, spec)
-    first = _split(lines[0], layout)
-    headed = spec.header if spec.header is not None else not all(map(_is_number, first))
-    names = tuple(first) if headed else tuple(str(k) for k in range(len(first)))
-    body = _body(text, start + int(headed), spec, layout)
+    looked = [line for line in lines[1:] if not _skipped(line, spec.comment)]
+    marks = _marks(looked[-_COMPARED:], spec)
+    fields = [[] if _skipped(line, spec.comment) else _split(line, marks) for line in lines]
+    found = find_layout(fields) if spec.header is None else None
+    if found is None:
+        found = _first_line_layout(path, lines, fields, spec)
+    names = found.names or tuple(str(k) for k in range(len(fields[found.data])))
+    body = _body(text, start + found.data, spec, marks)
     if not body.strip():
         raise BadLog(
             f"{path}: no rows below the header {lines[0].strip()[:40]!r}; log some data, or check"
             " that it is the right file"
         )
-    first_row = start + int(headed) + 1
+    first_row = start + found.data + 1
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
-    columns = _parse(path, content, layout, len(names), first_row)
-    return TextTable(names, columns, first_row, headed)
+    columns = _parse(path, content, marks, len(names), first_row)
+    return Table(names, columns, first_row, bool(found.names), found.groups)
+
+
+def _first_line_layout(
+    path: Path, lines: list[str], fields: list[list[str]], spec: FileSpec
+) -> Layout:
+    """The header in the first line, as the card says or because nothing shows where it is."""
+    if spec.header is None:
+        _check_first_line(path, lines, fields, spec)
+    headed = spec.header if spec.header is not None else not all(map(is_number, fields[0]))
+    return Layout(tuple(fields[0]) if headed else (), int(headed))
 
 
 def _decode(path: Path, encoding: str) -> str:
@@ -93,17 +97,18 @@ def _decode(path: Path, encoding: str) -> str:
     return text.removeprefix("\ufeff")
 
 
-def _check_first_line(path: Path, lines: list[str], layout: _Layout, spec: FileSpec) -> None:
+def _check_first_line(
+    path: Path, lines: list[str], fields: list[list[str]], spec: FileSpec
+) -> None:
     """Raises BadLog where the first line cannot be a header, since the rows have more fields."""
-    looked = [line for line in lines[:40] if not _skipped(line, spec.comment)]
-    widths = [len(_split(line, layout)) for line in looked[1:]]
+    widths = [len(line) for line in fields[1:_COMPARED] if line]
     width = max(set(widths), key=widths.count) if widths else 0
-    if len(_split(lines[0], layout)) > 1 or width < 2 or 2 * widths.count(width) < len(widths):
+    if len(fields[0]) > 1 or width < 2 or 2 * widths.count(width) < len(widths):
         return
-    header = next(line for line in looked[1:] if len(_split(line, layout)) == width)
+    header = next(k for k, line in enumerate(fields) if k and len(line) == width)
     raise BadLog(
         f"{path}: line {spec.skip_rows + 1} ({lines[0].strip()[:40]!r}) is no header of the"
-        f" {width} columns below; set skip_rows = {spec.skip_rows + lines.index(header)} in the"
+        f" {width} columns below; set skip_rows = {spec.skip_rows + header} in the"
         " card's [file], or comment to the sign with which such lines begin"
     )
 
@@ -112,40 +117,36 @@ def _skipped(line: str, comment: str) -> bool:
     return not line.strip() or bool(comment and line.lstrip().startswith(comment))
 
 
-def _layout(lines: list[str], spec: FileSpec) -> _Layout:
+def _marks(lines: list[str], spec: FileSpec) -> _Marks:
     """The delimiter that makes most fields numbers in lines of equal length, and the decimal."""
     best, most = ",", -1.0
     for delimiter in (spec.delimiter,) if spec.delimiter else _DELIMITERS:
-        rows = [_split(line, _Layout(delimiter, ".")) for line in lines]
+        rows = [_split(line, _Marks(delimiter, ".")) for line in lines]
         widths = [len(row) for row in rows]
         if not widths or max(widths) == 1:
             continue
         width = max(set(widths), key=widths.count)
         fields = [field for row in rows for field in row]
-        share = sum(map(_is_number, fields)) / len(fields) + widths.count(width) / len(widths)
+        share = sum(map(is_number, fields)) / len(fields) + widths.count(width) / len(widths)
         if share > most:
             best, most = delimiter, share
     best = spec.delimiter or best
-    fields = [field for line in lines for field in _split(line, _Layout(best, "."))]
+    fields = [field for line in lines for field in _split(line, _Marks(best, "."))]
     # Between commas only a quoted field can hold one; "1,000.5" is no decimal comma.
     comma = any(map(_DECIMAL_COMMA.fullmatch, fields)) and not (
         best == "," and any("." in field for field in fields)
     )
-    return _Layout(best, spec.decimal or ("," if comma else "."))
+    return _Marks(best, spec.decimal or ("," if comma else "."))
 
 
-def _split(line: str, layout: _Layout) -> list[str]:
-    if layout.delimiter == " ":
+def _split(line: str, marks: _Marks) -> list[str]:
+    if marks.delimiter == " ":
         return line.split()
-    fields = next(csv.reader([line.rstrip("\r\n")], delimiter=layout.delimiter), [])
+    fields = next(csv.reader([line.rstrip("\r\n")], delimiter=marks.delimiter), [])
     return [field.strip() for field in fields]
 
 
-def _is_number(field: str) -> bool:
-    return not field or _NUMBER.fullmatch(field) is not None
-
-
-def _body(text: str, start: int, spec: FileSpec, layout: _Layout) -> str:
+def _body(text: str, start: int, spec: FileSpec, marks: _Marks) -> str:
     """The rows' text from line `start`, comments left out, one delimiter between fields."""
     at = 0
     for _ in range(start):
@@ -153,16 +154,18 @@ def _body(text: str, start: int, spec: FileSpec, layout: _Layout) -> str:
         if at == 0:
             return ""
     body = text[at:]
+    if body.endswith((_END, _END + "\n", _END + "\r\n")):
+        body = body.rstrip().removesuffix(_END)
     if spec.comment and spec.comment in body:
         kept = (line for line in body.splitlines() if not line.lstrip().startswith(spec.comment))
         body = "\n".join(kept)
-    if layout.delimiter == " ":
+    if marks.delimiter == " ":
         body = "\n".join(" ".join(line.split()) for line in body.splitlines())
     return body
 
 
 def _parse(
-    path: Path, content: bytes, layout: _Layout, width: int, first_row: int
+    path: Path, content: bytes, marks: _Marks, width: int, first_row: int
 ) -> Callable[[int], NDArray[Any]]:
     import pyarrow as pa
     from pyarrow import csv as arrow
@@ -174,13 +177,13 @@ def _parse(
         return "skip"
 
     names = [str(k) for k in range(width)]
-    parse = arrow.ParseOptions(delimiter=layout.delimiter, invalid_row_handler=note)
+    parse = arrow.ParseOptions(delimiter=marks.delimiter, invalid_row_handler=note)
     read = arrow.ReadOptions(column_names=names, use_threads=False)
 
     def load(kind: Any, wanted: list[str]) -> Any:
         convert = arrow.ConvertOptions(
             column_types=dict.fromkeys(names, kind),
-            decimal_point=layout.decimal,
+            decimal_point=marks.decimal,
             include_columns=wanted,
         )
         found = arrow.read_csv(pa.BufferReader(content), read, parse, convert)
@@ -190,7 +193,7 @@ def _parse(
             advice = "correct or remove it"
             if len(wrong) > MANY and fields == width + 1:
                 advice = "the header has one name too few for the rows; add it"
-            elif len(wrong) > MANY and fields > width and layout.delimiter == ",":
+            elif len(wrong) > MANY and fields > width and marks.delimiter == ",":
                 advice = "if the numbers have decimal commas, export with ';' between the columns"
             raise BadLog(
                 f"{path}: row {first_row + row - 1} has {fields} fields, {width} needed{more};"
@@ -210,7 +213,7 @@ def _parse(
             return np.asarray(load(pa.float64(), [names[number]]).column(0).to_numpy())
         except pa.ArrowInvalid:
             column = load(pa.string(), [names[number]]).column(0).to_pylist()
-        if layout.decimal == ",":
+        if marks.decimal == ",":
             column = [None if value is None else value.replace(",", ".") for value in column]
         return np.asarray(column, dtype=object)
 

@@ -1,0 +1,125 @@
+"""Signals of several groups of one file, each on its own clock, brought to the clock of one."""
+
+from collections.abc import Callable, Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog
+from identification.signals.clean import LONGEST_GAP, at_times
+
+_MEASURED = ("y", "F", "p_p", "p_n")
+_SLOWEST = 1.5  # times the clock's period that a measured signal's may be
+
+Clock = Callable[[str], Array]
+
+
+class OneClock(NamedTuple):
+    """Signals on the clock of `t`, the first row of it that is kept, and what was done in words."""
+
+    signals: dict[str, Array]
+    first: int
+    remarks: tuple[str, ...]
+
+
+def on_one_clock(
+    signals: Mapping[str, Array], groups: Mapping[str, str], clock: Clock, where: str
+) -> OneClock:
+    """The signals on the clock of the group of `t`, where all groups have samples.
+
+    groups: the group of each signal; clock: the times [s] of a group. A group of the same times
+    passes as it is. Of any other a command is held and the rest interpolated as for an uneven
+    clock; nothing is made up across its gaps and missing samples. Raises BadLog where a clock goes
+    back, where groups have no time in common, and where a measured signal is slower than the clock.
+    """
+    base, own = signals["t"], groups["t"]
+    kept = np.isfinite(base)
+    _check(f"{where}, signals.t", base[kept])
+    h = _period(base)
+    every, remarks = dict(signals), list[str]()
+    members = _members(signals, groups)
+    for group in members:
+        times = clock(group)
+        if _same(times, base):
+            continue
+        known = np.isfinite(times)
+        _check(f"{where}, the clock of group {group!r}", times[known])
+        period = _period(times)
+        for name in members[group]:
+            if name in _MEASURED and period > _SLOWEST * h:
+                raise BadLog(_too_slow(where, name, group, period, h))
+            if len(signals[name]) != len(times):
+                raise BadLog(_unequal(where, name, group, len(signals[name]), len(times)))
+            every[name] = _moved(name, times[known], signals[name][known], base, h)
+        kept[kept] &= (base[kept] >= times[known][0]) & (base[kept] <= times[known][-1] + period)
+        remarks.append(
+            f"{where}: signals of group {group!r} (every {period:.4g} s) are brought to the clock"
+            f" of {own!r} (every {h:.4g} s)"
+        )
+    if np.count_nonzero(kept) < 2:
+        raise BadLog(
+            f"{where}: the groups {', '.join(map(repr, (own, *members)))} have no time in common;"
+            " name columns of one recording"
+        )
+    first, last = (int(np.flatnonzero(kept)[k]) for k in (0, -1))
+    parts = {name: values[first : last + 1] for name, values in every.items()}
+    return OneClock(parts, first, tuple(remarks))
+
+
+def _members(signals: Mapping[str, Array], groups: Mapping[str, str]) -> dict[str, list[str]]:
+    """The signals of each group but that of `t`."""
+    out: dict[str, list[str]] = {}
+    for name in signals:
+        if groups[name] != groups["t"]:
+            out.setdefault(groups[name], []).append(name)
+    return out
+
+
+def _same(times: Array, base: Array) -> bool:
+    return times.shape == base.shape and bool(np.array_equal(times, base, equal_nan=True))
+
+
+def _period(times: Array) -> float:
+    return float(np.median(np.diff(times[np.isfinite(times)])))
+
+
+def _check(where: str, times: Array) -> None:
+    if len(times) < 2:
+        raise BadLog(f"{where}: has {len(times)} samples; name columns of another group")
+    back = np.flatnonzero(np.diff(times) < 0)
+    if back.size:
+        raise BadLog(f"{where}: goes back at {times[back[0]]:.6g} s; log one continuous run a file")
+
+
+def _too_slow(where: str, name: str, group: str, period: float, h: float) -> str:
+    return (
+        f"{where}: signals.{name} is sampled every {period:.4g} s, signals.t every {h:.4g} s; a"
+        f" measured signal is not made faster: take signals.t from the group {group!r}, or log both"
+        " at one rate"
+    )
+
+
+def _unequal(where: str, name: str, group: str, values: int, times: int) -> str:
+    return (
+        f"{where}: signals.{name} has {values} samples, the clock of its group {group!r} {times};"
+        " name another column"
+    )
+
+
+def _moved(name: str, times: Array, values: Array, base: Array, h: float) -> Array:
+    """Values at the times `base`; NaN where they are not known on both sides."""
+    single = np.append(np.diff(times) > 0, True)  # of several samples at one time the last counts
+    times, values = times[single], values[single]
+    known = np.isfinite(values)
+    out = np.full(base.shape, np.nan)
+    if np.count_nonzero(known) < 2:
+        return out
+    told = np.isfinite(base)
+    out[told] = at_times(name, times[known], values[known], base[told], h)
+    if name == "u":
+        return out
+    after = np.clip(np.searchsorted(times, base), 1, len(times) - 1)
+    gap = times[after] - times[after - 1] > LONGEST_GAP * _period(times)
+    missing = ~known[after] | ~known[after - 1]
+    return np.where(gap | missing, np.nan, out)

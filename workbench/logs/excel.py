@@ -1,0 +1,79 @@
+"""Excel and OpenDocument workbooks, read by calamine; macros and formulas are never run."""
+
+import zipfile
+from datetime import date, time, timedelta
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.errors import BadLog
+from workbench.cards.card import FileSpec
+from workbench.cards.nearest import nearest
+from workbench.files import refuse_larger
+from workbench.logs.channels import optional
+from workbench.logs.layout import Layout, find_layout
+from workbench.logs.table import RawColumn, Table, refuse_long
+
+_BOOK_BYTES = 100_000_000
+_UNPACKED = 1_000_000_000  # of the sheets in it
+_LOOKED_AT = 200  # rows in which the header is looked for
+
+
+def read_excel(path: Path, spec: FileSpec) -> Table:
+    """The sheet `spec.rows`, by default the first; its header below whatever stands above it."""
+    refuse_larger(path, _BOOK_BYTES, "a workbook", BadLog)
+    library = optional("python_calamine", "excel", path)
+    _refuse_unpacked(path)
+    with library.load_workbook(str(path)) as book:
+        names = [str(name) for name in book.sheet_names]
+        wanted = spec.rows if spec.rows is not None else names[0]
+        if wanted not in names:
+            raise BadLog(f"{path}: no sheet {wanted!r}{nearest(wanted, names)}")
+        rows = book.get_sheet_by_name(wanted).to_python(skip_empty_area=False)
+    while rows and not _shown(rows[-1]):
+        rows.pop()
+    refuse_long(path, len(rows))
+    shown = [_shown(row) for row in rows[spec.skip_rows : spec.skip_rows + _LOOKED_AT]]
+    found = find_layout(shown) if spec.header is None else None
+    if found is None:
+        titles = tuple(shown[0]) if shown and spec.header is not False else ()
+        found = Layout(titles, int(bool(titles)))
+    first = spec.skip_rows + found.data
+    if first >= len(rows):
+        raise BadLog(f"{path}: sheet {wanted!r} has no rows of data; name the right one in [file]")
+    names = list(found.names or map(str, range(len(rows[first]))))
+    return Table(
+        tuple(names),
+        lambda number: _column(rows[first:], number),
+        first + 1,
+        bool(found.names),
+        found.groups,
+    )
+
+
+def _refuse_unpacked(path: Path) -> None:
+    if not zipfile.is_zipfile(path):  # an old workbook
+        return
+    with zipfile.ZipFile(path) as archive:
+        size = sum(entry.file_size for entry in archive.infolist())
+    if size > _UNPACKED:
+        raise BadLog(
+            f"{path}: unpacks to {size / 1e6:.4g} MB, at most {_UNPACKED / 1e6:g} are read; save"
+            " its sheet as CSV"
+        )
+
+
+def _shown(row: list[Any]) -> list[str]:
+    """The cells as texts, empty ones at the end left out."""
+    texts = ["" if cell is None else str(cell).strip() for cell in row]
+    while texts and not texts[-1]:
+        texts.pop()
+    return texts
+
+
+def _column(rows: list[list[Any]], number: int) -> RawColumn:
+    cells = [row[number] if number < len(row) else None for row in rows]
+    if any(isinstance(cell, str | date | time | timedelta) and cell != "" for cell in cells):
+        return np.asarray(cells, dtype=object)
+    return np.asarray([np.nan if cell in ("", None) else float(cell) for cell in cells])

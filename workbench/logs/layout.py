@@ -1,0 +1,129 @@
+"""Where the header and the data of a table lie, below whatever a program writes before them.
+
+Scopes of PLCs and drives, data loggers and spreadsheets put lines of their own above the names:
+"key;value" lines, comments, a row of units or of types. A line is a list of its fields here.
+"""
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workbench.logs.times import is_time
+
+NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?|nan", re.I)
+
+_IN_A_ROW = 3  # lines of data that show where it begins
+_DATA_SHARE = 0.5  # of a line's fields above which numbers and times make it a line of data
+_UNITS = re.compile(
+    r"[\[(<].{0,20}[\])>]|[mµun]?[sm]|min|h|cm|km|inch?|deg|°|m?rad|rev|inc|"
+    r"(?:[mkM]?(?:Pa|bar|N|V|A|W|g|Hz)|hPa|psi|[mk]?N ?m|lbf?|kgf)|%|-|1|"
+    r"(?:[mµ]?m|deg|rad|rev|inc|°|U)/(?:s|min)(?:\^?2|²)?|rpm|1/min|min-1|°?[CFK]|"
+    r"(?:L?REAL|FLOAT|DOUBLE|U?[SDL]?INT|BOOL|BIT|BYTE|D?WORD|TIME)(?:8|16|32|64)?|"
+    r"double|float|int(?:8|16|32|64)?|seconds?|volts?"
+)
+_SCOPE_NAME = "name"
+_SCOPE_ROWS = 3  # of a block of keys, at least
+_SCOPE_TIME = "Time"
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Names of the columns, none where there is no header, and the first line of data, from 0.
+
+    `groups` names the group of each column where several columns are times, each of those that
+    follow it.
+    """
+
+    names: tuple[str, ...]
+    data: int
+    groups: tuple[str, ...] = ()
+
+
+def find_layout(lines: Sequence[Sequence[str]]) -> Layout | None:
+    """Where header and data lie in these first lines of a file; None where that is not clear.
+
+    Empty lists are lines to be skipped. A header is the last line of as many fields as the data
+    have, above a row of units or types if there is one; or the row "Name" of a block in which
+    each line begins with a key, as TwinCAT's Scope writes.
+    """
+    width = _width(lines)
+    first = _first_data(lines, width)
+    if first is None:
+        return None
+    above = [line for line in lines[:first] if line]
+    if not above:
+        return Layout((), first)
+    block = list[Sequence[str]]()
+    for line in reversed(above):
+        if not 1 < len(line) <= width or _is_data(line, width):
+            break
+        block.insert(0, line)
+    scope = _scope(block, width)
+    if scope is not None:
+        return Layout(scope[0], first, scope[1])
+    whole = [line for line in block if len(line) == width]
+    if not whole or whole[-1] is not block[-1]:
+        return None
+    while len(whole) > 1 and _is_units(whole[-1]):
+        whole.pop()
+    return Layout(tuple(whole[-1]), first)
+
+
+def is_number(field: str) -> bool:
+    """Whether the field is empty or a number, with a point or a comma."""
+    return not field or NUMBER.fullmatch(field) is not None
+
+
+def _width(lines: Sequence[Sequence[str]]) -> int:
+    """Fields of a line of data: the most frequent number among the last lines."""
+    counted = Counter(len(line) for line in lines[len(lines) // 2 :] if line)
+    return counted.most_common(1)[0][0] if counted else 0
+
+
+def _first_data(lines: Sequence[Sequence[str]], width: int) -> int | None:
+    kept = [k for k, line in enumerate(lines) if line]
+    for at in range(len(kept)):
+        if all(_is_data(lines[j], width) for j in kept[at : at + _IN_A_ROW]):
+            while at and len(lines[kept[at - 1]]) == width and not any(lines[kept[at - 1]]):
+                at -= 1  # a row of empty fields is one of missing samples
+            return kept[at]
+    return None
+
+
+def _is_data(line: Sequence[str], width: int) -> bool:
+    if len(line) != width:
+        return False
+    told = [field for field in line if field]
+    known = sum(is_number(field) or is_time(field) for field in told)
+    first = is_number(line[0]) or is_time(line[0])  # where other lines have a key
+    return first and known > _DATA_SHARE * len(told)
+
+
+def _is_units(line: Sequence[str]) -> bool:
+    told = [field for field in line if field]
+    return 2 * len(told) >= len(line) and all(_UNITS.fullmatch(field) for field in told)
+
+
+def _scope(
+    block: Sequence[Sequence[str]], width: int
+) -> tuple[tuple[str, ...], tuple[str, ...]] | None:
+    """Names and groups of a block of keys; None where it is none.
+
+    A key stands at the place of each column of times, the values of the channels behind it.
+    """
+    rows = [k for k, line in enumerate(block) if line[0].lower() == _SCOPE_NAME]
+    if not rows or len(block) - rows[-1] < _SCOPE_ROWS:
+        return None
+    named = [*block[rows[-1]], *[""] * (width - len(block[rows[-1]]))]
+    times = [k for k, field in enumerate(named) if field == named[0]]
+    keys = {line[0] for line in block[rows[-1] :]}
+    if len(keys) < len(block) - rows[-1] or (len(named) > 1 and 1 in times):
+        return None
+    names, groups = list[str](), list[str]()
+    for k, field in enumerate(named):
+        if k in times:
+            group = named[k + 1] if k + 1 < width else ""
+        names.append(_SCOPE_TIME if k in times else field)
+        groups.append(group)
+    return tuple(names), tuple(groups) if len(times) > 1 else ()

@@ -1,0 +1,102 @@
+"""A file as named columns, which its reader hands out one by one."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from identification.errors import BadLog
+from workbench.cards.nearest import nearest
+
+RawColumn = NDArray[Any]
+
+MOST_ROWS = 20_000_000
+"""Rows of which a gigabyte of signals can be made."""
+
+BINARY_BYTES = 1_000_000_000
+"""Size above which a binary log is not read."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of a file: their names, a function that reads one by number, the first row's number.
+
+    `headed` is false where the file gives no names: then columns go by number alone. `groups`
+    names the group of each column where a file holds several, each with a clock of its own; a
+    column then also goes by "group/name".
+    """
+
+    names: tuple[str, ...]
+    fetch: Callable[[int], RawColumn]
+    first_row: int = 1
+    headed: bool = True
+    groups: tuple[str, ...] = ()
+
+    def column(self, key: str | int, where: str) -> RawColumn:
+        """The column named or numbered `key`; raises BadLog with the nearest name."""
+        return self.fetch(self.number(key, where))
+
+    def number(self, key: str | int, where: str) -> int:
+        """The number from 0 of the column named or numbered `key`; raises BadLog as `column`."""
+        count = len(self.names)
+        if isinstance(key, int):
+            if not 0 <= key < count:
+                raise BadLog(
+                    f"{where}: no column {key}, there are {count} (0 to {count - 1}, counted "
+                    "from 0); correct it in the card"
+                )
+            return key
+        if not self.headed:
+            raise BadLog(
+                f"{where}: no column {key!r}, the file has no header; "
+                f"name the column by its number (0 to {count - 1}) in the card"
+            )
+        full = self.full_names()
+        found = _places(key, full) or _places(key, self.names)
+        if not found:
+            known = full if len(set(self.groups)) > 1 else self.names
+            raise BadLog(f"{where}: no column {key!r}{nearest(key, known)}")
+        if len(found) > 1:
+            raise BadLog(f"{where}: {self._ambiguous(key, found)}")
+        return found[0]
+
+    def full_names(self) -> tuple[str, ...]:
+        """The names with their groups, where there are groups."""
+        if not self.groups:
+            return self.names
+        pairs = zip(self.groups, self.names, strict=True)
+        return tuple(f"{group}/{name}" for group, name in pairs)
+
+    def _ambiguous(self, key: str, found: Sequence[int]) -> str:
+        full = [self.full_names()[k] for k in found[:10]]
+        if len(set(full)) > 1:
+            return (
+                f"{len(found)} groups have a column {key!r}; name it with its group in the card:"
+                f" {' or '.join(map(repr, full))}"
+            )
+        which = " and ".join(str(k) for k in found)
+        return (
+            f"columns {which} (counted from 0) are all named {key!r}; name the right one by its"
+            " number in the card"
+        )
+
+
+def refuse_long(path: Path, rows: int) -> None:
+    """Raises BadLog where the file has more rows than are read."""
+    if rows > MOST_ROWS:
+        raise BadLog(
+            f"{path}: has {rows} rows, at most {MOST_ROWS} are read; cut the log, or keep every"
+            " tenth row"
+        )
+
+
+def damaged(path: Path, form: str, error: Exception) -> BadLog:
+    """The one-line error for a file on which its reader failed."""
+    text = " ".join(str(error).split())[:120] or type(error).__name__
+    return BadLog(f"{path}: damaged or cut off, not a whole {form} file ({text}); copy it again")
+
+
+def _places(key: str, names: Sequence[str]) -> list[int]:
+    return [k for k, name in enumerate(names) if name == key]

@@ -1,0 +1,121 @@
+"""Times written as durations, clock times or dates, as seconds."""
+
+import re
+from datetime import date, datetime, time, timedelta
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog
+from workbench.logs.table import RawColumn
+
+_PER_SECOND = {
+    **{"s": 1.0, "sec": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "hr": 3600.0},
+    **{"day": 86400.0, "days": 86400.0},
+}
+_DURATION = re.compile(rf"([+-]?\d+(?:[.,]\d+)?(?:[eE][+-]?\d+)?) ?({'|'.join(_PER_SECOND)})")
+_OF_DAY = r"(\d{1,3}):(\d\d)(?::(\d\d)(?:[.,:](\d{1,9}))?)?"
+_DATE = r"\d{4}-\d\d-\d\d|\d{1,2}\.\d{1,2}\.\d{4}|\d{1,2}-[A-Z][a-z]{2}-\d{4}|\d{4}/\d\d?/\d\d?"
+_MOMENT = re.compile(rf"(?:({_DATE})[T ,;]\s*)?{_OF_DAY}(?:Z|[+-]\d\d:\d\d)?")
+_DATES = ("%Y-%m-%d", "%d.%m.%Y", "%d-%b-%Y", "%Y/%m/%d")
+_DAY = 86400.0
+
+
+def is_time(field: str) -> bool:
+    """Whether the text is a duration with its unit, a clock time, or a date with one."""
+    return bool(_DURATION.fullmatch(field) or _MOMENT.fullmatch(field))
+
+
+def seconds(raw: RawColumn, where: str, first_row: int) -> Array | None:
+    """Times of a column in s, missing ones as NaN; None where its first is a plain number.
+
+    Durations are as written, dates and clock times since midnight of the first day. Raises BadLog
+    naming the row of the first cell that is not of the first one's kind.
+    """
+    if raw.dtype.kind == "m":
+        return _spans(raw)
+    if raw.dtype.kind == "M":
+        moments = raw.astype("datetime64[ns]")
+        told = moments[~np.isnat(moments)]
+        return _spans(moments - told[0].astype("datetime64[D]")) if told.size else None
+    if raw.dtype.kind not in "OUS":
+        return None
+    first = next((value for value in raw if not _is_empty(value)), None)
+    if not isinstance(first, datetime | date | time | timedelta) and not (
+        isinstance(first, str) and is_time(first.strip())
+    ):
+        return None
+    out = np.full(len(raw), np.nan)
+    begun: date | None = None
+    for row, value in enumerate(raw):
+        if _is_empty(value):
+            continue
+        read = _moment(value)
+        if read is None:
+            raise BadLog(
+                f"{where}, row {first_row + row}: {str(value)[:40]!r} is no time as the first cell"
+                f" is ({str(first)[:40]!r}); correct it or leave the field empty"
+            )
+        day, out[row] = read
+        begun = begun or day
+        if day is not None and begun is not None:
+            out[row] += (day - begun).days * _DAY
+    return out if begun is not None else _over_midnight(out, first)
+
+
+def _is_empty(value: object) -> bool:
+    return value is None or value == "" or value != value
+
+
+def _spans(raw: RawColumn) -> Array:
+    out = raw.astype("timedelta64[ns]").astype(np.float64) * 1e-9
+    return np.where(np.isnat(raw), np.nan, out)
+
+
+def _moment(value: Any) -> tuple[date | None, float] | None:
+    """Day, if any, and seconds of it; None where the cell is no time."""
+    match value:
+        case datetime():
+            return value.date(), _of_day(value.time())
+        case time():
+            return None, _of_day(value)
+        case timedelta():
+            return None, value.total_seconds()
+        case str():
+            return _text_moment(value.strip())
+    return None
+
+
+def _text_moment(text: str) -> tuple[date | None, float] | None:
+    if found := _DURATION.fullmatch(text):
+        return None, float(found[1].replace(",", ".")) * _PER_SECOND[found[2]]
+    found = _MOMENT.fullmatch(text)
+    if found is None:
+        return None
+    day, hours, minutes, secs, part = found.groups()
+    total = 3600.0 * int(hours) + 60.0 * int(minutes) + float(f"{secs or 0}.{part or 0}")
+    return (_day(day) if day else None), total
+
+
+def _day(text: str) -> date | None:
+    for form in _DATES:
+        try:
+            return datetime.strptime(text, form).date()
+        except ValueError:
+            continue
+    return None
+
+
+def _of_day(moment: time) -> float:
+    return (
+        3600.0 * moment.hour + 60.0 * moment.minute + moment.second + 1e-6 * moment.microsecond
+    )  # fmt: skip
+
+
+def _over_midnight(times: Array, first: object) -> Array:
+    """Clock times without a date that begin anew at midnight, going on."""
+    if isinstance(first, timedelta) or (isinstance(first, str) and _DURATION.fullmatch(first)):
+        return times
+    days = np.cumsum(np.diff(times, prepend=times[:1]) < -0.5 * _DAY)
+    return times + _DAY * days
