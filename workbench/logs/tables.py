@@ -137,9 +137,9 @@ def _variables(root: Any) -> list[Any]:
 
 def _objects(path: Path) -> str:
     return (
-        f"{path}: holds a MATLAB object (a timetable or table), which only MATLAB reads; there, write it by"
-        " writetimetable(TT, 'log.csv'), or S = table2struct(timetable2table(TT), 'ToScalar', true)"
-        " with S.Time = seconds(S.Time) and save('log.mat', '-struct', 'S')"
+        f"{path}: holds a MATLAB object (a timetable or table), which only MATLAB reads; there,"
+        " write it by writetimetable(TT, 'log.csv'), or S = table2struct(timetable2table(TT),"
+        " 'ToScalar', true) with S.Time = seconds(S.Time) and save('log.mat', '-struct', 'S')"
     )
 
 

@@ -16,11 +16,12 @@ from identification.arrays import Array
 from tests.workbench.log_files import CARD, WRITERS, card, signals, write_csv, write_parquet
 from workbench.logs.runs import fingerprint, read_log, read_runs
 
+EXACT = sorted({*WRITERS} - {"a.xlsx"})  # whose numbers have 16 digits
 FINITE = st.floats(allow_nan=False, allow_infinity=False, width=64)
 
 
 @settings(max_examples=15)
-@given(values=arrays(np.float64, 120, elements=FINITE), name=st.sampled_from(sorted(WRITERS)))
+@given(values=arrays(np.float64, 120, elements=FINITE), name=st.sampled_from(EXACT))
 def test_every_format_round_trips_bit_for_bit(values: Array, name: str) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / name
@@ -29,10 +30,7 @@ def test_every_format_round_trips_bit_for_bit(values: Array, name: str) -> None:
         text = CARD + 'extra = { column = "extra", unit = "1" }\n'
         log = read_log(path, card(Path(folder), text))
         for key, expected in columns.items():
-            if name == "a.xlsx":  # which has 16 digits
-                np.testing.assert_allclose(log[key], expected, rtol=5e-16, atol=5e-324)
-            else:
-                assert np.array_equal(log[key], expected), key
+            assert np.array_equal(log[key], expected), key
 
 
 @pytest.mark.parametrize(
