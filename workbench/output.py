@@ -196,14 +196,18 @@ def emit(result: object, as_json: bool, table: Callable[[], object]) -> None:
     if as_json:
         click.echo(dumps(result))
         return
+    click.echo(as_text(table(), None if sys.stdout.isatty() else PIPED_WIDTH), nl=False)
+
+
+def as_text(shown: object, width: int | None = PIPED_WIDTH) -> str:
+    """A text, or anything rich can show, as a terminal of that width does; None: as this one."""
     from rich.console import Console
 
     # No markup: "[m/s]" is a unit here, not a style.
-    width = None if sys.stdout.isatty() else PIPED_WIDTH
     console = Console(markup=False, highlight=False, emoji=False, width=width)
-    with console.capture() as shown:
-        console.print(table())
-    click.echo(shown.get(), nl=False)
+    with console.capture() as captured:
+        console.print(shown)
+    return captured.get()
 
 
 @contextmanager

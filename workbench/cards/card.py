@@ -184,7 +184,13 @@ def load_card(path: Path, library: Library | None = None, *, with_recipe: bool =
     with_recipe False leaves its recipe out, as for a log that is there. Raises BadCard, one line:
     what was found, in which key, what is needed; an unknown key comes with the nearest right one.
     """
-    raw = _read_toml(path)
+    return card_from(_read_toml(path), path, library, with_recipe=with_recipe)
+
+
+def card_from(
+    raw: Mapping[str, Any], path: Path, library: Library | None = None, *, with_recipe: bool = True
+) -> Card:
+    """As `load_card`, of a card's tables; path: what messages call the card."""
     try:
         parsed = _CardFile.model_validate(raw)
         rigs = {"": parsed.rig.value()}

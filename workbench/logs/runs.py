@@ -56,7 +56,7 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw = _read_signals(path, card)
+    raw = _read_signals(_table(path, card), path, card)
     log = _with_force(_repaired(raw, path, card).log, path, card)
     check(log, card.rig(path.name), raw.first_row)
     return log
@@ -64,7 +64,12 @@ def read_log(path: Path, card: Card) -> Log:
 
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
-    raw = _read_signals(path, card)
+    return runs_of(_table(path, card), path, card)
+
+
+def runs_of(table: Table, path: Path, card: Card) -> Prepared:
+    """As `read_runs`, of a table; path: what the run and the messages are called by."""
+    raw = _read_signals(table, path, card)
     first_row, read = raw.first_row, raw.remarks
     repaired = _repaired(raw, path, card)
     del raw  # of a long log a gigabyte
@@ -106,11 +111,14 @@ def _with_force(log: Log, path: Path, card: Card) -> Log:
     return log.with_signals(F=F)
 
 
-def _read_signals(path: Path, card: Card) -> _Raw:
-    """The card's signals in SI as they stand in the file, on the clock of `t`."""
+def _table(path: Path, card: Card) -> Table:
     if not card.signals:
         raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
-    table = read_table(path, card.file)
+    return read_table(path, card.file)
+
+
+def _read_signals(table: Table, path: Path, card: Card) -> _Raw:
+    """The card's signals in SI as they stand in the table, on the clock of `t`."""
     signals, groups = dict[str, Array](), dict[str, str]()
     for name, spec in card.signals.items():
         number = table.number(spec.column, f"{path}, signals.{name}")

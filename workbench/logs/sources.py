@@ -11,7 +11,8 @@ from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.documents.plausible import log_remarks
 from workbench.logs.fetch import card_path, find_data
-from workbench.logs.runs import fingerprint, read_runs
+from workbench.logs.runs import fingerprint, read_runs, runs_of
+from workbench.logs.table import Table
 
 
 @dataclass(frozen=True)
@@ -36,25 +37,41 @@ class Sources:
     bad: tuple[BadSamples, ...] = ()
 
 
+@dataclass(frozen=True)
+class Recorded:
+    """A log that is no file: what it is called by, its columns, and a hash of them."""
+
+    name: str
+    table: Table
+    sha256: str
+
+
 def read_sources(names: Sequence[str], card_name: str) -> Sources:
     """The runs of the log files `names`, each a path or a file of the card's set.
 
     Raises BadCard, BadLog; also where the files are of different machines or one is named twice.
     """
-    card = load_card(card_path(card_name), with_recipe=False)
+    return sources_of(names, load_card(card_path(card_name), with_recipe=False))
+
+
+def sources_of(logs: Sequence[str | Recorded], card: Card) -> Sources:
+    """As `read_sources`, of a card that is read, and of logs that may be no files."""
     found: list[tuple[Path, Source]] = []
     remarks, bad = list[str](), list[BadSamples]()
     rigs: dict[Path, Rig] = {}
-    for name in names:
-        path = find_data(name, card)
-        whole = path.resolve()
+    for one in logs:
+        path = Path(one.name) if isinstance(one, Recorded) else find_data(one, card)
+        whole = path if isinstance(one, Recorded) else path.resolve()
         if whole in rigs:
             raise BadLog(f"{path.name}: given twice; name every log once")
         rigs[whole] = card.rig(path.name)
-        prepared = read_runs(path, card)
+        if isinstance(one, Recorded):
+            prepared = runs_of(one.table, path, card)
+        else:
+            prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)
-        found.extend((whole, _source(path, run)) for run in prepared.runs)
+        found.extend((whole, _source(one, path, run)) for run in prepared.runs)
     names_of = Counter(path.name for path in rigs)
     runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
@@ -68,7 +85,9 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 
 
-def _source(path: Path, run: Log) -> Source:
+def _source(log: str | Recorded, path: Path, run: Log) -> Source:
+    if isinstance(log, Recorded):
+        return Source(run, log.name, log.sha256, len(run))
     found = fingerprint(path, run)
     return Source(run, found.file, found.sha256, found.rows)
 

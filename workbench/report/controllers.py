@@ -1,5 +1,7 @@
 """Sections of a design: margins in a table, sensitivity functions, the linear step response."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from scipy.signal import lfilter
 
@@ -18,6 +20,9 @@ from workbench.report.figures import (
     style,
 )
 from workbench.report.page import Section, render
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def controllers(found: Design, rotary: bool = False) -> Section:
@@ -64,6 +69,17 @@ def sensitivity_section(found: Design, rotary: bool = False) -> Section:
 def step_response(found: Design) -> Section:
     """Linear step response of both loops, without Coulomb friction."""
     with style():
+        svg = inline(step_figure(found), "step", "linear step response of the closed loop")
+    caption = (
+        "Response of the linear loop. The machine has Coulomb friction too: workbench validate"
+        " shows the loop with it."
+    )
+    return Section("Step response", render("figure", svg=svg, caption=caption))
+
+
+def step_figure(found: Design) -> "Figure":
+    """The figure of `step_response`."""
+    with style():
         drawn = figure(9.0, 3.0)
         axes = drawn.subplots()
         for name, one in found.controllers.items():
@@ -72,12 +88,7 @@ def step_response(found: Design) -> Section:
         axes.axhline(1.0, color=OTHER, ls=":", lw=1.0)
         label(axes, "time [s]", "position / step [-]")
         axes.legend(loc="lower right")
-        svg = inline(drawn, "step", "linear step response of the closed loop")
-    caption = (
-        "Response of the linear loop. The machine has Coulomb friction too: workbench validate"
-        " shows the loop with it."
-    )
-    return Section("Step response", render("figure", svg=svg, caption=caption))
+    return drawn
 
 
 def linear_step(found: Design, one: Controller) -> tuple[Array, Array]:

@@ -84,7 +84,7 @@ def polynomial_lines(found: Design) -> list[str]:
     ]
 
 
-def design_view(found: Design, folder: Path, rotary: bool = False) -> "Group":
+def design_view(found: Design, folder: Path | None, rotary: bool = False) -> "Group":
     """The design for a terminal."""
     from rich.console import Group
 
@@ -92,5 +92,5 @@ def design_view(found: Design, folder: Path, rotary: bool = False) -> "Group":
     return Group(
         table(DESIGN_HEAD, margin_rows(found)),
         *lines,
-        written(folder, "design.json", "report.html"),
+        *([] if folder is None else [written(folder, "design.json", "report.html")]),
     )

@@ -18,6 +18,7 @@ from workbench.steps.drift import Drifted, Tested
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 LINEAR_UP_TO = 1.0  # statistic over threshold up to which the axis is linear
 
@@ -38,12 +39,19 @@ def drift_report(found: Drifted) -> str:
 
 def _pictures(found: Drifted, last: Tested) -> Section:
     with style():
+        drawn = drift_figure(found, last)
+        html = inline(drawn, "drift", "Parameters before and after, and the statistic over logs")
+    return Section("Before and after, and over the logs", html)
+
+
+def drift_figure(found: Drifted, last: Tested) -> "Figure":
+    """The parameters of a tested run before and after, and the statistics over the logs."""
+    with style():
         drawn = figure(9.0, 4.2)
         left, right = drawn.subplots(1, 2)
         _changes(left, found, last)
         _over_logs(right, found)
-        html = inline(drawn, "drift", "Parameters before and after, and the statistic over logs")
-    return Section("Before and after, and over the logs", html)
+    return drawn
 
 
 def _changes(axes: "Axes", found: Drifted, last: Tested) -> None:

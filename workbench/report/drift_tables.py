@@ -138,7 +138,7 @@ def notes(found: Drifted) -> list[str]:
     return [*out, *found.remarks]
 
 
-def drift_view(found: Drifted, folder: Path) -> "Group":
+def drift_view(found: Drifted, folder: Path | None) -> "Group":
     """The verdict, every run, the parameters of the last one, for a terminal."""
     from rich.console import Group, RenderableType
 
@@ -150,5 +150,6 @@ def drift_view(found: Drifted, folder: Path) -> "Group":
     if rows:
         parts.append(table(SHIFT_HEAD, rows))
     parts.extend(f"note: {line}" for line in notes(found))
-    parts.append(written(folder, "drift.json", "report.html"))
+    if folder is not None:
+        parts.append(written(folder, "drift.json", "report.html"))
     return Group(*parts)

@@ -1,5 +1,7 @@
 """Section: measured and simulated position and force over time."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
 from identification.arrays import Array
@@ -12,11 +14,22 @@ from workbench.report.figures import MEASURED, MODEL, figure, inline, label, lin
 from workbench.report.model_tables import held
 from workbench.report.page import Section, render
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 ZOOM = 0.12  # part of the log shown enlarged
 
 
 def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
     """Position and force of one log, the whole of it and its liveliest part."""
+    with style():
+        drawn = fit_figure(model, log, run)
+        svg = inline(drawn, "fit", "measured and simulated position and force over time")
+    return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
+
+
+def fit_figure(model: Model, log: Log, run: FreeRun | None) -> "Figure":
+    """The figure of `fit`."""
     units = shown(model.rotary)
     t = log["t"] - log["t"][0]
     position = run.y if run else None
@@ -39,8 +52,7 @@ def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
         label(axes[1][0], "time [s]", f"applied force [{units.force}]")
         label(axes[1][1], "time [s]", "")
         drawn.legend(*axes[1][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
-        svg = inline(drawn, "fit", "measured and simulated position and force over time")
-    return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
+    return drawn
 
 
 def _caption(model: Model) -> str:

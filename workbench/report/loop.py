@@ -20,6 +20,7 @@ from workbench.steps.validate import COMPENSATED, Traces, Validation
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 DASHED = "--"  # with the compensator
 
@@ -33,6 +34,20 @@ def judged(found: Validation, rotary: bool) -> Section:
 
 def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Section:
     """Position, error and force in the loop on one plant, both controllers."""
+    with style():
+        drawn = loop_figure(traces, place, rotary)
+        svg = inline(drawn, f"loop-{place}", "simulated loop: position, error and force")
+    caption = (
+        "The loop with the identified Karnopp friction and the logs' noise; broken lines: with the"
+        " compensator."
+        " Left and right have their own time axes."
+    )
+    title = "Loop on the identified plant" if place == "model" else "Loop on the other plant"
+    return Section(title, render("figure", svg=svg, caption=caption))
+
+
+def loop_figure(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> "Figure":
+    """The figure of `loop`."""
     units = shown(rotary)
     with style():
         drawn = figure(9.0, 6.2)
@@ -49,14 +64,7 @@ def loop(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> 
         label(axes[2][0], "time [s]", f"applied force [{units.force}]")
         handles = axes[0][0].get_legend_handles_labels()
         drawn.legend(*handles, loc="outside upper right", ncols=5)
-        svg = inline(drawn, f"loop-{place}", "simulated loop: position, error and force")
-    caption = (
-        "The loop with the identified Karnopp friction and the logs' noise; broken lines: with the"
-        " compensator."
-        " Left and right have their own time axes."
-    )
-    title = "Loop on the identified plant" if place == "model" else "Loop on the other plant"
-    return Section(title, render("figure", svg=svg, caption=caption))
+    return drawn
 
 
 def _lines(axes: "list[Axes]", trace: LoopRun, name: str, first: bool) -> None:

@@ -12,6 +12,7 @@ from workbench.output import Row, table, written
 if TYPE_CHECKING:
     from rich.console import Group
 
+MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")
 MEANING = {
     "m": "moving mass",
     "F_cp": "Coulomb friction, positive direction",
@@ -61,15 +62,16 @@ def in_digits(values: Iterable[float], size: float, sd: float | None) -> list[st
     return [f"{value:#.{min(digits, 8)}g}".rstrip(".") for value in values]
 
 
-def model_view(model: Model, remarks: Sequence[str], folder: Path) -> "Group":
+def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> "Group":
     """The parameters, what the fit leaves, and remarks, for a terminal."""
     from rich.console import Group, RenderableType
 
     rows = [row[:4] for row in parameter_rows(model)]
-    parts: list[RenderableType] = [table(("parameter", "value", "unit", "95 % interval"), rows)]
+    parts: list[RenderableType] = [table(MODEL_HEAD, rows)]
     parts.extend(fit_lines(model))
     parts.extend(f"note: {line}" for line in (*remarks, *model.fit.remarks))
-    parts.append(written(folder, "model.json", "report.html"))
+    if folder is not None:
+        parts.append(written(folder, "model.json", "report.html"))
     return Group(*parts)
 
 

@@ -29,6 +29,7 @@ from workbench.steps.trace import Traced
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Curve = tuple[Karnopp, list[Acting], str, str]  # a model, its effects of speed, colour and name
 CURVE = 160  # points of a friction curve
@@ -39,9 +40,28 @@ def friction_before_after(traced: Traced) -> Section:
 
     Where the machine has drifted without lacking an effect, on training and test logs.
     """
+    with style():
+        drawn = friction_figure(traced)
+        svg = inline(drawn, "trace-friction", "friction against velocity, before and after")
+    speeds = _of_speed(traced)
+    other = [words(a.key) for a in traced.model.acting if a not in speeds]
+    caption = "Dots: the log's samples, smoothed. The bar at 0 spans the breakaway limits."
+    if other:
+        caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
+    return Section("Friction", render("figure", svg=svg, caption=caption))
+
+
+def _of_speed(traced: Traced) -> list[Acting]:
+    """The effects that are a function of velocity."""
+    every = traced.model.acting
+    return [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
+
+
+def friction_figure(traced: Traced) -> "Figure":
+    """The figure of `friction_before_after`."""
     found, model = traced.trace, traced.model
     units, after = shown(model.rotary), model.karnopp
-    speeds = [a for a in model.acting if a.effect.place.rubs and a.effect.depends_on == ("v",)]
+    speeds = _of_speed(traced)
     curves = _curves(found, after, speeds)
     source = traced.test[0] if _drifted(found) and traced.test else traced.train[0]
     data = friction_data(model, source.log)
@@ -63,12 +83,7 @@ def friction_before_after(traced: Traced) -> Section:
         drawn.legend(
             lines.values(), lines.keys(), loc="outside upper right", ncols=3, markerscale=3
         )
-        svg = inline(drawn, "trace-friction", "friction against velocity, before and after")
-    other = [words(a.key) for a in model.acting if a not in speeds]
-    caption = "Dots: the log's samples, smoothed. The bar at 0 spans the breakaway limits."
-    if other:
-        caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
-    return Section("Friction", render("figure", svg=svg, caption=caption))
+    return drawn
 
 
 def _drifted(found: Trace) -> bool:

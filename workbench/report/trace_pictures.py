@@ -27,6 +27,7 @@ from workbench.report.trace_tables import words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Equation = Literal["mechanical", "actuator"]
 BEFORE = "#8a8a8a"
@@ -240,6 +241,18 @@ def log_starts(residual: Residual) -> Array:
 
 def against_signal(picture: Picture, rotary: bool) -> Section:
     """Residual against the signal that explains it, before and after, with running medians."""
+    with style():
+        drawn = signal_figure(picture, rotary)
+        name = f"trace-{picture.residual.equation}-{picture.signal}"
+        svg = inline(drawn, name, "residual against a signal")
+    signal = axis_label(picture.signal, rotary).split(" [")[0]
+    alone = len(_both(picture.residual)) == 1
+    title = f"Against {signal}" if alone else f"What it depends on: {signal}"
+    return Section(title, render("figure", svg=svg, caption=_caption(picture)))
+
+
+def signal_figure(picture: Picture, rotary: bool) -> "Figure":
+    """The figure of `against_signal`."""
     residual, x = picture.residual, picture.residual.signals[picture.signal]
     panels = _both(residual)
     if len(panels) > 1:
@@ -260,12 +273,7 @@ def against_signal(picture: Picture, rotary: bool) -> Section:
         _limits(every[0], residual, panels[0][0])
         lines = dict(zip(*reversed(every[0].get_legend_handles_labels()), strict=True))
         drawn.legend(lines.values(), lines.keys(), loc="outside upper right", ncols=3)
-        svg = inline(
-            drawn, f"trace-{residual.equation}-{picture.signal}", "residual against a signal"
-        )
-    signal = axis_label(picture.signal, rotary).split(" [")[0]
-    title = f"What it depends on: {signal}" if len(panels) > 1 else f"Against {signal}"
-    return Section(title, render("figure", svg=svg, caption=_caption(picture)))
+    return drawn
 
 
 def _cloud(axes: "Axes", residual: Residual, x: Array, values: Array, colour: str) -> None:

@@ -344,26 +344,32 @@ def next_run(found: Trace) -> str:
     return f"Next run: {found.next_experiment.rstrip('.')}." if found.next_experiment else ""
 
 
-def trace_view(traced: Traced, folder: Path) -> "Group":
+def trace_view(traced: Traced, folder: Path | None) -> "Group":
     """The verdict, errors before and after, effects, rivals and drift, for a terminal."""
     from rich.console import Group, RenderableType
 
-    found, rotary = traced.trace, traced.model.rotary
+    found = traced.trace
     parts: list[RenderableType] = [trace_sentence(traced)]
-    parts.append(table(errors_head(bool(traced.test)), error_rows(found, rotary)))
-    sections: Sequence[tuple[Sequence[str], list[Row]]] = (
-        (EFFECT_HEAD, effect_rows(found, traced.model.rig.motion)),
-        (RIVAL_HEAD, rival_rows(found, rotary)),
-        (change_head(found), change_rows(found)),
-        (DRIFT_HEAD, drift_rows(found)),
-    )
-    for head, rows in sections:
-        if rows:
-            parts.append(table(head, rows))
-        if head is EFFECT_HEAD:
-            parts.extend(effect_lines(found))
+    for head, rows, lines in trace_parts(traced):
+        parts.append(table(head, rows))
+        parts.extend(lines)
     if found.next_experiment:
         parts.append(next_run(found))
     parts.extend(f"note: {line}" for line in (*traced.remarks, *found.remarks))
-    parts.append(written(folder, "trace.json", "model.json", "report.html"))
+    if folder is not None:
+        parts.append(written(folder, "trace.json", "model.json", "report.html"))
     return Group(*parts)
+
+
+def trace_parts(traced: Traced) -> list[tuple[Sequence[str], list[Row], list[str]]]:
+    """Errors before and after, effects, rivals, parameters and drift: head, rows and lines each;
+    those without rows are left out."""
+    found, rotary = traced.trace, traced.model.rotary
+    parts: list[tuple[Sequence[str], list[Row], list[str]]] = [
+        (errors_head(bool(traced.test)), error_rows(found, rotary), []),
+        (EFFECT_HEAD, effect_rows(found, traced.model.rig.motion), effect_lines(found)),
+        (RIVAL_HEAD, rival_rows(found, rotary), []),
+        (change_head(found), change_rows(found), []),
+        (DRIFT_HEAD, drift_rows(found), []),
+    ]
+    return [part for part in parts if part[1]]

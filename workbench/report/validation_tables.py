@@ -94,7 +94,7 @@ def validation_verdict(found: Validation) -> str:
     return f"{found.judged.upper()} {word} in simulation"
 
 
-def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "Group":
+def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> "Group":
     """The validation for a terminal."""
     from rich.console import Group
 
@@ -102,5 +102,5 @@ def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "G
         validation_verdict(found),
         table(VALIDATION_HEAD, validation_rows(found, rotary)),
         *validation_lines(found, rotary),
-        written(folder, "validation.json", "report.html"),
+        *([] if folder is None else [written(folder, "validation.json", "report.html")]),
     )

@@ -1,7 +1,7 @@
 """The chain, each link callable alone: runs -> model -> design -> validation."""
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,17 +13,22 @@ from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
 
+if TYPE_CHECKING:
+    from identification.estimation.posterior import Posterior
+
 __all__ = ["Identified", "Options", "identify_sources"]
 
 
 @dataclass(frozen=True)
 class Identified:
-    """A model, the fit it comes from, and the runs it was fitted on."""
+    """A model, the fit it comes from, the runs it was fitted on, and the walk around the fit that
+    was asked for with the posterior."""
 
     model: Model
     fit: KarnoppFit
     sources: tuple[Source, ...]
     remarks: tuple[str, ...]
+    walk: "Posterior | None" = None
 
 
 def identify_sources(
@@ -47,25 +52,29 @@ def identify_sources(
         on_progress=on_progress,
     )
     model = replace(model, bad_samples=(*sources.bad, *fit.bad))
-    if posterior:
-        model = replace(model, posterior=_posterior(sources, fit, seed, on_progress))
-    return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)))
+    walk = _walk(sources, fit, seed, on_progress) if posterior else None
+    if walk is not None:
+        model = replace(model, posterior=_posterior(walk, fit))
+    return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)), walk)
 
 
-def _posterior(
+def _walk(
     sources: Sources, fit: KarnoppFit, seed: int, on_progress: Progress | None
-) -> dict[str, Any]:
-    """What the walkers found, as model.json holds it."""
+) -> "Posterior":
     from identification.estimation.posterior import sample_posterior
 
     report = on_progress or (lambda _stage, _share: None)
-    found = sample_posterior(
+    return sample_posterior(
         fit,
         [source.log for source in sources.runs],
         np.random.default_rng(seed),
         rig=sources.rig,
         on_progress=lambda share: report("posterior", share),
     )
+
+
+def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
+    """What the walkers found, as model.json holds it."""
     spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
     told = {
         name: told_estimate(

@@ -1,7 +1,8 @@
 """Model + log -> prediction: force by the inverse model, force and position by simulation."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,11 @@ from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from workbench.documents.model import Model
+from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 RUN_NEEDS = ("m", "F_cp", "F_cn", "F_vp", "F_vn")  # without which no run is the machine's
 FORCE_WINDOW = 2.0  # s between the fresh starts of a fit driven by force
@@ -108,6 +113,55 @@ def predict(
             *([] if other is None else [f"force, simulated: {other}"]),
         ),
     )
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """The predictions of a log's runs, and what is said of them together, as `--json` prints it."""
+
+    runs: tuple[Prediction, ...]
+    summary: Mapping[str, Any]
+
+
+def predict_sources(
+    model: Model, sources: Sources, *, drive: Drive | None = None, window: float | None = None
+) -> Predicted:
+    """What the model says of the runs that the sources are; see `predict`.
+
+    Raises BadModel where model and card are of unlike machines, and as `predict` does.
+    """
+    if sources.rig.motion != model.rig.motion:
+        raise BadModel(
+            f"the model is of a {model.rig.motion} machine, but {sources.card.path} says"
+            f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
+        )
+    found = tuple(predict(model, s.log, drive=drive, window=window) for s in sources.runs)
+    of_runs = dict.fromkeys(line for one in found for line in one.remarks)
+    refused = dict.fromkeys(one.refused for one in found if one.refused is not None)
+    names = ("position_rms", "force_predicted_rms", "force_simulated_rms")
+    other = []
+    if model.card != sources.card.name:
+        other = [f"the model is of {model.card}, the log of {sources.card.name}"]
+    return Predicted(
+        found,
+        {
+            "drive": found[0].drive,
+            "window": window,
+            "samples": sum(len(one.t) for one in found),
+            **{name: _rms_of_runs(found, name) for name in names},
+            "run_refused": "; ".join(refused) or None,
+            "remarks": (*model.read, *sources.remarks, *other, *of_runs),
+        },
+    )
+
+
+def _rms_of_runs(found: Sequence[Prediction], name: str) -> float | None:
+    """Root mean square over all runs of the log."""
+    pairs = [(getattr(one, name), len(one.t)) for one in found]
+    known = [(value, n) for value, n in pairs if value is not None]
+    if not known:
+        return None
+    return float(np.sqrt(sum(v * v * n for v, n in known) / sum(n for _, n in known)))
 
 
 def why_no_run(model: Model, drive: Drive) -> str | None:
@@ -222,12 +276,16 @@ def _rms_where(values: Array) -> float | None:
     return _rms(found) if found.size else None
 
 
-def prediction_csv(found: Sequence[Prediction]) -> str:
-    """prediction.csv of the runs of one log; a cell is empty where there is no value."""
+def prediction_frame(found: Sequence[Prediction]) -> "pd.DataFrame":
+    """The columns of prediction.csv of the runs of one log; NaN where there is no value."""
     import pandas as pd
 
     frames = [
         pd.DataFrame({name: getattr(one, name) for name in PREDICTION_COLUMNS}) for one in found
     ]
-    text: str = pd.concat(frames).to_csv(index=False, float_format="%.10g")
-    return text
+    return pd.concat(frames, ignore_index=True)
+
+
+def prediction_csv(found: Sequence[Prediction]) -> str:
+    """prediction.csv of the runs of one log; a cell is empty where there is no value."""
+    return str(prediction_frame(found).to_csv(index=False, float_format="%.10g"))

@@ -1,0 +1,102 @@
+"""What results are turned into: objects of python-control and arviz."""
+
+import importlib
+import subprocess
+import sys
+from dataclasses import replace
+from typing import Any
+
+import control
+import numpy as np
+import pytest
+
+import workbench as wb
+from identification.errors import UserError
+from identification.estimation.posterior import Posterior
+from tests.chain import identified
+from workbench.interface.models import IdentifyResult
+
+
+def result(walk: Posterior | None = None) -> IdentifyResult:
+    found = identified()
+    return IdentifyResult(
+        found.card if hasattr(found, "card") else _card(), replace(found, walk=walk)
+    )
+
+
+def _card() -> Any:
+    from workbench.cards.card import load_card
+    from workbench.logs.fetch import card_path
+
+    return load_card(card_path("paper_table1_rich"))
+
+
+def walk(steps: int = 30, walkers: int = 4) -> Posterior:
+    """A chain whose value says its parameter, walker and step: 1000 k + walker + step / 100."""
+    names = identified().fit.free
+    step, walker, k = np.meshgrid(
+        np.arange(steps), np.arange(walkers), np.arange(len(names)), indexing="ij"
+    )
+    samples = (1000.0 * k + walker + step / 100.0).reshape(-1, len(names))
+    return Posterior(tuple(names), samples, 1.0, 0.3, walkers, 2 * steps, True, "converged")
+
+
+def test_the_plant_and_the_loop_in_python_control() -> None:
+    model = result()
+    designed = wb.design(model)
+    loop = designed.to_control()
+    plant = model.to_control()
+    assert isinstance(plant, control.TransferFunction)
+    np.testing.assert_allclose(plant.den[0][0], loop.plant.den[0][0], rtol=1e-12)
+    assert plant.dt == pytest.approx(designed.design.plant.h)
+    poles = control.feedback(loop.plant, loop.feedback).poles()
+    assert np.max(np.abs(poles)) < 1.0
+    slow = np.exp(1e-4j)
+    gain = loop.plant(slow) / (1.0 + loop.plant(slow) * loop.feedback(slow)) * loop.forward(slow)
+    assert abs(gain) == pytest.approx(1.0, abs=1e-3)
+    named = designed.to_control("pid")
+    assert named.feedback.num[0][0].tolist() != loop.feedback.num[0][0].tolist()
+    assert model.to_control(period=0.02).dt == pytest.approx(0.02)
+
+
+def test_the_posterior_in_arviz_has_a_chain_for_each_walker() -> None:
+    found = result(walk()).to_arviz()
+    names = identified().fit.free
+    assert list(found.posterior.data_vars) == list(names)
+    assert dict(found.posterior.sizes) == {"chain": 4, "draw": 30}
+    for k, name in enumerate(names):
+        chains = found.posterior[name].to_numpy()
+        expected = 1000.0 * k + np.arange(4)[:, None] + np.arange(30)[None, :] / 100.0
+        np.testing.assert_allclose(chains, expected)
+
+
+def test_without_arviz_the_command_that_installs_it_is_named(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def without(module: str, package: str | None = None) -> Any:
+        raise ModuleNotFoundError(f"No module named {module!r}", name=module)
+
+    monkeypatch.setattr(importlib, "import_module", without)
+    with pytest.raises(UserError, match=r"pip install 'servo-workbench\[arviz\]'"):
+        result(walk()).to_arviz()
+
+
+def test_nothing_heavy_is_imported_before_it_is_named() -> None:
+    said = subprocess.run(
+        [sys.executable, "-c", "import sys, workbench\nprint(sorted(sys.modules))\ndir(workbench)"],
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout
+    for heavy in ("numpy", "pandas", "numba", "scipy", "click", "matplotlib", "identification"):
+        assert f"'{heavy}'" not in said, heavy
+
+
+def test_every_name_of_the_front_is_there() -> None:
+    for name in ("identify", "trace", "design", "validate", "predict", "drift", "simulate"):
+        found = getattr(wb, name)
+        assert callable(found)
+        assert name in dir(wb)
+        assert found.__doc__ and len(found.__doc__.splitlines()) > 2
+    with pytest.raises(AttributeError, match="no attribute 'idetify'"):
+        _ = wb.idetify

@@ -1,0 +1,250 @@
+"""`identify`, `trace`, `design`, `validate`, `predict`, `drift` and `simulate`, as the commands do.
+
+A log is a DataFrame (or what makes one), a path, or the name of a file of the card's set; several
+of one machine go as a list. The machine is said by `card` (a path, the name of a shipped card, or a
+card that is read), or by `rig` and `signals`:
+
+    rig = "motor"                                     # all columns in SI
+    rig = {"kind": "electro-pneumatic", "area_p": "12.6 cm^2", "area_n": "10 cm^2",
+           "supply_pressure": "5 bar"}
+    signals = {"y": "position [mm]", "u": ("valve", "V"), "F": {"column": 3, "unit": "kN"}}
+
+Keys of `rig` are a card's, also without the unit in them, then as numbers in SI or texts with a
+unit. Without `signals` the columns are those named as signals are (`t`, `y`, `F`, ...), a unit in
+brackets behind the name included; an index of times counts as a column. Errors of what was given
+are `UserError`, a line that says what to do.
+"""
+
+import math
+import os
+import time
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from identification.errors import BadCard, BadModel
+from workbench.cards.card import Card, load_card
+from workbench.cards.own_effects import library
+from workbench.commands.identify import IDENTIFY_STAGES
+from workbench.commands.trace import TRACE_STAGES
+from workbench.course import Course, moving, watched
+from workbench.documents.design import Design, read_design
+from workbench.documents.model import Model, read_model
+from workbench.interface.inputs import (
+    CardLike,
+    LogLike,
+    PathLike,
+    RigLike,
+    Signals,
+    read_card,
+    sources,
+)
+from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
+from workbench.interface.loops import DesignResult, ValidateResult
+from workbench.interface.models import IdentifyResult, TraceResult
+from workbench.logs.fetch import card_path
+from workbench.output import progress
+from workbench.steps.design import design as design_of_model
+from workbench.steps.design import effort_limit
+from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
+from workbench.steps.identify_sources import Options, identify_sources
+from workbench.steps.predict import predict_sources
+from workbench.steps.simulate import as_columns, record, truth
+from workbench.steps.trace import named_logs, trace_sources
+from workbench.steps.validate import Limits
+from workbench.steps.validate import validate as validate_design
+
+if TYPE_CHECKING:
+    from typing import Literal
+
+    from design.tune import Goals
+    from identification.drift.drift_test import DriftSettings
+    from identification.model.estimates import Drive
+
+Logs: TypeAlias = LogLike | Sequence[LogLike]
+ModelLike: TypeAlias = IdentifyResult | TraceResult | Model | PathLike
+DesignLike: TypeAlias = DesignResult | Design | PathLike
+
+
+def identify(
+    logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, options: Options | None = None, posterior: bool = False,
+    seed: int = 0,
+) -> IdentifyResult:  # fmt: skip
+    """Friction, plant and actuator of a machine from its logs, as `workbench identify`.
+
+    options: what drives the fitted run, orders and period of the ARX plant; posterior: sample it
+    too, which takes half a minute and more. Raises NotIdentifiable where the logs tell nothing.
+    """
+    found = sources(logs, card, rig, signals)
+    with progress("identifying", 1.0) as bar:
+        course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
+        with moving(course):
+            known = identify_sources(
+                found, options, seed, posterior=posterior, on_progress=course.report
+            )
+    return IdentifyResult(found.card, known)
+
+
+def trace(
+    train: Logs | None = None, test: Logs | None = None, card: CardLike | None = None, *,
+    rig: RigLike | None = None, signals: Signals | None = None,
+    effects: Iterable[PathLike] = (), budget: float | None = None, seed: int = 0,
+) -> TraceResult:  # fmt: skip
+    """The effect that the model of a machine lacks, as `workbench trace`.
+
+    test: held-out logs, which neither fit nor choice sees; without them stretches of the training
+    logs are left out in turn, and without `train` the card's [split] names both. effects: folders
+    of your own, whose Python is run. budget [s]: end after so long with the best so far, as Ctrl-C
+    does. Raises NotIdentifiable where too little slides.
+    """
+    begun = time.monotonic()
+    known = library([Path(one) for one in effects])
+    if train is None:
+        if card is None or isinstance(card, Card):
+            raise BadCard("no log given; give train, or the path or name of a card with a [split]")
+        names, held_out = named_logs((), (), os.fspath(card))
+        train, test = list(names), list(held_out) or None
+    learnt = sources(train, card, rig, signals)
+    seen = None if test is None else sources(test, learnt.card, None, None)
+    left = math.inf if budget is None else budget - (time.monotonic() - begun)
+    with progress("trace", 1.0) as bar:
+        course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
+        with watched(course):
+            found = trace_sources(
+                learnt, seen, known, seed, course.report, keep_going=course.keep_going
+            )
+    return TraceResult(learnt.card, found)
+
+
+def design(
+    model: ModelLike, *, poles: tuple[float, float] | None = None,
+    auxiliary: Sequence[complex] | None = None, integrator: bool = True,
+    source: "Literal['physical', 'arx'] | None" = None, period: float | None = None,
+    goals: "Goals | None" = None,
+) -> DesignResult:  # fmt: skip
+    """PID and RST for a model by pole placement, as `workbench design`.
+
+    poles: w_n [rad/s] and damping of the dominant pair, auxiliary: the others, values of z; both
+    searched where not given. source: the plant to design on; period: of the position loop [s];
+    goals: margins to keep, by default those of the command. Raises BadSpecification where the poles
+    cannot be placed, NotIdentifiable where the model carries no design.
+    """
+    from design.tune import Asked
+    from design.tune import Goals as DesignGoals
+
+    known = _model(model)
+    asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
+    wanted = goals or DesignGoals(effort=effort_limit(known))
+    with progress("designing"):
+        found = design_of_model(known, asked, goals=wanted, source=source, period=period)
+    return DesignResult(found, known)
+
+
+def validate(
+    model: ModelLike, design: DesignLike, *, plant: ModelLike | None = None,
+    limits: Limits | None = None, seed: int = 0,
+) -> ValidateResult:  # fmt: skip
+    """A design on its model in the simulated loop, as `workbench validate`.
+
+    plant: another machine on which it has to work too; limits: what the judged controller keeps.
+    """
+    known = _model(model)
+    made = read_design(Path(design)) if isinstance(design, str | os.PathLike) else design
+    made = made.design if isinstance(made, DesignResult) else made
+    other = None if plant is None else _model(plant)
+    with progress("simulating the loop"):
+        rng = np.random.default_rng(seed)
+        found, traces = validate_design(known, made, rng, plant=other, limits=limits)
+    return ValidateResult(found, traces, known.rotary)
+
+
+def predict(
+    model: ModelLike, log: LogLike, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, drive: "Drive | None" = None, window: float | None = None,
+) -> PredictResult:  # fmt: skip
+    """Force and position of a log by a model, nothing fitted on it, as `workbench predict`.
+
+    Without card and rig the log is read as those of the model were. drive: "force" or "command";
+    window [s]: the run starts anew from the measured state after each.
+    """
+    known = _model(model)
+    found = sources(log, *_machine(model, card, rig, signals))
+    with progress("predicting"):
+        told = predict_sources(known, found, drive=drive, window=window)
+    return PredictResult(told, known.rotary)
+
+
+def drift(
+    model: ModelLike, logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, state: PathLike | None = None,
+    settings: "DriftSettings | None" = None, seed: int = 0,
+) -> DriftResult:  # fmt: skip
+    """Whether a machine has changed since its model, and in what, as `workbench drift`.
+
+    Without card and rig the logs are read as those of the model were. state: file that carries the
+    test from log to log; made where there is none.
+    """
+    known = _model(model)
+    stream = read_stream(Path(state)) if state is not None else None
+    found = sources(logs, *_machine(model, card, rig, signals))
+    with progress("testing"):
+        tested = drift_of(
+            known, model_key(known), found, stream=stream, settings=settings, seed=seed
+        )
+    if state is not None:
+        write_stream(Path(state), tested.stream)
+    path = os.fspath(model) if isinstance(model, str | os.PathLike) else f"model of {known.card}"
+    return DriftResult(tested, path)
+
+
+def simulate(
+    card: CardLike, *, seed: int | None = None, effects: Iterable[PathLike] = ()
+) -> SimulateResult:
+    """The log of a card's recipe and its truth, as `workbench simulate`.
+
+    card: a path, the name of a shipped card, or a card read with its recipe; seed: instead of the
+    recipe's. Raises BadCard where the card has no [recipe].
+    """
+    import pandas as pd
+
+    if not isinstance(card, Card):
+        card = load_card(card_path(os.fspath(card)), library([Path(one) for one in effects]))
+    if card.recipe is None:
+        raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
+    with progress("simulating"):
+        log = record(card.name, card.recipe, seed, card.rig())
+    frame = pd.DataFrame(as_columns(log, card))
+    frame.attrs["name"] = card.name
+    known = truth(card.name, card.recipe, seed, motion=card.rig().motion)
+    return SimulateResult(frame, known, card, log)
+
+
+def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:
+    """The model in the file, its effects also of your own folders, whose Python is run."""
+    return read_model(Path(path), library([Path(one) for one in effects]))
+
+
+def _model(given: ModelLike) -> Model:
+    if isinstance(given, Model):
+        return given
+    if isinstance(given, IdentifyResult | TraceResult):
+        return given.model
+    if isinstance(given, str | os.PathLike):
+        return load_model(given)
+    raise BadModel(
+        f"{type(given).__name__} found, a model needed: the path of a model.json, or what identify"
+        " or trace gave"
+    )
+
+
+def _machine(
+    model: ModelLike, card: CardLike | None, rig: RigLike | None, signals: Signals | None
+) -> tuple[Any, ...]:
+    """Card, rig and signals as given, else the card by which the model's logs were read."""
+    own = model.card if isinstance(model, IdentifyResult | TraceResult) else None
+    if own is not None and card is None and rig is None and signals is None:
+        return own, None, None
+    return None if card is None else read_card(card), rig, signals

@@ -1,0 +1,154 @@
+"""Results of `predict`, `drift` and `simulate`: what is said of logs, and logs that are made."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from identification.log import Log
+from workbench.cards.card import Card
+from workbench.interface.result import Part, Result
+from workbench.output import dumps
+from workbench.steps.drift import Drifted
+from workbench.steps.predict import Predicted
+
+if TYPE_CHECKING:
+    import pandas as pd
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True, repr=False)
+class PredictResult(Result):
+    """What a model says of a log, and how far off it is."""
+
+    found: Predicted
+    rotary: bool = False
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        return self.found.summary
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """The columns of prediction.csv; NaN where there is no value."""
+        from workbench.steps.predict import prediction_frame
+
+        return prediction_frame(self.found.runs)
+
+    def report(self) -> str:
+        from workbench.report.page import Section, page, render
+        from workbench.report.prediction import prediction_section
+
+        lines = Section("In words", render("lines", lines=self._lines()))
+        return page(
+            "Prediction", self._lines()[0], [lines, prediction_section(self.found, self.rotary)]
+        )
+
+    def _lines(self) -> list[str]:
+        from workbench.report.prediction import prediction_lines
+
+        return prediction_lines(self.found, self.rotary)
+
+    def _figure(self) -> "Figure":
+        from workbench.report.prediction import prediction_figure
+
+        return prediction_figure(self.found, self.rotary)
+
+    def _view(self) -> object:
+        return "\n".join(self._lines())
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        first, *rest = self._lines()
+        return first, [Part((), (), rest)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        from workbench.steps.predict import prediction_csv
+
+        yield "prediction.csv", prediction_csv(self.found.runs)
+
+    @property
+    def _command(self) -> str:
+        return "predict"
+
+
+@dataclass(frozen=True, repr=False)
+class DriftResult(Result):
+    """Whether a machine has changed since its model, log by log."""
+
+    found: Drifted
+    model_name: str
+
+    @property
+    def verdict(self) -> str:
+        """ "none", "drift", "structure" or "not_judged"."""
+        return self.found.verdict
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.drift import drift_document
+
+        return drift_document(self.found, self.model_name)
+
+    def report(self) -> str:
+        from workbench.report.drift import drift_report
+
+        return drift_report(self.found)
+
+    def _figure(self) -> "Figure":
+        from workbench.report.drift import drift_figure
+
+        judged = [one for one in self.found.tests if one.test.shifts] or list(self.found.tests)
+        return drift_figure(self.found, judged[-1])
+
+    def _view(self) -> object:
+        from workbench.report.drift_tables import drift_view
+
+        return drift_view(self.found, None)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.drift_tables import (
+            RUN_HEAD,
+            SHIFT_HEAD,
+            drift_sentence,
+            notes,
+            run_rows,
+            shift_rows,
+        )
+
+        last = Part(SHIFT_HEAD, shift_rows(self.found.tests[-1]))
+        parts = [Part(RUN_HEAD, run_rows(self.found), notes(self.found)), last]
+        return drift_sentence(self.found), parts
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        yield "drift.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "drift"
+
+
+@dataclass(frozen=True, repr=False)
+class SimulateResult:
+    """The log of a recipe: its columns as a table, the truth, and the card that reads it."""
+
+    frame: "pd.DataFrame"
+    truth: Mapping[str, Any]
+    card: Card
+    log: Log = field(compare=False)
+
+    def to_json(self) -> str:
+        """The truth as strict JSON, as truth.json holds it."""
+        return dumps(self.truth)
+
+    def __repr__(self) -> str:
+        return f"{self._line()}\n{self.frame!r}"
+
+    def _repr_html_(self) -> str:
+        from workbench.report.page import render
+
+        shown = self.frame._repr_html_()  # type: ignore[operator]
+        return f"{render('lead', sentence=self._line())}\n{shown}"
+
+    def _line(self) -> str:
+        n, h, seed = len(self.log), self.log.h, self.truth["seed"]
+        return f"{self.card.name}: {n} samples every {h:.4g} s, seed {seed}"

@@ -1,0 +1,140 @@
+"""Results of `design` and `validate`: controllers, and what they do in the simulated loop."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from identification.errors import BadModel
+from workbench.documents.design import Design
+from workbench.documents.model import Model
+from workbench.interface.result import Part, Result
+from workbench.steps.validate import Traces, Validation
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+class ControlLoop(NamedTuple):
+    """Transfer functions in z, objects of python-control: F_ref = forward r - feedback y."""
+
+    plant: Any
+    feedback: Any
+    forward: Any
+
+
+@dataclass(frozen=True, repr=False)
+class DesignResult(Result):
+    """What `design` made for a model: an RST and a PID with their margins, and the compensator."""
+
+    design: Design
+    model: Model
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.documents.design import design_document
+
+        return design_document(self.design)
+
+    @property
+    def recommended(self) -> str:
+        """ "rst", "pid", or "none" where no controller keeps every goal."""
+        return self.design.recommended
+
+    def to_control(self, name: str | None = None) -> ControlLoop:
+        """Plant and controller as transfer functions of python-control, for loops and Bode plots.
+
+        name: "rst" or "pid", by default the recommended. Raises BadModel where there is no such.
+        """
+        from design.convert import controller_to_control, to_control
+
+        wanted = name or self.design.recommended
+        if wanted not in self.design.controllers:
+            there = ", ".join(self.design.controllers)
+            raise BadModel(f"no controller {wanted!r}; name one that is there ({there})")
+        plant = self.design.plant
+        feedback, forward = controller_to_control(self.design.controllers[wanted].rst)
+        return ControlLoop(to_control(plant.A, plant.B, plant.h), feedback, forward)
+
+    def report(self) -> str:
+        from workbench.report.reports import design_report
+
+        return design_report(self.design, self.model.rotary)
+
+    def _figure(self) -> "Figure":
+        from workbench.report.controllers import step_figure
+
+        return step_figure(self.design)
+
+    def _view(self) -> object:
+        from workbench.report.design_tables import design_view
+
+        return design_view(self.design, None, self.model.rotary)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.design_tables import DESIGN_HEAD, design_lines, margin_rows
+
+        first, *lines = design_lines(self.design, self.model.rotary)
+        return first, [Part(DESIGN_HEAD, margin_rows(self.design), lines)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        yield "design.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "design"
+
+
+@dataclass(frozen=True, repr=False)
+class ValidateResult(Result):
+    """What `validate` saw of a design in the simulated loop."""
+
+    found: Validation
+    traces: Mapping[tuple[str, str], Traces]
+    rotary: bool = False
+
+    @property
+    def passed(self) -> bool:
+        """Whether the judged controller keeps every limit on every plant."""
+        return self.found.passed
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.validate import validation_document
+
+        return validation_document(self.found)
+
+    def report(self) -> str:
+        from workbench.report.reports import validation_report
+
+        return validation_report(self.found, self.traces, self.rotary)
+
+    def _figure(self) -> "Figure":
+        from workbench.report.loop import loop_figure
+
+        return loop_figure(self.traces, "model", self.rotary)
+
+    def _view(self) -> object:
+        from workbench.report.validation_tables import validation_view
+
+        return validation_view(self.found, None, self.rotary)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.validation_tables import (
+            VALIDATION_HEAD,
+            validation_lines,
+            validation_rows,
+            validation_verdict,
+        )
+
+        rows = validation_rows(self.found, self.rotary)
+        lines = validation_lines(self.found, self.rotary)
+        return f"{validation_verdict(self.found)}.", [Part(VALIDATION_HEAD, rows, lines)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        yield "validation.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "validate"
