@@ -204,7 +204,9 @@ def as_text(shown: object, width: int | None = PIPED_WIDTH) -> str:
     from rich.console import Console
 
     # No markup: "[m/s]" is a unit here, not a style.
-    console = Console(markup=False, highlight=False, emoji=False, width=width)
+    console = Console(
+        markup=False, highlight=False, emoji=False, width=width, force_jupyter=False
+    )  # fmt: skip
     with console.capture() as captured:
         console.print(shown)
     return captured.get()

@@ -17,8 +17,10 @@ are `UserError`, a line that says what to do.
 
 import math
 import os
+import sys
 import time
 from collections.abc import Iterable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -45,7 +47,7 @@ from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
 from workbench.interface.loops import DesignResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
-from workbench.output import progress
+from workbench.output import Bar, progress
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
@@ -79,7 +81,7 @@ def identify(
     too, which takes half a minute and more. Raises NotIdentifiable where the logs tell nothing.
     """
     found = sources(logs, card, rig, signals)
-    with progress("identifying", 1.0) as bar:
+    with _bar("identifying", 1.0) as bar:
         course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
         with moving(course):
             known = identify_sources(
@@ -110,7 +112,7 @@ def trace(
     learnt = sources(train, card, rig, signals)
     seen = None if test is None else sources(test, learnt.card, None, None)
     left = math.inf if budget is None else budget - (time.monotonic() - begun)
-    with progress("trace", 1.0) as bar:
+    with _bar("trace", 1.0) as bar:
         course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
         with watched(course):
             found = trace_sources(
@@ -138,7 +140,7 @@ def design(
     known = _model(model)
     asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
     wanted = goals or DesignGoals(effort=effort_limit(known))
-    with progress("designing"):
+    with _bar("designing"):
         found = design_of_model(known, asked, goals=wanted, source=source, period=period)
     return DesignResult(found, known)
 
@@ -155,7 +157,7 @@ def validate(
     made = read_design(Path(design)) if isinstance(design, str | os.PathLike) else design
     made = made.design if isinstance(made, DesignResult) else made
     other = None if plant is None else _model(plant)
-    with progress("simulating the loop"):
+    with _bar("simulating the loop"):
         rng = np.random.default_rng(seed)
         found, traces = validate_design(known, made, rng, plant=other, limits=limits)
     return ValidateResult(found, traces, known.rotary)
@@ -172,7 +174,7 @@ def predict(
     """
     known = _model(model)
     found = sources(log, *_machine(model, card, rig, signals))
-    with progress("predicting"):
+    with _bar("predicting"):
         told = predict_sources(known, found, drive=drive, window=window)
     return PredictResult(told, known.rotary)
 
@@ -190,7 +192,7 @@ def drift(
     known = _model(model)
     stream = read_stream(Path(state)) if state is not None else None
     found = sources(logs, *_machine(model, card, rig, signals))
-    with progress("testing"):
+    with _bar("testing"):
         tested = drift_of(
             known, model_key(known), found, stream=stream, settings=settings, seed=seed
         )
@@ -214,7 +216,7 @@ def simulate(
         card = load_card(card_path(os.fspath(card)), library([Path(one) for one in effects]))
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
-    with progress("simulating"):
+    with _bar("simulating"):
         log = record(card.name, card.recipe, seed, card.rig())
     frame = pd.DataFrame(as_columns(log, card))
     frame.attrs["name"] = card.name
@@ -225,6 +227,11 @@ def simulate(
 def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:
     """The model in the file, its effects also of your own folders, whose Python is run."""
     return read_model(Path(path), library([Path(one) for one in effects]))
+
+
+def _bar(label: str, total: float | None = None) -> AbstractContextManager[Bar]:
+    """A bar as the commands show it; none in a notebook, where its traces would stay."""
+    return progress(label, total, as_json="ipykernel" in sys.modules)
 
 
 def _model(given: ModelLike) -> Model:

@@ -48,7 +48,7 @@ class PredictResult(Result):
 
         return prediction_lines(self.found, self.rotary)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.prediction import prediction_figure
 
         return prediction_figure(self.found, self.rotary)
@@ -93,7 +93,7 @@ class DriftResult(Result):
 
         return drift_report(self.found)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.drift import drift_figure
 
         judged = [one for one in self.found.tests if one.test.shifts] or list(self.found.tests)

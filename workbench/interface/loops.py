@@ -60,7 +60,7 @@ class DesignResult(Result):
 
         return design_report(self.design, self.model.rotary)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.controllers import step_figure
 
         return step_figure(self.design)
@@ -109,7 +109,7 @@ class ValidateResult(Result):
 
         return validation_report(self.found, self.traces, self.rotary)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.loop import loop_figure
 
         return loop_figure(self.traces, "model", self.rotary)

@@ -108,7 +108,7 @@ class IdentifyResult(_OfModel):
 
         return identification_report(self.found)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.fit import fit_figure
         from workbench.steps.predict import fitted_run
 
@@ -167,7 +167,7 @@ class TraceResult(_OfModel):
 
         return trace_report(self.found)
 
-    def _figure(self) -> "Figure":
+    def plot(self) -> "Figure":
         from workbench.report.trace_friction import friction_figure
         from workbench.report.trace_pictures import pictures, signal_figure
 

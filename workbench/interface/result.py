@@ -3,7 +3,6 @@
 It holds the value that the command of its name writes, and its JSON is the command's own document.
 """
 
-import sys
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -40,9 +39,6 @@ class Result(ABC):
         """The report as one HTML page, as the command writes it."""
 
     @abstractmethod
-    def _figure(self) -> "Figure": ...
-
-    @abstractmethod
     def _view(self) -> object:
         """What the command shows on a terminal."""
 
@@ -62,11 +58,9 @@ class Result(ABC):
         """The document as strict JSON, letter for letter what the command writes."""
         return dumps(self.document)
 
+    @abstractmethod
     def plot(self) -> "Figure":
         """The telling picture, a figure of matplotlib."""
-        if "IPython" in sys.modules:  # which shows figures once pyplot is there
-            import matplotlib.pyplot  # noqa: F401
-        return self._figure()
 
     def save(self, out: PathLike | None = None) -> Path:
         """The folder that now holds the command's files: `out`, or runs/<time>-<command>."""

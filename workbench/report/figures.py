@@ -4,6 +4,7 @@ import io
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -48,10 +49,21 @@ def style() -> Iterator[None]:
 
 
 def figure(width: float, height: float) -> "Figure":
-    """An empty figure [inch] without a window."""
+    """An empty figure [inch] without a window; a notebook shows it, whatever its backend."""
+    return _shown_figure()(figsize=(width, height))
+
+
+@cache
+def _shown_figure() -> "type[Figure]":
     from matplotlib.figure import Figure
 
-    return Figure(figsize=(width, height))
+    class ShownFigure(Figure):
+        def _repr_png_(self) -> bytes:
+            out = io.BytesIO()
+            self.savefig(out, format="png", dpi=110)
+            return out.getvalue()
+
+    return ShownFigure
 
 
 def inline(drawn: "Figure", name: str, description: str) -> Any:

@@ -4,17 +4,22 @@ import importlib
 import subprocess
 import sys
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import control
+import nbformat
 import numpy as np
 import pytest
+from nbclient import NotebookClient
 
 import workbench as wb
 from identification.errors import UserError
 from identification.estimation.posterior import Posterior
 from tests.chain import identified
+from workbench.documents.model import model_document
 from workbench.interface.models import IdentifyResult
+from workbench.output import dumps
 
 
 def result(walk: Posterior | None = None) -> IdentifyResult:
@@ -100,3 +105,17 @@ def test_every_name_of_the_front_is_there() -> None:
         assert found.__doc__ and len(found.__doc__.splitlines()) > 2
     with pytest.raises(AttributeError, match="no attribute 'idetify'"):
         _ = wb.idetify
+
+
+def test_a_notebook_shows_results_as_html_and_figures_as_pictures(tmp_path: Path) -> None:
+    cells = ('import workbench as wb\nmade = wb.simulate("demo")\nmade', CELL, "design.plot()")
+    notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(one) for one in cells])
+    text = dumps(model_document(identified().model))
+    (tmp_path / "model.json").write_text(text, "utf-8")
+    NotebookClient(notebook, resources={"metadata": {"path": str(tmp_path)}}).execute()
+    shown = [[sorted(out.data) for out in cell.outputs] for cell in notebook.cells]
+    pair = ["text/html", "text/plain"]
+    assert shown == [[pair], [pair], [["image/png", "text/plain"]]]
+
+
+CELL = 'design = wb.design("model.json")\ndesign'
