@@ -25,12 +25,7 @@ def read_excel(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, _BOOK_BYTES, "a workbook", BadLog)
     library = optional("python_calamine", "excel", path)
     _refuse_unpacked(path)
-    with library.load_workbook(str(path)) as book:
-        names = [str(name) for name in book.sheet_names]
-        wanted = spec.rows if spec.rows is not None else names[0]
-        if wanted not in names:
-            raise BadLog(f"{path}: no sheet {wanted!r}{nearest(wanted, names)}")
-        rows = book.get_sheet_by_name(wanted).to_python(skip_empty_area=False)
+    wanted, rows = _sheet(library, path, spec.rows)
     while rows and not _shown(rows[-1]):
         rows.pop()
     refuse_long(path, len(rows))
@@ -52,6 +47,21 @@ def read_excel(path: Path, spec: FileSpec) -> Table:
     )
 
 
+def _sheet(library: Any, path: Path, name: str | None) -> tuple[str, list[list[Any]]]:
+    """Name and cells of the sheet, the first where none is named."""
+    try:
+        with library.load_workbook(str(path)) as book:
+            names = [str(one) for one in book.sheet_names]
+            wanted = names[0] if name is None else name
+            if wanted not in names:
+                raise BadLog(f"{path}: no sheet {wanted!r}{nearest(wanted, names)}")
+            return wanted, book.get_sheet_by_name(wanted).to_python(skip_empty_area=False)
+    except BaseException as error:
+        if type(error).__name__ == "PanicException":  # of Rust, on a broken file
+            raise ValueError(str(error)) from None
+        raise
+
+
 def _refuse_unpacked(path: Path) -> None:
     if not zipfile.is_zipfile(path):  # an old workbook
         return
@@ -65,11 +75,9 @@ def _refuse_unpacked(path: Path) -> None:
 
 
 def _shown(row: list[Any]) -> list[str]:
-    """The cells as texts, empty ones at the end left out."""
+    """The cells as texts; none where all are empty."""
     texts = ["" if cell is None else str(cell).strip() for cell in row]
-    while texts and not texts[-1]:
-        texts.pop()
-    return texts
+    return texts if any(texts) else []
 
 
 def _column(rows: list[list[Any]], number: int) -> RawColumn:

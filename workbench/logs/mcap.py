@@ -42,10 +42,10 @@ class _Container:
 
 @dataclass
 class _Topic:
-    """A topic as found: how many messages it has, and the first as columns."""
+    """A topic as found: the names of its columns, by its first message, and how many it has."""
 
     decode: Decoder
-    first: Mapping[str, float]
+    names: tuple[str, ...]
     count: int = 0
     columns: dict[str, RawColumn] = field(default_factory=dict)
 
@@ -63,10 +63,8 @@ def read_mcap(path: Path, spec: FileSpec) -> Table:
         optional(name, "mcap", path).DecoderFactory()
         for name in ("mcap_ros2.decoder", "mcap_protobuf.decoder")
     )
-    file = _Container(path, library, decoders)
-    begun = min((message.log_time for _, _, message in _messages(file)), default=0)
-    file = replace(file, begun=begun)
-    topics, others = _topics(file, spec.rows)
+    topics, others, begun = _topics(_Container(path, library, decoders), spec.rows)
+    file = _Container(path, library, decoders, begun)
     if not topics and others:
         raise BadLog(
             f"{path}: has no topic whose encoding is read (there is: {', '.join(sorted(others))});"
@@ -75,16 +73,18 @@ def read_mcap(path: Path, spec: FileSpec) -> Table:
     channels = [
         Channel(name, column, partial(_column, file, name, topic, column))
         for name, topic in topics.items()
-        for column in (*_CLOCKS, *topic.first)
+        for column in (*_CLOCKS, *topic.names)
     ]
     return channel_table(path, channels, spec)
 
 
-def _topics(file: _Container, only: str | None) -> tuple[dict[str, _Topic], set[str]]:
-    """Topics whose messages hold numbers, and the encodings that are not read."""
+def _topics(file: _Container, only: str | None) -> tuple[dict[str, _Topic], set[str], int]:
+    """Topics whose messages hold numbers, encodings that are not read, the first message's time."""
     topics = dict[str, _Topic]()
     silent, others = set[str](), set[str]()
+    begun: int | None = None
     for schema, channel, message in _messages(file):
+        begun = message.log_time if begun is None else min(begun, message.log_time)
         name = str(channel.topic)
         if name in silent or (only is not None and name != only):
             continue
@@ -94,10 +94,10 @@ def _topics(file: _Container, only: str | None) -> tuple[dict[str, _Topic], set[
                 others.add(str(channel.message_encoding))
                 silent.add(name)
                 continue
-            topics[name] = _Topic(decode, dict(_numbers(decode(message.data), file.begun)))
+            topics[name] = _Topic(decode, tuple(dict(_numbers(decode(message.data), 0))))
         topics[name].count += 1
         refuse_long(file.path, topics[name].count)
-    return topics, others
+    return topics, others, begun or 0
 
 
 def _decoder(file: _Container, channel: Any, schema: Any) -> Decoder | None:
@@ -116,13 +116,13 @@ def _column(file: _Container, name: str, topic: _Topic, column: str) -> RawColum
 
 
 def _columns(file: _Container, name: str, topic: _Topic) -> dict[str, RawColumn]:
-    out = {key: np.full(topic.count, np.nan) for key in (*_CLOCKS, *topic.first)}
+    out = {key: np.full(topic.count, np.nan) for key in (*_CLOCKS, *topic.names)}
     own = (message for _, channel, message in _messages(file) if channel.topic == name)
     for row, message in enumerate(sorted(own, key=lambda message: int(message.log_time))):
         out["log_time"][row] = (message.log_time - file.begun) * 1e-9
         out["publish_time"][row] = (message.publish_time - file.begun) * 1e-9
         for key, value in _numbers(topic.decode(message.data), file.begun):
-            if key in topic.first:
+            if key in out:
                 out[key][row] = value
     return out
 

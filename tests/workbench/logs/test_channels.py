@@ -323,3 +323,12 @@ def test_a_missing_library_is_named_with_the_command_that_installs_it(
     assert f"run pip install 'servo-workbench[{extra}]'" in said
     assert len(said.splitlines()) == 1
     assert not (tmp_path / "out").exists()
+
+
+def test_a_last_column_that_is_often_empty_is_a_column(tmp_path: Path) -> None:
+    rows: list[Any] = [["Messung 7"], [], [*signals(), "note"]]
+    rows += [[*row, None] for row in zip(*(v.tolist() for v in signals().values()), strict=True)]
+    rows[300][3] = "restarted"
+    write_sheet(tmp_path / "a.xlsx", rows)
+    log = read_log(tmp_path / "a.xlsx", card(tmp_path))
+    np.testing.assert_allclose(log["F"], signals()["F"], rtol=5e-16)
