@@ -9,10 +9,10 @@ from identification.effects._library import Library
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.inertia import inertia_has_no_part
-from identification.estimation.regression.row_fit import RowFit, base_fits
+from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
 from identification.estimation.structure_fit import FittedStructure, band, plain_structure
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.thresholds import ASTRAY, COMPLETE, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, NEARLY_FOLLOWED
 from identification.tracing.recorded_rows import RecordedRows, imposed_rows, told_by_speed
 
 REFINEMENT = "the refinement of the plain model to its end"
@@ -63,7 +63,8 @@ def plain_model(rows: RecordedRows, library: Library, rng: np.random.Generator) 
     slow = band(model) if model.misfit <= ASTRAY else 0.0
     start = replace(start, band=slow, sliding=model.plant.friction)
     with halt.closing():  # or it would be open whether an effect is worth a trial at all
-        if misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE:
-            library = {}  # the plain plant's run leaves nothing but noise
+        follows = misfit(model.plant, logs, rows.drive, every=True) <= COMPLETE
+    if follows and all(mean_square(o) <= ADEQUATE for o in first.values()):
+        library = {}  # neither the plain plant's run nor its equations leave anything but noise
     rows = replace(rows, recorded=replace(rows.recorded, logs=logs))
     return PlainModel(rows, start, base_fits(start), model, library, recorded)
