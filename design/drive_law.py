@@ -51,11 +51,17 @@ class DriveLaw:
         return RST(np.array(self.R), np.array(self.S), np.array(self.T), self.h)
 
 
-def drive_law(controller: RST, forget: float | None, per_output: float = 1.0) -> DriveLaw:
+def drive_law(
+    controller: RST,
+    forget: float | None,
+    per_output: float = 1.0,
+    W: tuple[float, ...] | None = None,
+) -> DriveLaw:
     """The law of a controller whose output is asked for in units of `per_output` of its own.
 
-    forget [s]: see `forgetting`; per_output: a motor's k_a, of a controller that gives a force.
-    Raises BadSpecification where the controller has a tracking model.
+    forget [s]: see `forgetting`; W: in its place; per_output: a motor's k_a, of a controller that
+    gives a force. Raises BadSpecification where the controller has a tracking model, or W another
+    length than S (which has three values at least).
     """
     if controller.A_m.size > 1 or controller.B_m.size > 1:
         raise BadSpecification("a drive's law has no tracking model; put B_m/A_m before it")
@@ -63,8 +69,8 @@ def drive_law(controller: RST, forget: float | None, per_output: float = 1.0) ->
     size = max(controller.R.size, controller.S.size, 3)
     S = np.pad(controller.S, (0, size - controller.S.size)) / first
     R, T = (c / (first * per_output) for c in (controller.R, controller.T))
-    W = forgetting(S, forget, controller.h)
-    return DriveLaw(_tuple(R), _tuple(S), _tuple(T), _tuple(W), controller.h)
+    W = W or _tuple(forgetting(S, forget, controller.h))
+    return DriveLaw(_tuple(R), _tuple(S), _tuple(T), W, controller.h)
 
 
 def _tuple(values: Array) -> tuple[float, ...]:

@@ -11,12 +11,12 @@ from typing import Any, Literal
 import numpy as np
 
 from design.compensator import Compensator
-from design.drive_law import DriveLaw
+from design.drive_law import DriveLaw, drive_law
 from design.filters import CompensatorFilters
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
-from identification.errors import BadModel
+from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.parameter_units import converted, friction_units, in_unit, shown
@@ -94,8 +94,8 @@ class Controller:
 
     dominant: (w_n [rad/s], zeta); auxiliary: poles z as (re, im). rate: the reference is moved at
     most at this speed [m/s], None for any; lag [s] and overshoot [-] as `design.tracking` has
-    them. missed: goals not kept. gains: of a PID in parallel form. law: the same in the drive's own
-    terms, None in older files.
+    them. missed: goals not kept. gains: of a PID in parallel form. W: its anti-windup as
+    `design.drive_law` has it, None in older files.
     """
 
     R: tuple[float, ...]
@@ -111,12 +111,22 @@ class Controller:
     missed: tuple[str, ...]
     gains: PIDGains | None = None
     note: str | None = None
-    law: DriveLaw | None = None
+    W: tuple[float, ...] | None = None
 
     @property
     def rst(self) -> RST:
         """The controller for the loop."""
         return RST(np.array(self.R), np.array(self.S), np.array(self.T), self.h)
+
+    def law(self, command: Command) -> DriveLaw:
+        """The controller in the drive's own terms.
+
+        Without a W, above a force loop an integrator forgets in 1/w_n what was not carried out,
+        beside the loop's own anti-windup; else the whole controller forgets it at once.
+        """
+        per = command.force_per_command
+        forget = 1.0 / self.dominant[0] if per is None else 0.0
+        return drive_law(self.rst, forget, 1.0 if per is None else per, self.W)
 
 
 @dataclass(frozen=True)
@@ -318,9 +328,10 @@ def read_design(path: Path) -> Design:
     units = _units_of(written)
     try:
         found = _from_file(written, units)
+        _refuse_other_laws(written, found, units)
         pairs = tuple(_pairs(written, _as_file(found, units), ""))
         _refuse_changed_units(pairs, found)
-    except BadModel as error:
+    except (BadModel, BadSpecification) as error:
         raise BadModel(f"{path}: {error}") from None
     if not found.controllers:
         raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
@@ -361,6 +372,24 @@ def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], fou
         refuse_unequal("[plant.h]", other, same, used(ours), f"[{name}.h]")
 
 
+def _refuse_other_laws(written: _DesignFile, found: Design, units: _Units) -> None:
+    """Raises BadModel where a law is not the controller beside it."""
+    for name, one in (("rst", written.rst), ("pid", written.pid)):
+        if one is None or one.law is None:
+            continue
+        if found.command is None:
+            raise BadModel(f"[{name}.law] needs [command]; run 'workbench design' again")
+        law = law_of(one.law, units.drive, f"{name}.law")
+        ours = found.controllers[name].law(found.command)
+        for key in "RST":
+            mine, other = getattr(ours, key), getattr(law, key)
+            if len(mine) != len(other) or not np.allclose(mine, other, rtol=1e-9, atol=0.0):
+                raise BadModel(
+                    f"[{name}.law] {key} is not [{name}] {key} in the unit of the command; run"
+                    " 'workbench design' again"
+                )
+
+
 def _plain(value: object) -> Any:
     """Dataclasses as dictionaries, parameters as results carry them."""
     if isinstance(value, Estimate):
@@ -377,7 +406,7 @@ def _as_file(found: Design, units: _Units) -> _DesignFile:
     limit = found.command.limit if found.command else None
 
     def controller(one: Controller | None) -> _ControllerFile | None:
-        return None if one is None else _controller_file(one, found.output, limit, units)
+        return None if one is None else _controller_file(one, found.command, found.output, units)
 
     return _DesignFile(
         card=found.card,
@@ -409,7 +438,7 @@ def _gains_file(gains: PIDGains, units: _Units) -> _GainsFile:
 
 
 def _controller_file(
-    one: Controller, output: Output, limit: float | None, units: _Units
+    one: Controller, command: Command | None, output: Output, units: _Units
 ) -> _ControllerFile:
     w_n, zeta = one.dominant
     reason = None if one.rate is not None else "no limit of force or command to keep"
@@ -427,7 +456,7 @@ def _controller_file(
         missed=one.missed,
         gains=None if one.gains is None else _gains_file(one.gains, units),
         note=one.note,
-        law=None if one.law is None else law_file(one.law, output, limit, units.drive),
+        law=law_file(one.law(command), output, command.limit, units.drive) if command else None,
     )
 
 
@@ -493,7 +522,7 @@ def _controller(one: _ControllerFile, units: _Units, where: str) -> Controller:
         missed=one.missed,
         gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
         note=one.note,
-        law=None if one.law is None else law_of(one.law, units.drive, f"{where}.law"),
+        W=None if one.law is None else one.law.W,
     )
 
 

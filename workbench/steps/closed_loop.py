@@ -19,7 +19,7 @@ from identification.model.plant import Actuator, Motor
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
-from workbench.steps.design import command_of, law_of_poles
+from workbench.steps.design import command_of
 
 
 @dataclass(frozen=True)
@@ -49,10 +49,9 @@ def driven_loop(
 ) -> DrivenLoop:
     """A design's controller as its drive runs it; of an older file as it is run on the machine."""
     command = found.command or command_of(machine, found.force)
-    law = one.law or law_of_poles(one.rst, one.dominant[0], command)
     filters = found.compensator.filters or filters_at(one.h)
     return DrivenLoop(
-        law=law,
+        law=one.law(command),
         force=found.force,
         rate=one.rate,
         limit=command.limit,

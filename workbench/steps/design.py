@@ -2,14 +2,13 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
-from design.drive_law import DriveLaw, drive_law
 from design.filters import filters_at
 from design.linear import ForceGains, force_gains, linear_plant
-from design.rst import RST
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.arrays import Array
@@ -291,7 +290,7 @@ def effort_limit(model: Model) -> float | None:
 
 def _controller(tuned: Tuned, command: Command, units: Shown) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
-    return Controller(
+    found = Controller(
         R=tuple(rst.R.tolist()),
         S=tuple(rst.S.tolist()),
         T=tuple(rst.T.tolist()),
@@ -305,19 +304,8 @@ def _controller(tuned: Tuned, command: Command, units: Shown) -> Controller:
         missed=tuned.missed,
         gains=None if pid is None else pid.gains,
         note="; ".join(_notes(tuned, units)),
-        law=law_of_poles(rst, tuned.dominant[0], command),
     )
-
-
-def law_of_poles(rst: RST, w_n: float, command: Command) -> DriveLaw:
-    """The controller in the drive's own terms; w_n [rad/s] of its dominant poles.
-
-    Above a force loop an integrator forgets in 1/w_n what was not carried out, beside the loop's
-    own; else the whole controller forgets it at once.
-    """
-    if command.force_per_command is None:
-        return drive_law(rst, 1.0 / w_n)
-    return drive_law(rst, 0.0, command.force_per_command)
+    return replace(found, W=found.law(command).W)
 
 
 def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
