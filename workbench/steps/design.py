@@ -35,6 +35,7 @@ N_C = 2.0  # the paper's, in simulation and on the rig
 E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
 LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
 SLOWED = 4  # times that a controller is made slower for the sake of its reference
+ENOUGH = 0.95  # of the w_n that would just do
 SLOWEST_CUT = 0.3  # of its w_n that is left at once, at least
 OVERSHOOT = 0.05  # of a step, in the linear loop
 NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
@@ -144,7 +145,7 @@ def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -
         if speed is None or rate is None or rate >= speed:
             break
         try:
-            fastest = found.dominant[0] * max(rate / speed, SLOWEST_CUT)
+            fastest = ENOUGH * found.dominant[0] * max(rate / speed, SLOWEST_CUT)
             slower = tune(goals=replace(goals, fastest=fastest))
         except BadSpecification:
             break
