@@ -121,7 +121,7 @@ def present_figures(
 ) -> tuple[LoopFigures, Traces] | None:
     """The controller that the model's machine has now, on a machine, along the design's motion.
 
-    None where the card named none.
+    None where the card named none. Raises BadModel where it cannot be simulated.
     """
     now = model.present
     if now is None:

@@ -121,6 +121,19 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     assert result.why.startswith(found.recommended.upper())
 
 
+def test_a_present_controller_that_cannot_be_simulated_is_told() -> None:
+    model, found = motor()
+    unknown = replace(model, actuator=None, rig=replace(model.rig, kind="force"))
+    result, _ = validate(unknown, found, np.random.default_rng(0))
+    assert PRESENT not in result.figures
+    assert any("the present controller is not shown on the model: it gives" in line
+               for line in result.remarks)  # fmt: skip
+    away = now(replace(model, rig=replace(model.rig, control_limit=None)), 1e6)
+    result, _ = validate(away, found, np.random.default_rng(0))
+    shown = result.figures.get(PRESENT)
+    assert shown is None or not shown["model"].passed
+
+
 def test_its_margins_are_those_of_its_own_period() -> None:
     model, found = motor()
     figures, _ = validate(model, found, np.random.default_rng(0))
