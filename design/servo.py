@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
+from design.drive_law import forgetting
 from design.filters import PASS, CompensatorFilters, sampled
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
-from design.pid import INTEGRATOR
-from design.polynomial import divide, trim
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST
 from design.servo_kernels import (
@@ -44,6 +43,7 @@ class Compensation:
     filters: CompensatorFilters
 
 
+DIRECT = ForcePI(0.0, 1.0)  # as the kernels take it that there is no force loop
 Countermeasure = Compensation | DisturbanceObserver | FrictionObserver
 
 
@@ -56,7 +56,9 @@ class Servo:
     the command). dither: added to the command. control_limit: of |u| [V]; force_limit: of the
     force reference [N]. anti_windup [s]: in which time an RST's integrator forgets what a clipped
     command did not carry out; 0: the whole controller forgets it at once; None: never. A PID stops
-    its sum while it would drive the command further out.
+    its sum while it would drive the command further out. W: in place of anti_windup, that of a
+    `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own.
+    direct: an actuator takes the position controller's output as its command, without a force loop.
 
     Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
@@ -68,6 +70,15 @@ class Servo:
     control_limit: float | None = None
     force_limit: float | None = None
     anti_windup: float | None = None
+    W: tuple[float, ...] | None = None
+    k_a: float | None = None
+    direct: bool = False
+
+    def __post_init__(self) -> None:
+        if self.direct and (self.force is not None or self.friction is not None):
+            raise BadModel(
+                "a command without a force loop takes no force of a loop or a countermeasure"
+            )
 
     @property
     def linear(self) -> RST:
@@ -130,7 +141,7 @@ def simulate_servo(
     cannot be followed.
     """
     ratio = max(1, round(servo.linear.h / h))
-    cascade = Cascade(servo.linear, servo.force, servo.control_limit)
+    cascade = Cascade(servo.linear, DIRECT if servo.direct else servo.force, servo.control_limit)
     loop, p = prepared_loop([plant], cascade, reference, h, noise, start, ratio)
     n, table = len(loop.reference), effect_table(plant.effects)
     codes = np.where(table.codes == ON_ACTUATOR, -1, table.codes) if loop.motor else table.codes
@@ -139,7 +150,9 @@ def simulate_servo(
     t = h * np.arange(n, dtype=np.float64)
     law = _law(servo, loop.R, loop.S, ratio * h)
     shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
-    k_a = plant.actuator.k_a if isinstance(plant.actuator, Motor) else 0.0
+    k_a = 0.0
+    if isinstance(plant.actuator, Motor):
+        k_a = plant.actuator.k_a if servo.k_a is None else servo.k_a
     limits = (loop.limit, math.inf if servo.force_limit is None else servo.force_limit)
     out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
     y_noise, f_noise = (np.ascontiguousarray(one[:, 0]) for one in (loop.noise.y, loop.noise.F))
@@ -204,7 +217,7 @@ def settled(b: Array, a: Array, x: float) -> Array:
 def _law(servo: Servo, R: Array, S: Array, h: float) -> Law:
     law = friction_law(servo.friction, h)
     if isinstance(servo.position, RST):
-        return law._replace(R=R, S=S, W=_forgetting(S, servo.anti_windup, h))
+        return law._replace(R=R, S=S, W=_observer(S, servo, h))
     pid = servo.position
     per_difference, pole = pid.T_d / pid.eps, math.exp(-h / pid.eps)
     rule = float(RULES.index(pid.rule))
@@ -212,18 +225,10 @@ def _law(servo: Servo, R: Array, S: Array, h: float) -> Law:
     return law._replace(position=PID_LAW, pid=constants)
 
 
-def _forgetting(S: Array, time: float | None, h: float) -> Array:
-    """S (n,) with its integrators, poles at z = 1, replaced by poles that decay in `time` [s]."""
-    if time is None:
-        return S
-    if time == 0.0:
-        return np.where(np.arange(len(S)) == 0, 1.0, 0.0)
-    left, kept = trim(S), np.ones(1)
-    while left.size > 1 and abs(left.sum()) < 1e-9 * np.abs(left).sum():
-        left = divide(left, INTEGRATOR)[0]
-        kept = np.convolve(kept, [1.0, -math.exp(-h / time)])
-    W = np.convolve(left, kept)
-    return np.pad(W, (0, len(S) - len(W)))
+def _observer(S: Array, servo: Servo, h: float) -> Array:
+    if servo.W is None:
+        return forgetting(S, servo.anti_windup, h)
+    return np.pad(np.array(servo.W), (0, len(S) - len(servo.W)))
 
 
 def _memory(law: Law, x: Array, start: tuple[float, float, float]) -> Memory:

@@ -153,14 +153,15 @@ def servo_sample(
     """Command [V], what the position controller wants, and the force loop's integral.
 
     acts: whether the position controller has its turn; k_a: of a motor, whose controller wants
-    volts, or 0; shake: the dither [V]; limits: of the command [V] and of the force reference [N].
-    Where the command is clipped, what was carried out is the force reference that gives it.
+    volts, or 0; pi: gains of the force loop, 0 where the controller wants volts too; shake: the
+    dither [V]; limits: of the command [V] and of the force reference [N]. Where the command is
+    clipped, what was carried out is the force reference that gives it.
     """
     limit, most = limits
     asked = position_force(c, s, r, fed, y) if acts else wanted
     added = friction_force(c, s, r, y, F) if acts else float(s.last[ADDED])
-    if k_a != 0.0:
-        free = asked + added / k_a
+    if k_a != 0.0 or pi[0] == 0.0:
+        free = asked + (added / k_a if k_a != 0.0 else 0.0)
         held = min(max(free, -limit), limit)
         u = min(max(held + shake, -limit), limit)
         wanted, taken = asked, asked + held - free

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from workbench.interface.calls import trace as trace
     from workbench.interface.calls import validate as validate
     from workbench.steps.identify_sources import Options as Options
-    from workbench.steps.validate import Limits as Limits
+    from workbench.steps.loop_figures import Limits as Limits
 
 _CALLS = "workbench.interface.calls"
 _HOMES = {
@@ -34,7 +34,7 @@ _HOMES = {
     "NotIdentifiable": "identification.errors",
     "UserError": "identification.errors",
     "Options": "workbench.steps.identify_sources",
-    "Limits": "workbench.steps.validate",
+    "Limits": "workbench.steps.loop_figures",
 }
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from workbench.options import POSITIVE, effects_option
+from workbench.options import POSITIVE, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -42,6 +42,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
     help="Largest force, relative to the largest in the logs of the machine's model.",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@present_card_option
 @effects_option
 @output_options
 def command(
@@ -55,6 +56,7 @@ def command(
     overshoot: float,
     force: float,
     seed: int,
+    card: str | None,
     effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
@@ -73,10 +75,12 @@ def command(
     from workbench.documents.model import read_model
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
-    from workbench.steps.validate import Limits, validate, validation_document
+    from workbench.steps.loop_figures import Limits
+    from workbench.steps.present import with_card
+    from workbench.steps.validate import validate, validation_document
 
     known = library(effects)
-    model, found = read_model(model_file, known), read_design(design_file)
+    model, found = with_card(read_model(model_file, known), card), read_design(design_file)
     plant = read_model(plant_file, known) if plant_file else None
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     with OutputFolder("validate", out, now=datetime.now()) as folder:
@@ -86,5 +90,9 @@ def command(
         document = validation_document(result)
         folder.write_json("validation.json", document)
         folder.write_text("report.html", validation_report(result, traces, model.rotary))
-    emit({**document, "out": folder.final}, as_json, lambda: validation_view(result, folder.final))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: validation_view(result, folder.final, model.rotary),
+    )
     return 0 if result.passed else 1

@@ -52,10 +52,10 @@ from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 from workbench.steps.identify_sources import Options, identify_sources
+from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import named_logs, trace_sources
-from workbench.steps.validate import Limits
 from workbench.steps.validate import validate as validate_design
 
 if TYPE_CHECKING:
@@ -220,7 +220,7 @@ def simulate(
         log = record(card.name, card.recipe, seed, card.rig())
     frame = pd.DataFrame(as_columns(log, card))
     frame.attrs["name"] = card.name
-    known = truth(card.name, card.recipe, seed, motion=card.rig().motion)
+    known = truth(card.name, card.recipe, seed, rig=card.rig())
     return SimulateResult(frame, known, card, log)
 
 

@@ -37,11 +37,6 @@ _RIG_KEYS: Mapping[str, tuple[str, tuple[str, ...]]] = {  # key of a card, SI un
     "area_n": ("area_n_m2", ("m^2",)),
     "supply_pressure": ("supply_pressure_pa", ("Pa",)),
     "stroke": ("stroke_m", ("m", "rad")),
-    "control_limit": ("control_limit_v", ("V", "A", "1")),
-    "force_per_command": (
-        "force_per_command",
-        ("N/V", "N/A", "N", "N*m/V", "N*m/A", "N*m"),
-    ),
 }
 
 

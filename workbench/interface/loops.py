@@ -8,7 +8,8 @@ from identification.errors import BadModel
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.interface.result import Part, Result
-from workbench.steps.validate import Traces, Validation
+from workbench.steps.loop_figures import Traces
+from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -112,7 +113,7 @@ class ValidateResult(Result):
     def plot(self) -> "Figure":
         from workbench.report.loop import loop_figure
 
-        return loop_figure(self.traces, "model", self.rotary)
+        return loop_figure(self.found, self.traces, "model", self.rotary)
 
     def _view(self) -> object:
         from workbench.report.validation_tables import validation_view
@@ -121,7 +122,7 @@ class ValidateResult(Result):
 
     def _told(self) -> tuple[str, Sequence[Part]]:
         from workbench.report.validation_tables import (
-            VALIDATION_HEAD,
+            validation_head,
             validation_lines,
             validation_rows,
             validation_verdict,
@@ -129,7 +130,9 @@ class ValidateResult(Result):
 
         rows = validation_rows(self.found, self.rotary)
         lines = validation_lines(self.found, self.rotary)
-        return f"{validation_verdict(self.found)}.", [Part(VALIDATION_HEAD, rows, lines)]
+        return f"{validation_verdict(self.found)}.", [
+            Part(validation_head(self.found, self.rotary), rows, lines)
+        ]
 
     def _files(self) -> Iterator[tuple[str, str]]:
         yield "validation.json", self.to_json() + "\n"

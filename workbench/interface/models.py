@@ -61,7 +61,7 @@ class _OfModel(Result):
         period [s]: by default as for a design. Raises NotIdentifiable where the model carries none.
         """
         from design.convert import to_control
-        from workbench.steps.design import linear_of
+        from workbench.steps.linear_loop import linear_of
 
         plant, _ = linear_of(self.model, None, period)
         return to_control(plant.A, plant.B, plant.h)

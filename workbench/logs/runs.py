@@ -80,9 +80,8 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
     remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
-    return Prepared(
-        prepared.runs, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    )  # fmt: skip
+    remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
+    return Prepared(prepared.runs, remarks, bad, repaired.log.h)
 
 
 def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:
@@ -225,7 +224,7 @@ def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -
     if spec.offset != 0.0:
         values = values - spec.offset
     try:
-        factor, shift = spec.scale(name, rig.motion)
+        factor, shift = spec.scale(name, rig)
     except BadCard as error:
         raise BadCard(f"{card.path}: {error}") from None
     if factor != 1.0:

@@ -17,12 +17,16 @@ from workbench.logs.table import Table
 
 @dataclass(frozen=True)
 class Source:
-    """One run of a file: its log on an even clock, the file's name, hash and rows."""
+    """One run of a file: its log on an even clock, the file's name, hash and rows.
+
+    period: of the samples in the file [s]; None where it is that of the log.
+    """
 
     log: Log
     file: str
     sha256: str
     rows: int
+    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +75,7 @@ def sources_of(logs: Sequence[str | Recorded], card: Card) -> Sources:
             prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)
-        found.extend((whole, _source(one, path, run)) for run in prepared.runs)
+        found.extend((whole, _source(one, path, run, prepared.period)) for run in prepared.runs)
     names_of = Counter(path.name for path in rigs)
     runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
@@ -85,11 +89,11 @@ def sources_of(logs: Sequence[str | Recorded], card: Card) -> Sources:
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 
 
-def _source(log: str | Recorded, path: Path, run: Log) -> Source:
+def _source(log: str | Recorded, path: Path, run: Log, period: float | None) -> Source:
     if isinstance(log, Recorded):
-        return Source(run, log.name, log.sha256, len(run))
+        return Source(run, log.name, log.sha256, len(run), period)
     found = fingerprint(path, run)
-    return Source(run, found.file, found.sha256, found.rows)
+    return Source(run, found.file, found.sha256, found.rows, period)
 
 
 def _told_apart(source: Source, path: Path) -> Source:

@@ -1,23 +1,81 @@
 """A design in its loop on a machine: what `design.loop` needs, put together from results."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from design.compensator import Compensator
+from design.drive_law import DriveLaw
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
-from design.rst import RST
-from design.servo import Compensation, Servo, simulate_servo
+from design.servo import Compensation, Servo, ServoRun, simulate_servo
 from design.tracking import rate_limited
 from identification.arrays import Array, frozen
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Actuator, Motor
 from workbench.documents.design import Controller, Design
+from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model
+from workbench.steps.linear_loop import command_of
+
+
+@dataclass(frozen=True)
+class DrivenLoop:
+    """A law in the loop that it closes: what stands between the sensors and the machine.
+
+    force: the loop below it, None where its output is the command. rate: the reference is moved at
+    most at this speed [m/s]. limit: of the command, in its unit. k_a: by which the compensation's
+    force becomes a command; None: the motor's own. direct: an actuator takes the law's output.
+    """
+
+    law: DriveLaw
+    force: ForceLoop | None = None
+    rate: float | None = None
+    limit: float | None = None
+    compensation: Compensation | None = None
+    k_a: float | None = None
+    direct: bool = False
+
+    @property
+    def h(self) -> float:
+        """The period of the loop's samples [s]."""
+        return self.force.h if self.force else self.law.h
+
+
+def driven_loop(
+    machine: Model, found: Design, one: Controller, compensator: Compensator | None = None
+) -> DrivenLoop:
+    """A design's controller as its drive runs it; of an older file as it is run on the machine."""
+    command = found.command or command_of(machine, found.force)
+    filters = found.compensator.filters or filters_at(one.h)
+    return DrivenLoop(
+        law=one.law(command),
+        force=found.force,
+        rate=one.rate,
+        limit=command.limit,
+        compensation=None if compensator is None else Compensation(compensator, filters),
+        k_a=command.force_per_command,
+    )
+
+
+def present_loop(machine: Model, now: Present) -> DrivenLoop:
+    """The controller that the machine has now, as its drive runs it.
+
+    Where no command is logged its force loop is not known to the model, and gives what is asked.
+    Raises BadModel where the controller gives a command of which the logs do not tell the force.
+    """
+    drive = machine.simulated.actuator
+    force = now.force if isinstance(drive, Actuator) else None
+    command = command_of(machine, force)
+    if drive is None and now.output == "command" and machine.rig.command_unit != command.unit:
+        raise BadModel(
+            f"it gives a command in {machine.rig.command_unit}, and no log tells what force that"
+            " makes; log the command"
+        )
+    return DrivenLoop(now.law, force, now.rate, command.limit, direct=now.output == "command")
 
 
 def run_loop(
@@ -28,45 +86,61 @@ def run_loop(
     rng: np.random.Generator,
     compensator: Compensator | None = None,
 ) -> LoopRun:
-    """One reference r [m], (n,) at `loop_period`, through the loop, with the machine's noise.
+    """One reference r [m], (n,) at `loop_period`, through the design's loop; see `run_driven`."""
+    return run_driven(machine, driven_loop(machine, found, one, compensator), r, rng)
+
+
+def run_driven(
+    machine: Model, loop: DrivenLoop, r: Array, rng: np.random.Generator | None
+) -> ServoRun:
+    """One reference r [m], (n,) every loop.h, through the loop; with the machine's noise by rng.
 
     The controller sees it moved at its own rate; the run has it as given. A machine without an
-    actuator takes the force reference as its force, and the rig's limit of the command [V] says
-    nothing of it. The compensator runs with the position controller, behind `filters_at`. Raises
-    BadModel where the design has a force loop and the machine nothing for it to drive, or the other
-    way round.
+    actuator takes the law's output as its force. Raises BadModel where there is a force loop and
+    nothing for it to drive, or the other way round.
     """
-    moved = rate_limited(r, one.rate, loop_period(found))
     plant = replace(machine.simulated, effects=in_the_loop(machine))
-    servo, whole = _servo(plant, found, one)
-    limit = None if plant.actuator is None else machine.rig.control_limit
-    if compensator is not None:
-        servo = replace(servo, friction=Compensation(compensator, filters_at(one.h)))
+    direct = isinstance(plant.actuator, Actuator) and loop.direct
+    if isinstance(plant.actuator, Actuator):
+        if loop.force is None and not direct:
+            raise BadModel("the machine has an actuator, the design no force loop for it")
+    elif loop.force is not None:
+        raise BadModel("the design has a force loop, the machine no actuator for it")
+    force = None if loop.force is None else ForcePI(loop.force.k_i, loop.force.T_i)
+    servo = Servo(
+        loop.law.rst,
+        force,
+        friction=loop.compensation,
+        control_limit=limit_on(machine, loop),
+        W=loop.law.W,
+        k_a=loop.k_a,
+        direct=direct,
+    )
     run = simulate_servo(
-        whole,
-        replace(servo, control_limit=limit),
-        moved,
-        loop_period(found),
-        noise=LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng),
+        plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
+        servo,
+        rate_limited(r, loop.rate, loop.h),
+        loop.h,
+        noise=_noise(machine, len(r), rng),
         start=(float(r[0]), 0.0, 0.0),
         signals=_chambers(machine.rig),
     )
     return replace(run, r=frozen(r))
 
 
-def _servo(plant: Plant, found: Design, one: Controller) -> tuple[Servo, Plant]:
-    """The design's loops for this plant, and the plant that they drive."""
-    if isinstance(plant.actuator, Actuator):
-        if found.force is None:
-            raise BadModel("the machine has an actuator, the design no force loop for it")
-        force = ForcePI(found.force.k_i, found.force.T_i)
-        return Servo(one.rst, force, anti_windup=1.0 / one.dominant[0]), plant
-    if found.force is not None:
-        raise BadModel("the design has a force loop, the machine no actuator for it")
-    motor = plant.actuator or Motor(1.0)
-    rst = one.rst
-    volts = RST(rst.R / motor.k_a, rst.S, rst.T / motor.k_a, rst.h)
-    return Servo(volts, None, anti_windup=0.0), replace(plant, actuator=motor)
+def limit_on(machine: Model, loop: DrivenLoop) -> float | None:
+    """The limit of the command of a loop on a machine: the law's, and that of the machine's drive.
+
+    A machine without an actuator takes a force, of which a limit of its command says nothing.
+    """
+    own = None if machine.simulated.actuator is None else machine.rig.control_limit
+    return min((one for one in (loop.limit, own) if one is not None), default=None)
+
+
+def _noise(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise | None:
+    if rng is None:
+        return None
+    return LoopNoise.draw(n, machine.fit.noise_y, machine.fit.noise_F, rng)
 
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:

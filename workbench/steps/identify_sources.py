@@ -12,6 +12,7 @@ from workbench.documents.model import Model, as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
+from workbench.steps.present import present_of_card
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
@@ -51,7 +52,8 @@ def identify_sources(
         options=options,
         on_progress=on_progress,
     )
-    model = replace(model, bad_samples=(*sources.bad, *fit.bad))
+    now = present_of_card(sources.card, sources.rig, model.period)
+    model = replace(model, bad_samples=(*sources.bad, *fit.bad), controller=now)
     walk = _walk(sources, fit, seed, on_progress) if posterior else None
     if walk is not None:
         model = replace(model, posterior=_posterior(walk, fit))

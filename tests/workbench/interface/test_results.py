@@ -59,8 +59,8 @@ def test_the_plant_and_the_loop_in_python_control() -> None:
     slow = np.exp(1e-4j)
     gain = loop.plant(slow) / (1.0 + loop.plant(slow) * loop.feedback(slow)) * loop.forward(slow)
     assert abs(gain) == pytest.approx(1.0, abs=1e-3)
-    named = designed.to_control("pid")
-    assert named.feedback.num[0][0].tolist() != loop.feedback.num[0][0].tolist()
+    laws = [designed.to_control(name).feedback.num[0][0].tolist() for name in ("pid", "rst")]
+    assert laws[0] != laws[1] and loop.feedback.num[0][0].tolist() in laws
     assert model.to_control(period=0.02).dt == pytest.approx(0.02)
 
 

@@ -144,7 +144,7 @@ def test_the_truth_has_every_parameter_with_its_unit() -> None:
             "delta": {"value": 2.0, "unit": "1", **bare},
         }
     }
-    turning = truth("x", with_effects(acting("spring")), motion="rotary")
+    turning = truth("x", with_effects(acting("spring")), rig=Rig("force", motion="rotary"))
     assert turning["effects"]["spring"]["k"]["unit"] == "N m/rad"
 
 
@@ -203,7 +203,7 @@ def test_a_log_without_the_effect_s_signals_is_refused() -> None:
 
 def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     plain = model_of(EMPS, k_a=35.15)
-    found = design(plain)
+    found = design(plain, period=10e-3)
     assert found.rst is not None
     spring = built_in()["spring"].acting({"k": 2000.0})
     whole = replace(plain, effects={"spring": exact(spring, "linear")})
