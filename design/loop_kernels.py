@@ -8,7 +8,7 @@ figure 1, upper.
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.compiled import compiled, compiled_inline
+from identification.compiled import compiled, compiled_exact, compiled_inline
 from identification.simulation.karnopp_lanes import (
     GAIN,
     V_OLD,
@@ -50,7 +50,7 @@ RECORD_Y, RECORD_F, RECORD_V, RECORD_U, RECORD_MODE = range(5)
 RECORDS = 5
 
 
-@compiled_inline
+@compiled_exact
 def force_command(
     wanted: float, force: float, integral: float, k_p: float, k_int: float, limit: float
 ) -> tuple[float, float]:
@@ -65,7 +65,7 @@ def force_command(
     return u, integral + k_int * driving
 
 
-@compiled_inline
+@compiled_exact
 def shift(x: Array, R: Array, S: Array, y: float, u: float) -> None:
     """Next state x (deg+1,), last entry 0, of S u = T r - R y in observer form."""
     for j in range(len(x) - 1):

@@ -10,8 +10,7 @@ from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
 from design.rst import RST
 from design.servo import Compensation, Servo, simulate_servo
-from design.tracking import rate_limited
-from identification.arrays import Array, frozen
+from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
@@ -36,22 +35,20 @@ def run_loop(
     BadModel where the design has a force loop and the machine nothing for it to drive, or the other
     way round.
     """
-    moved = rate_limited(r, one.rate, loop_period(found))
     plant = replace(machine.simulated, effects=in_the_loop(machine))
     servo, whole = _servo(plant, found, one)
     limit = None if plant.actuator is None else machine.rig.control_limit
     if compensator is not None:
         servo = replace(servo, friction=Compensation(compensator, filters_at(one.h)))
-    run = simulate_servo(
+    return simulate_servo(
         whole,
-        replace(servo, control_limit=limit),
-        moved,
+        replace(servo, control_limit=limit, rate=one.rate),
+        r,
         loop_period(found),
         noise=LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng),
         start=(float(r[0]), 0.0, 0.0),
         signals=_chambers(machine.rig),
     )
-    return replace(run, r=frozen(r))
 
 
 def _servo(plant: Plant, found: Design, one: Controller) -> tuple[Servo, Plant]:
