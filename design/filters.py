@@ -89,8 +89,8 @@ def sampled(one: Filter, slope: Filter | None = None) -> Sampled:
 def settled(one: Sampled, x: float) -> Array:
     """The state of the filter, of the length of b, last entry 0, that a past of `x` leaves."""
     b, a = one.b, np.pad(one.a, (0, one.b.size - one.a.size))
-    out = x * float(b.sum() / a.sum())
-    return np.append(np.cumsum((b * x - a * out)[:0:-1])[::-1], 0.0)
+    left = b - a * float(b.sum() / a.sum())
+    return np.asarray(x * np.append(np.cumsum(left[:0:-1])[::-1], 0.0), dtype=np.float64)
 
 
 @compiled_exact

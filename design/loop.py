@@ -330,7 +330,7 @@ def observer_form(controller: RST, y_0: float) -> tuple[Array, Array, Array]:
     size = max(controller.R.size, controller.S.size, 3)
     R = np.pad(controller.R, (0, size - controller.R.size)) / controller.S[0]
     S = np.pad(controller.S, (0, size - controller.S.size)) / controller.S[0]
-    x = np.append(-y_0 * np.cumsum(R[:0:-1])[::-1], 0.0)
+    x = y_0 * np.append(-np.cumsum(R[:0:-1])[::-1], 0.0)
     return R, S, x
 
 

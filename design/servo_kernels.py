@@ -26,7 +26,7 @@ SUM, SLOPE, ERROR = range(3)
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
 # What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
-R_MOVED, INTEGRAL_SUM = range(2)
+R_MOVED, INTEGRAL_SUM, COMMAND = range(3)
 
 
 class Law(NamedTuple):
@@ -72,8 +72,8 @@ class Law(NamedTuple):
 
 class Memory(NamedTuple):
     """A servo's state: controller, PID (3,), filters of reference, velocity, error and C, Kalman
-    filter (12,), what the last sample left (4,), reference moved and sum of the force error (2,),
-    the force loop's samples since the position controller had its turn (1,)."""
+    filter (12,), what the last sample left (4,), reference moved, sum of the force error and a
+    motor's command (3,), the force loop's samples since the position controller's turn (1,)."""
 
     x: Array
     pid: Array
@@ -161,35 +161,39 @@ def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> N
 def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) -> float:
     """Command [V] of one sample at reference r, position y [m] and force F [N]; shake: the dither.
 
-    Where the command is clipped, what was carried out is the force reference that gives it.
+    A motor's force is not measured: it is that of the command before. Where the command is
+    clipped, what was carried out is the force reference that gives it.
     """
+    aim = r
     if c.rate < math.inf:
-        r = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
-        s.held[R_MOVED] = r
+        aim = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
+        s.held[R_MOVED] = aim
     acts = c.ratio == 1 or s.turn[0] == 0
-    asked = s.last[WANTED]
-    if acts:
-        asked = position_force(c, s, r, y)
-        friction_force(c, s, r, y, F)
-    added = s.last[ADDED]
+    asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
+    added = 0.0
+    if c.friction != NO_COUNTERMEASURE:
+        force = c.k_a * s.held[COMMAND] if c.k_a != 0.0 else F
+        added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
     if c.k_a != 0.0:
-        free = asked + added / c.k_a
+        free = asked + added / c.k_a if c.friction != NO_COUNTERMEASURE else asked
         u = min(max(free, -c.limit), c.limit)
-        taken = asked + u - free
+        taken = asked + (u - free)
         s.last[WANTED] = asked
     else:
-        wanted = min(max(asked + added, -c.force_limit), c.force_limit) - added
+        wanted = asked + added if c.friction != NO_COUNTERMEASURE else asked
+        total = min(max(wanted, -c.force_limit), c.force_limit)
         before = s.held[INTEGRAL_SUM]
-        u, s.held[INTEGRAL_SUM] = force_command(wanted + added, F, before, c.k_i, c.k_int, c.limit)
-        taken = wanted
-        free = c.k_i * (wanted + added - F) + before
-        if free != u and c.k_i > 0.0:
+        u, free, s.held[INTEGRAL_SUM] = force_command(total, F, before, c.k_i, c.k_int, c.limit)
+        s.last[WANTED] = total - added if c.friction != NO_COUNTERMEASURE else total
+        taken = s.last[WANTED]
+        if u != free and c.k_i > 0.0:
             taken = F + (u - before) / c.k_i - added
-        s.last[WANTED] = wanted
     if shake != 0.0:
         u = min(max(u + shake, -c.limit), c.limit)
     if acts:
         position_moved(c, s, y, asked, taken)
+    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE:
+        s.held[COMMAND] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0
     return float(u)
