@@ -20,10 +20,9 @@ import numpy as np
 
 from identification.effects._library import built_in
 from identification.errors import UserError
-from identification.log import Log
+from identification.log import Log, Rig
 from identification.tracing.result import Errors, FoundEffect, Trace
 from workbench.cards.card import load_card
-from workbench.cards.units import Motion
 from workbench.logs.fetch import DATA_VARIABLE, card_path
 from workbench.logs.sources import Sources, read_sources
 from workbench.steps.trace import Traced, effect_estimates, trace_sources
@@ -133,11 +132,11 @@ def row(chapter: Chapter) -> tuple[Sequence[str], list[str]]:
         spent = time.perf_counter() - start
         return (chapter.name, f"refused: {error}", *[""] * (len(HEAD) - 3), f"{spent:.1f}"), []
     spent = time.perf_counter() - start
-    motion = found.model.rig.motion
+    rig = found.model.rig
     cells = (
         chapter.name,
         verdict(found.trace),
-        "; ".join(effect(e, motion) for e in found.trace.effects) or "-",
+        "; ".join(effect(e, rig) for e in found.trace.effects) or "-",
         *(force(found.trace, where) for where in ("train", "test")),
         *(errors(found.trace, "position_rms", where, 1e3) for where in ("train", "test")),
         errors(found.trace, "actuator_rms", "test", 1.0),
@@ -158,10 +157,10 @@ def verdict(found: Trace) -> str:
     return f"{found.verdict} ({', '.join(left.depends_on)}: {100 * left.explained:.0f} %)"
 
 
-def effect(found: FoundEffect, motion: Motion) -> str:
+def effect(found: FoundEffect, rig: Rig) -> str:
     """An effect with its parameters and their 95 % half-widths."""
     told = []
-    for name, one in effect_estimates(found, motion).items():
+    for name, one in effect_estimates(found, rig).items():
         if one.value == 0 and not one.sd:
             continue  # held at nothing
         value = "?" if one.value is None else f"{one.value:.4g}"

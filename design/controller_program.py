@@ -11,6 +11,7 @@ from design.program import (
     Assign,
     Constant,
     Element,
+    Kind,
     NamedConstant,
     Program,
     Signal,
@@ -161,8 +162,8 @@ def _slotted(name: str, value: Array, slots: tuple[str, ...], meaning: str) -> N
     return NamedArray(name, len(slots), meaning, tuple(value.tolist()), slots)
 
 
-def _named_memory(memory: Memory) -> list[NamedArray]:
-    found = []
+def _named_memory(memory: Memory) -> list[Any]:
+    found: list[Any] = []
     for field, value in memory._asdict().items():
         if field in STATES:
             name, meaning = STATES[field]
@@ -181,7 +182,7 @@ def _states(memory: Memory) -> Iterator[State]:
             yield State(name, "real", tuple(value.tolist()), True, meaning)
         for at, (name, meaning) in enumerate(SLOTS.get(field, ())):
             whole = np.issubdtype(value.dtype, np.integer)
-            kind = "integer" if whole else "real"
+            kind: Kind = "integer" if whole else "real"
             yield State(name, kind, (float(value[at]),), False, meaning)
 
 

@@ -301,7 +301,7 @@ class KernelReader:
                 condition = self._value(test, frame)
                 if (known := known_value(condition)) is not None:
                     return self._value(then if known else otherwise, frame, name)
-                ends = [lambda n=each: self._value(n, frame) for each in (then, otherwise)]  # type: ignore[misc]
+                ends = [lambda n=each: self._value(n, frame) for each in (then, otherwise)]
                 return self._either(condition, name, ends, frame)
             case ast.Compare() | ast.BoolOp():
                 return self._condition(node, frame)

@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
+from design.drive_law import forgetting
 from design.filters import PASS, CompensatorFilters, Sampled, sampled, settled
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, observer_form, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
-from design.pid import INTEGRATOR
-from design.polynomial import divide, trim
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST
 from design.servo_kernels import (
@@ -56,8 +55,9 @@ class Servo:
     the command). dither: added to the command. control_limit: of |u| [V]; force_limit: of the
     force reference [N]. anti_windup [s]: in which time an RST's integrator forgets what a clipped
     command did not carry out; 0: the whole controller forgets it at once; None: never. A PID stops
-    its sum while it would drive the command further out. rate: the reference is moved at most at
-    this speed [m/s], None: at any.
+    its sum while it would drive the command further out. W: in place of anti_windup, that of a
+    `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own. rate:
+    the reference is moved at most at this speed [m/s], None: at any.
 
     Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
@@ -69,6 +69,8 @@ class Servo:
     control_limit: float | None = None
     force_limit: float | None = None
     anti_windup: float | None = None
+    W: tuple[float, ...] | None = None
+    k_a: float | None = None
     rate: float | None = None
 
     @property
@@ -139,7 +141,10 @@ def simulate_servo(
     base, gain = effect_signals(plant.effects, signals or {}, n)
     late = command_delay(plant.effects) / h
     t = h * np.arange(n, dtype=np.float64)
-    law = servo_law(servo, h, plant.actuator.k_a if isinstance(plant.actuator, Motor) else 0.0)
+    k_a = 0.0
+    if isinstance(plant.actuator, Motor):
+        k_a = plant.actuator.k_a if servo.k_a is None else servo.k_a
+    law = servo_law(servo, h, k_a)
     memory = servo_memory(servo, law, loop.start[0], loop.start[2])
     shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
     out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
@@ -212,9 +217,7 @@ def servo_law(servo: Servo, h: float, k_a: float = 0.0) -> Law:
     if isinstance(servo.position, RST):
         R, S, _ = observer_form(servo.position, 0.0)
         b_r, a_r = _reference_filter(servo.position)
-        return law._replace(
-            R=R, S=S, W=_forgetting(S, servo.anti_windup, ratio * h), b_r=b_r, a_r=a_r
-        )
+        return law._replace(R=R, S=S, W=_observer(S, servo, ratio * h), b_r=b_r, a_r=a_r)
     pid = servo.position
     per_difference, pole = pid.T_d / pid.eps, math.exp(-ratio * h / pid.eps)
     rule = float(RULES.index(pid.rule))
@@ -235,15 +238,7 @@ def _reference_filter(controller: RST) -> Sampled:
     return sampled(Filter(tuple(b.tolist()), tuple((controller.A_m / lead).tolist())))
 
 
-def _forgetting(S: Array, time: float | None, h: float) -> Array:
-    """S (n,) with its integrators, poles at z = 1, replaced by poles that decay in `time` [s]."""
-    if time is None:
-        return S
-    if time == 0.0:
-        return np.where(np.arange(len(S)) == 0, 1.0, 0.0)
-    left, kept = trim(S), np.ones(1)
-    while left.size > 1 and abs(left.sum()) < 1e-9 * np.abs(left).sum():
-        left = divide(left, INTEGRATOR)[0]
-        kept = np.convolve(kept, [1.0, -math.exp(-h / time)])
-    W = np.convolve(left, kept)
-    return np.pad(W, (0, len(S) - len(W)))
+def _observer(S: Array, servo: Servo, h: float) -> Array:
+    if servo.W is None:
+        return forgetting(S, servo.anti_windup, h)
+    return np.pad(np.array(servo.W), (0, len(S) - len(servo.W)))

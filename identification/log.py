@@ -16,9 +16,10 @@ RigKind = Literal["electro-pneumatic", "force", "motor"]
 
 @dataclass(frozen=True)
 class Rig:
-    """What a card says of the machine; areas [m^2], pressure [Pa], limits [V], stroke [m].
+    """What a card says of the machine; areas [m^2], pressure [Pa], stroke [m].
 
-    `force_per_command` [N/V] is the motor's k_a; `motion` "rotary" reads rad, N m and kg m^2.
+    `command_unit` is that of u (V, A, 1, %, N): `control_limit` is in it, and `force_per_command`
+    [N per such unit] is the motor's k_a. `motion` "rotary" reads rad, N m and kg m^2.
     """
 
     kind: RigKind
@@ -29,13 +30,15 @@ class Rig:
     control_limit: float | None = None
     stroke: tuple[float, float] | None = None
     motion: Literal["linear", "rotary"] = "linear"
+    command_unit: str = "V"
 
 
 @dataclass(frozen=True)
 class Log:
     """Signals of one run by canonical name, each of shape (n,), with their time `t` [s].
 
-    `y` position [m], `F` applied force F_e [N], `u` command [V], `r` reference [m]; any further
+    `y` position [m], `F` applied force F_e [N], `u` command [V, or the
+    rig's command_unit], `r` reference [m]; any further
     name is a signal that effects may use. Arrays are read-only copies. Raises BadLog where the
     lengths differ or `t` is missing.
     """

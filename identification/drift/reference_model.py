@@ -116,7 +116,7 @@ class InForce:
     @property
     def units(self) -> Mapping[str, str]:
         """Units by name."""
-        found = dict(units_of(self.rig.motion))
+        found = dict(units_of(self.rig.motion, self.rig.command_unit))
         for acting in self.plant.effects:
             found |= {f"{acting.key}.{p.name}": p.unit for p in acting.effect.params}
         return found

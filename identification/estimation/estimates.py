@@ -13,6 +13,7 @@ from scipy.stats import norm
 
 from identification.arrays import Array, IntArray
 from identification.effects._base import AT_REST, Acting, Param
+from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
@@ -116,11 +117,11 @@ def estimates(
     center: Array,
     samples: Array,
     events: Events,
-    rotary: bool,
+    rig: Rig,
     log: str,
 ) -> Mapping[str, Estimate]:
     """Estimate of each of `names` from its value (d,) and equally likely samples (k, d)."""
-    units = units_of("rotary" if rotary else "linear")
+    units = units_of(rig.motion, rig.command_unit)
     value_of = dict(zip(names, center, strict=True))
     found = {}
     for column, name in enumerate(names):

@@ -225,8 +225,7 @@ def _of_sliding(
 ) -> Mapping[str, Estimate]:  # fmt: skip
     """Estimates of parameters that need no more than sliding; so many rows in each direction."""
     events = Events((0, 0), (0, 0), sliding, (fastest, fastest))
-    rotary = recorded.rig.motion == "rotary"
-    return estimates(names, values, samples, events, rotary, recorded.name)
+    return estimates(names, values, samples, events, recorded.rig, recorded.name)
 
 
 def _reasoned(

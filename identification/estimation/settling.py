@@ -304,7 +304,7 @@ def _told(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
     told = {
         **estimates(
             [spread.names[i] for i in own], center[own], spread.samples[:, own], spread.events,
-            recorded.rig.motion == "rotary", recorded.name,
+            recorded.rig, recorded.name,
         ),
         **effect_estimates(spread.plant.effects, sd),
     }  # fmt: skip
@@ -366,8 +366,7 @@ def structure_estimates(
     own = np.array([sd.get(name, 0.0) for name in names])
     own = np.where(own > 0.0, own, _of_silent(plant, names, values, events))
     samples = normal_samples(values, own)
-    rotary = recorded.rig.motion == "rotary"
-    return dict(estimates(names, values, samples, events, rotary, recorded.name))
+    return dict(estimates(names, values, samples, events, recorded.rig, recorded.name))
 
 
 def _events(plant: Plant, recorded: RecordedLogs) -> Events:

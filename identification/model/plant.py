@@ -8,9 +8,6 @@ from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.karnopp import ROTARY_UNITS, UNITS, Karnopp
 
-ACTUATOR_UNITS = {"k1": "N/(V s)", "k2": "N/m", "k_a": "N/V"}
-ROTARY_ACTUATOR_UNITS = {"k1": "N m/(V s)", "k2": "N m/rad", "k_a": "N m/V"}
-
 
 @dataclass(frozen=True)
 class Actuator:
@@ -26,7 +23,7 @@ class Actuator:
 
 @dataclass(frozen=True)
 class Motor:
-    """Motor with negligible dynamics, F = k_a u; k_a [N/V] (paper, figure 1, upper part)."""
+    """Motor with negligible dynamics, F = k_a u; k_a [N/V, or N per unit of u] (paper, fig. 1)."""
 
     k_a: float
 
@@ -40,8 +37,23 @@ class Plant:
     effects: tuple[Acting, ...] = ()
 
 
-def units_of(motion: Literal["linear", "rotary"]) -> Mapping[str, str]:
+def over(unit: str, under: str) -> str:
+    """The unit `unit` for each `under`, as "N/A"; a share ("1") leaves no trace."""
+    if unit == under:
+        return "1"
+    if under == "1":
+        return unit
+    return f"{unit}/({under})" if " " in under else f"{unit}/{under}"
+
+
+def actuator_units(motion: Literal["linear", "rotary"], command: str = "V") -> Mapping[str, str]:
+    """Units of k1 and k2, and of a motor's k_a, where the command has the unit `command`."""
+    force, length = ("N m", "rad") if motion == "rotary" else ("N", "m")
+    rate = "s" if command == "1" else f"{command} s"
+    return {"k1": over(force, rate), "k2": over(force, length), "k_a": over(force, command)}
+
+
+def units_of(motion: Literal["linear", "rotary"], command: str = "V") -> Mapping[str, str]:
     """Units of the nine parameters and of the actuator's, by name."""
-    if motion == "rotary":
-        return {**ROTARY_UNITS, **ROTARY_ACTUATOR_UNITS}
-    return {**UNITS, **ACTUATOR_UNITS}
+    nine = ROTARY_UNITS if motion == "rotary" else UNITS
+    return {**nine, **actuator_units(motion, command)}

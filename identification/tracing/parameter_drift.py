@@ -33,7 +33,7 @@ def parameter_drift(
 ) -> tuple[Change, ...]:
     """Parameters that differ between training and test logs, fewest that bring the error down."""
     stage = seen_by(after.stage, steps, seen)
-    units = units_of(rig.motion)
+    units = units_of(rig.motion, rig.command_unit)
     out: list[Change] = []
     for equation, names in ((MECHANICAL, FIVE), (ACTUATOR, ("k1", "k2"))):
         if equation in after.outcomes:

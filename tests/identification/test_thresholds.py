@@ -489,7 +489,7 @@ def told(name: str, relative: float, events: int) -> bool:
     """Whether a value is given of this deviation and so many breakaways and crossings."""
     samples = 10.0 + 10.0 * relative * signs()[:, np.newaxis]
     happened = Events((events, 9), (events, 9), (900, 900), (1.0, 1.0))
-    found = estimates((name,), np.array([10.0]), samples, happened, False, "log")
+    found = estimates((name,), np.array([10.0]), samples, happened, Rig("force"), "log")
     return found[name].value is not None
 
 

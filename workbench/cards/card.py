@@ -13,6 +13,11 @@ Beyond the contract's example a card may say (all optional, all additive):
              workbench/cards/sensors.py; bits = 16, signed = true reads a column logged as
              unsigned as two's complement; a scalar beside the rows is a constant signal
     [rig]    kind = "force": areas and pressures given as well make F_e = F + S_p p_p - S_n p_n
+             kind = "electro-pneumatic": F_e = S_p p_p - S_n p_n - (S_p - S_n) supply_pressure_pa,
+             paper eq. (7); without supply_pressure_pa the last term is 0, as for gauge pressures
+             command_unit = "%": what the drive takes, in which u is held; default: V, A, 1, N or
+             N m, as the unit of u is; force_per_command = 35.0 or "35 N/A"; control_limit = 8.0 or
+             "8 A"; a number of both is in command_unit (control_limit_v is the older name)
     [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
     [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
     [recipe] see workbench/cards/recipe.py
@@ -31,10 +36,12 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from identification.effects._library import Library
 from identification.errors import BadCard, BadModel
 from identification.log import Rig, RigKind
+from identification.model.plant import over
 from workbench.cards.nearest import nearest
+from workbench.cards.quantities import in_unit_of
 from workbench.cards.recipe import CardTable, Positive, Recipe, RecipeSection
-from workbench.cards.sensors import column_scale, parse_gain
-from workbench.cards.units import Motion, Scale, si_unit
+from workbench.cards.sensors import column_scale, command_unit, parse_gain
+from workbench.cards.units import LONGEST_UNIT, Scale, force_unit, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
 Format = Literal["csv", "parquet", "mat", "hdf5", "json"]
@@ -91,10 +98,14 @@ class SignalSpec(CardTable):
             raise ValueError("signed = true needs bits")
         return self
 
-    def scale(self, signal: str, motion: Motion) -> Scale:
+    def scale(self, signal: str, rig: Rig) -> Scale:
         """Signal in SI = factor * (column - offset) + shift; raises BadCard where it cannot be."""
-        given = "gain" in self.model_fields_set
-        return column_scale(self.unit, self.gain if given else None, signal, motion)
+        return column_scale(self.unit, self.written_gain, signal, rig.motion, rig.command_unit)
+
+    @property
+    def written_gain(self) -> float | str | None:
+        """The gain as it is written; None where it is not."""
+        return self.gain if "gain" in self.model_fields_set else None
 
 
 class RigSection(CardTable):
@@ -104,7 +115,9 @@ class RigSection(CardTable):
     area_p_m2: Positive | None = None
     area_n_m2: Positive | None = None
     supply_pressure_pa: float | None = None
-    force_per_command: float | None = None
+    force_per_command: float | str | None = None
+    command_unit: str | None = Field(default=None, min_length=1, max_length=LONGEST_UNIT)
+    control_limit: Positive | str | None = None
     control_limit_v: Positive | None = None
     stroke_m: tuple[float, float] | None = None
     motion: Literal["linear", "rotary"] = "linear"
@@ -112,25 +125,46 @@ class RigSection(CardTable):
     @model_validator(mode="after")
     def _complete(self) -> "RigSection":
         if self.kind == "electro-pneumatic":
-            for key in ("area_p_m2", "area_n_m2", "supply_pressure_pa"):
+            for key in ("area_p_m2", "area_n_m2"):
                 if getattr(self, key) is None:
                     raise ValueError(f'kind = "electro-pneumatic" needs {key!r} for eq. (7)')
         if self.stroke_m and self.stroke_m[0] >= self.stroke_m[1]:
             raise ValueError("stroke_m must be [low, high]")
+        if self.control_limit is not None and self.control_limit_v is not None:
+            raise ValueError("control_limit and control_limit_v are the same; give one of them")
         return self
 
-    def value(self) -> Rig:
-        """The rig."""
+    def value(self, signals: Mapping[str, SignalSpec]) -> Rig:
+        """The rig; signals tell the unit of its command where the card does not name it.
+
+        Raises BadCard where a number's unit is of another kind.
+        """
+        command = self.command_unit or self._command_unit(signals)
+        limit = self.control_limit_v if self.control_limit is None else self.control_limit
+        per = over(force_unit(self.motion), command)
         return Rig(
             kind=self.kind,
             area_p=self.area_p_m2,
             area_n=self.area_n_m2,
             supply_pressure=self.supply_pressure_pa,
-            force_per_command=self.force_per_command,
-            control_limit=self.control_limit_v,
+            force_per_command=in_unit_of(self.force_per_command, per, "rig.force_per_command"),
+            control_limit=_positive(in_unit_of(limit, command, "rig.control_limit")),
             stroke=self.stroke_m,
             motion=self.motion,
+            command_unit=command,
         )
+
+    def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
+        """The unit of the command's column; a force where none is logged but its limit is told."""
+        if "u" in signals:
+            return command_unit(signals["u"].unit, signals["u"].written_gain, self.motion)
+        return "V" if self.control_limit is None else force_unit(self.motion)
+
+
+def _positive(limit: float | None) -> float | None:
+    if limit is not None and not limit > 0:
+        raise BadCard(f"rig.control_limit = {limit:g}, must be > 0")
+    return limit
 
 
 class FileEntry(CardTable):
@@ -185,19 +219,20 @@ def load_card(path: Path, library: Library | None = None, *, with_recipe: bool =
     raw = _read_toml(path)
     try:
         parsed = _CardFile.model_validate(raw)
-        rigs = {"": parsed.rig.value()}
+        signals = parsed.signals or (_recipe_signals(parsed.rig) if parsed.recipe else {})
+        rigs = {"": _rig(path, parsed.rig, signals)}
         for number, entry in enumerate(parsed.files):
             if entry.rig:
                 merged = _CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
-                rigs[entry.name] = merged.value()
+                rigs[entry.name] = _rig(path, merged, signals)
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
         wanted = parsed.recipe if with_recipe else None
-        recipe = wanted.value(library, parsed.rig.motion) if wanted else None
+        rig = rigs[""]
+        recipe = wanted.value(library, rig.motion, rig.command_unit) if wanted else None
     except ValidationError as error:
         raise BadCard(f"{path}: {explain(error)}") from None
     except BadModel as error:
         raise BadCard(f"{path}: [recipe] {error}") from None
-    signals = parsed.signals or (_recipe_signals(parsed.rig) if parsed.recipe else {})
     _need_signals(path, parsed.rig, signals, "[rig]")
     _check_split(path, parsed)
     return Card(
@@ -210,6 +245,13 @@ def load_card(path: Path, library: Library | None = None, *, with_recipe: bool =
         recipe=recipe,
         rigs=MappingProxyType(rigs),
     )
+
+
+def _rig(path: Path, section: RigSection, signals: Mapping[str, SignalSpec]) -> Rig:
+    try:
+        return section.value(signals)
+    except BadCard as error:
+        raise BadCard(f"{path}: {error}") from None
 
 
 def _read_toml(path: Path) -> dict[str, Any]:
@@ -317,9 +359,10 @@ def _tag(section: type[CardTable]) -> str | None:
 def _recipe_signals(rig: RigSection) -> dict[str, SignalSpec]:
     linear = rig.motion == "linear"
     position, force = ("m", "N") if linear else ("rad", "N m")
-    units = {"t": "s", "r": position, "y": position, "F": force, "u": "V"}
+    command = rig.command_unit or "V"
+    units = {"t": "s", "r": position, "y": position, "F": force, "u": command}
     if rig.kind == "electro-pneumatic":
-        units = {"t": "s", "r": position, "y": position, "p_p": "Pa", "p_n": "Pa", "u": "V"}
+        units = {"t": "s", "r": position, "y": position, "p_p": "Pa", "p_n": "Pa", "u": command}
     return {name: SignalSpec(column=name, unit=unit) for name, unit in units.items()}
 
 

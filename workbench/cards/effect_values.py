@@ -10,20 +10,21 @@ from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import in_unit
+from workbench.cards.quantities import NUMBER_AND_UNIT
 from workbench.cards.units import Motion, conversion
 
-_NUMBER_AND_UNIT = re.compile(
-    r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(.*?)\s*", re.DOTALL
-)
+_COMMAND = re.compile(r"\bV\b")
 _SYMBOLIC_EXPONENT = re.compile(r"\*\*([A-Za-z_]\w*)")
 
 
-def effect_units(effect: Effect, motion: Motion) -> dict[str, str]:
+def effect_units(effect: Effect, motion: Motion, command: str = "V") -> dict[str, str]:
     """Units of an effect's parameters, by name; an exponent may be the name of a parameter.
 
-    Effects declare them for a linear machine; a rotary one has rad and N m in the same places.
+    Effects declare them for a linear machine whose command is a voltage; a rotary one has rad and
+    N m in the same places, another command its own unit in that of V.
     """
-    return {p.name: p.unit if motion == "linear" else _turned(p.unit) for p in effect.params}
+    units = {p.name: _COMMAND.sub(lambda _: command, p.unit) for p in effect.params}
+    return units if motion == "linear" else {name: _turned(unit) for name, unit in units.items()}
 
 
 def known_effect(key: str, library: Library) -> Effect:
@@ -37,7 +38,11 @@ def known_effect(key: str, library: Library) -> Effect:
 
 
 def written_effect(
-    key: str, written: Mapping[str, object], library: Library, motion: Motion = "linear"
+    key: str,
+    written: Mapping[str, object],
+    library: Library,
+    motion: Motion = "linear",
+    command: str = "V",
 ) -> Acting:
     """The effect as a card writes it: numbers in SI, or texts with a unit such as "30 mm/s".
 
@@ -45,7 +50,7 @@ def written_effect(
     of another kind.
     """
     effect = known_effect(key, library)
-    units = effect_units(effect, motion)
+    units = effect_units(effect, motion, command)
     _check_names(key, written, effect)
     plain = {name: value for name, value in written.items() if not isinstance(value, str)}
     for name, value in plain.items():
@@ -67,11 +72,15 @@ def written_effect(
 
 
 def estimates_in_si(
-    key: str, estimates: Mapping[str, Estimate], library: Library, motion: Motion
+    key: str,
+    estimates: Mapping[str, Estimate],
+    library: Library,
+    motion: Motion,
+    command: str = "V",
 ) -> dict[str, Estimate]:
     """An effect's estimates in their SI units; raises BadModel as `written_effect`."""
     effect = known_effect(key, library)
-    units = effect_units(effect, motion)
+    units = effect_units(effect, motion, command)
     _check_names(key, estimates, effect)
 
     def value(name: str) -> float:
@@ -94,16 +103,16 @@ def estimates_in_si(
 
 
 def relabelled(
-    effect: Effect, estimates: Mapping[str, Estimate], motion: Motion
+    effect: Effect, estimates: Mapping[str, Estimate], motion: Motion, command: str = "V"
 ) -> dict[str, Estimate]:
-    """Estimates in SI under the units of the machine's motion; their numbers are as they were."""
-    units = effect_units(effect, motion)
+    """Estimates in SI under the machine's own units; their numbers are as they were."""
+    units = effect_units(effect, motion, command)
     return {name: replace(found, unit=units[name]) for name, found in estimates.items()}
 
 
-def exact(acting: Acting, motion: Motion) -> dict[str, Estimate]:
+def exact(acting: Acting, motion: Motion, command: str = "V") -> dict[str, Estimate]:
     """Parameters that are known exactly, as those of a recipe."""
-    units = effect_units(acting.effect, motion)
+    units = effect_units(acting.effect, motion, command)
     return {name: Estimate(value, units[name]) for name, value in acting.values.items()}
 
 
@@ -118,7 +127,7 @@ def _check_names(key: str, given: Mapping[str, object], effect: Effect) -> None:
 
 def _with_unit(where: str, text: str, unit: str, example: str) -> float:
     """The number in `text` in SI; raises BadModel where it is of another kind than `unit`."""
-    found = _NUMBER_AND_UNIT.fullmatch(text)
+    found = NUMBER_AND_UNIT.fullmatch(text)
     if found is None:
         raise BadModel(f'{where} = {text!r}: no number with a unit; write it as "{example}"')
     try:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import ROTARY_UNITS, UNITS
-from identification.model.plant import ACTUATOR_UNITS, ROTARY_ACTUATOR_UNITS
+from identification.model.plant import over
 from workbench.cards.units import Motion, conversion
 
 
@@ -19,23 +19,19 @@ class Shown(NamedTuple):
     force: str
     stiffness: str
     force_gain: str
+    command: str
 
 
-def shown(rotary: bool) -> Shown:
-    """The units in which a linear or a rotary machine is shown."""
+def shown(rotary: bool, command: str = "V") -> Shown:
+    """The units of a linear or a rotary machine whose command has the unit `command`."""
     if rotary:
-        return Shown("rad", "rad/s", "N m", "N m/rad", "V/(N m)")
-    return Shown("m", "m/s", "N", "N/m", "V/N")
+        return Shown("rad", "rad/s", "N m", "N m/rad", over(command, "N m"), command)
+    return Shown("m", "m/s", "N", "N/m", over(command, "N"), command)
 
 
 def friction_units(motion: Motion) -> Mapping[str, str]:
     """Units of the nine, by name."""
     return ROTARY_UNITS if motion == "rotary" else UNITS
-
-
-def actuator_units(motion: Motion) -> Mapping[str, str]:
-    """Units of k1 and k2, and of k_a."""
-    return ROTARY_ACTUATOR_UNITS if motion == "rotary" else ACTUATOR_UNITS
 
 
 def in_unit(estimate: Estimate, unit: str, where: str) -> Estimate:

@@ -376,10 +376,13 @@ class RecipeSection(CardTable):
                 )
         return self
 
-    def value(self, library: Library | None = None, motion: Motion = "linear") -> Recipe:
+    def value(
+        self, library: Library | None = None, motion: Motion = "linear", command: str = "V"
+    ) -> Recipe:
         """The recipe; raises BadModel where a parameter has the wrong sign or an effect is unknown.
 
-        library: the effects that it may name, by default all but a user's own files.
+        library: the effects that it may name, by default all but a user's own files; command: the
+        unit of the command.
         """
         drive = (
             Actuator(self.actuator.k1, self.actuator.k2)
@@ -387,7 +390,7 @@ class RecipeSection(CardTable):
             else Motor(self.motor.k_a if self.motor else 0.0)
         )
         known = library or (_installed() if self.effects else built_in())
-        effects = tuple(self._effect(key, known, motion) for key in self.effects)
+        effects = tuple(self._effect(key, known, motion, command) for key in self.effects)
         plant = Plant(Karnopp(**self.friction.model_dump()), drive, effects)
         return Recipe(
             plant=plant,
@@ -403,9 +406,9 @@ class RecipeSection(CardTable):
             mean_pressure=self.mean_pressure_pa,
         )
 
-    def _effect(self, key: str, library: Library, motion: Motion) -> Acting:
+    def _effect(self, key: str, library: Library, motion: Motion, command: str) -> Acting:
         try:
-            return written_effect(key, self.effects[key], library, motion)
+            return written_effect(key, self.effects[key], library, motion, command)
         except BadModel as error:
             raise BadModel(f"effects: {error}") from None
 

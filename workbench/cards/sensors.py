@@ -15,6 +15,7 @@ from workbench.cards.units import (
     LONGEST_UNIT,
     Motion,
     Scale,
+    commands,
     conversion,
     kind,
     scale_or_none,
@@ -51,15 +52,35 @@ def parse_gain(gain: float | str) -> Gain:
     return parsed
 
 
-def column_scale(unit: str, gain: float | str | None, signal: str, motion: Motion) -> Scale:
-    """Signal in SI = factor * (column - offset) + shift.
+def command_unit(unit: str, gain: float | str | None, motion: Motion) -> str:
+    """The unit in which the command of a column is held: V, A, 1 (a share), N, or N m (rotary).
+
+    "V" where unit and gain make none of these; `column_scale` then says so.
+    """
+    per = parse_gain(gain).unit if isinstance(gain, str) else None
+    if per is None and unit in commands(motion):
+        return unit
+    try:
+        return next((one for one in commands(motion) if conversion(unit, one, per)), "V")
+    except BadCard:
+        return "V"
+
+
+def column_scale(
+    unit: str,
+    gain: float | str | None,
+    signal: str,
+    motion: Motion,
+    command: str | None = None,
+) -> Scale:
+    """Signal in SI = factor * (column - offset) + shift; a command in the unit `command`.
 
     gain: None where the card gives none. Raises BadCard, saying what to write, where unit and gain
     do not make the signal; the caller says in which card.
     """
     number, per = (1.0, None) if gain is None else parse_gain(gain)
     try:
-        found = scale_or_none(unit, signal, motion, per)
+        found = scale_or_none(unit, signal, motion, per, command)
     except BadCard as error:
         how = "" if per is None else "; a gain is written as in '80 V/m'"
         raise BadCard(f"signals.{signal}: {error}{how}") from None

@@ -22,7 +22,7 @@ _NAMES = {
     "Pa": "a pressure such as Pa, bar or psi",
     "N": "a force such as N, kN, kgf or lbf",
     "N m": "a torque such as N m or lbf ft",
-    "V": "a command such as V, mA or 1 (duty)",
+    "V": "a command such as V, mA, 1 (duty), N or N m",
 }
 # Logs of forces are often in pounds: as a force they are read as pounds-force.
 _POUNDS = {"lb": "lbf", "lbs": "lbf", "klb": "kip"}
@@ -47,17 +47,27 @@ def si_unit(signal: str, motion: Motion) -> str | None:
     return {**table, "F": _FORCE_UNIT[motion], "u": "V"}.get(signal)
 
 
+def force_unit(motion: Motion) -> str:
+    """N, or N m of a rotary machine."""
+    return _FORCE_UNIT[motion]
+
+
 def kind(signal: str, motion: Motion) -> str:
     """What a canonical signal is, with units as examples."""
     return _NAMES[si_unit(signal, motion) or ""]
 
 
+def commands(motion: Motion) -> tuple[str, ...]:
+    """The units in which a command may be held: voltage, current, share, force."""
+    return ("V", "A", "1", _FORCE_UNIT[motion])
+
+
 def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
     """Factor and shift from `unit` to SI for a signal of this name.
 
-    The command `u` may be a voltage, a current or a pure number (duty). A temperature becomes
-    kelvin. Raises BadCard where the unit is unknown or of the wrong dimension; the caller says
-    in which file.
+    The command `u` may be a voltage, a current, a pure number (duty) or a force. A temperature
+    becomes kelvin. Raises BadCard where the unit is unknown or of the wrong dimension; the caller
+    says in which file.
     """
     found = scale_or_none(unit, signal, motion)
     if found is None:
@@ -66,15 +76,23 @@ def scale(unit: str, signal: str, motion: Motion = "linear") -> Scale:
 
 
 def scale_or_none(
-    unit: str, signal: str, motion: Motion = "linear", per: str | None = None
+    unit: str,
+    signal: str,
+    motion: Motion = "linear",
+    per: str | None = None,
+    command: str | None = None,
 ) -> Scale | None:
-    """As `scale`, of `unit` over the unit `per`; None where the dimension is wrong."""
-    need = si_unit(signal, motion)
+    """As `scale`, of `unit` over the unit `per`; None where the dimension is wrong.
+
+    command: the unit in which a command is held, by default any of `commands`.
+    """
+    need = command if signal == "u" and command else si_unit(signal, motion)
     if unit == need and per is None:
         return Scale(1.0, 0.0)
     if need in ("N", "N m"):
         unit, per = _as_forces(unit), None if per is None else _as_forces(per)
-    for target in ("V", "A", "1") if signal == "u" else (need,):
+    any_command = signal == "u" and command is None
+    for target in commands(motion) if any_command else (need,):
         found = conversion(unit, target, per)
         if found is not None:
             return found

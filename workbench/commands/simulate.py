@@ -55,7 +55,7 @@ def command(
             frame.to_csv(folder.path / name, index=False, float_format="%.12g")
         else:
             frame.to_parquet(folder.path / name, index=False)
-        known = truth(card.name, card.recipe, seed, motion=card.rig().motion)
+        known = truth(card.name, card.recipe, seed, rig=card.rig())
         folder.write_json("truth.json", known)
     result = {"log": folder.final / name, "samples": len(log), "seed": known["seed"], "h": log.h}
     emit({**result, "out": folder.final}, as_json, lambda: _said(result, folder.final))

@@ -11,20 +11,47 @@ from typing import Any, Literal
 import numpy as np
 
 from design.compensator import Compensator
+from design.drive_law import DriveLaw, drive_law
+from design.filters import CompensatorFilters
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
-from identification.errors import BadModel
+from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
 from workbench.cards.parameter_units import converted, friction_units, in_unit, shown
 from workbench.cards.units import Motion
 from workbench.documents.contradictions import refuse_apart, refuse_unequal
+from workbench.documents.drive import (
+    Command,
+    CommandFile,
+    DriveUnits,
+    FiltersFile,
+    ForceLoop,
+    ForceLoopFile,
+    LawFile,
+    Output,
+    Present,
+    PresentFile,
+    command_file,
+    command_of,
+    filters_file,
+    filters_of,
+    force_file,
+    force_of,
+    law_file,
+    law_of,
+    number,
+    positive,
+    present_file,
+    present_of,
+)
 from workbench.documents.model import as_number, used
 from workbench.documents.reading import read_result
 
 DESIGN_SCHEMA = "design/2"
 From = Literal["physical", "arx"]
+Recommended = Literal["rst", "pid", "none"]
 
 
 @dataclass(frozen=True)
@@ -41,15 +68,6 @@ class Linear:
     h: float
     m: Estimate | None
     F_v: Estimate | None
-
-
-@dataclass(frozen=True)
-class ForceLoop:
-    """C_F = k_i (1 + h z^-1/(T_i (1 - z^-1))), k_i [V/N], T_i [s], run every h [s]."""
-
-    k_i: float
-    T_i: float
-    h: float
 
 
 @dataclass(frozen=True)
@@ -76,7 +94,8 @@ class Controller:
 
     dominant: (w_n [rad/s], zeta); auxiliary: poles z as (re, im). rate: the reference is moved at
     most at this speed [m/s], None for any; lag [s] and overshoot [-] as `design.tracking` has
-    them. missed: goals not kept. gains: of a PID in parallel form.
+    them. missed: goals not kept. gains: of a PID in parallel form. W: its anti-windup as
+    `design.drive_law` has it, None in older files.
     """
 
     R: tuple[float, ...]
@@ -92,20 +111,36 @@ class Controller:
     missed: tuple[str, ...]
     gains: PIDGains | None = None
     note: str | None = None
+    W: tuple[float, ...] | None = None
 
     @property
     def rst(self) -> RST:
         """The controller for the loop."""
         return RST(np.array(self.R), np.array(self.S), np.array(self.T), self.h)
 
+    def law(self, command: Command) -> DriveLaw:
+        """The controller in the drive's own terms.
+
+        Without a W, above a force loop an integrator forgets in 1/w_n what was not carried out,
+        beside the loop's own anti-windup; else the whole controller forgets it at once.
+        """
+        per = command.force_per_command
+        forget = 1.0 / self.dominant[0] if per is None else 0.0
+        return drive_law(self.rst, forget, 1.0 if per is None else per, self.W)
+
 
 @dataclass(frozen=True)
 class CompensatorValues:
-    """Parameters of the compensator (4): N_c [-], e_T [m], the nine as the model has them."""
+    """Parameters of the compensator (4): N_c [-], e_T [m], the nine as the model has them.
+
+    filters: around it, and their period [s]; None in older files.
+    """
 
     N_c: float
     e_T: float
     friction: Mapping[str, Estimate]
+    filters: CompensatorFilters | None = None
+    h: float | None = None
 
     def __post_init__(self) -> None:
         for name in NAMES:
@@ -126,11 +161,22 @@ class CompensatorValues:
 
 
 @dataclass(frozen=True)
+class Recommendation:
+    """Which controller, with or without the compensator, and why, in one line with numbers."""
+
+    controller: Recommended
+    compensator: bool
+    why: str
+
+
+@dataclass(frozen=True)
 class Design:
     """Controllers of one machine; one may be None with its reason in `refused`.
 
-    recommended: the controller that keeps every goal, "none" where none does. read: what to say of
-    its file, a line for each value in another unit than ours.
+    recommended: the controller that keeps every goal, "none" where none does. command: what the
+    drive takes, present: the controller that it has now, recommendation: the same with its reason;
+    None in older files. read: what to say of its file, a line for each value in another unit than
+    ours.
     """
 
     card: str
@@ -140,16 +186,24 @@ class Design:
     rst: Controller | None
     pid: Controller | None
     refused: Mapping[str, str]
-    recommended: Literal["rst", "pid", "none"]
+    recommended: Recommended
     compensator: CompensatorValues
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
+    command: Command | None = None
+    present: Present | None = None
+    recommendation: Recommendation | None = None
     read: tuple[str, ...] = field(default=(), compare=False)
 
     @property
     def controllers(self) -> dict[str, Controller]:
         """The controllers that exist, by name."""
         return {k: c for k, c in (("rst", self.rst), ("pid", self.pid)) if c is not None}
+
+    @property
+    def output(self) -> Output:
+        """What its laws give: the command, or the reference of the force loop."""
+        return "command" if self.force is None else "force"
 
 
 def margin_values(found: Margins, worst: float | None) -> MarginValues:
@@ -176,13 +230,6 @@ class _LinearFile:
     h: Estimate
     m: Estimate | None
     F_v: Estimate | None
-
-
-@dataclass(frozen=True)
-class _ForceLoopFile:
-    k_i: Estimate
-    T_i: Estimate
-    h: Estimate
 
 
 @dataclass(frozen=True)
@@ -216,6 +263,7 @@ class _ControllerFile:
     missed: tuple[str, ...]
     gains: _GainsFile | None = None
     note: str | None = None
+    law: LawFile | None = None
 
 
 @dataclass(frozen=True)
@@ -223,6 +271,7 @@ class _CompensatorFile:
     N_c: Estimate
     e_T: Estimate
     friction: Mapping[str, Estimate]
+    filters: FiltersFile | None = None
 
 
 @dataclass(frozen=True)
@@ -232,49 +281,57 @@ class _DesignFile:
     card: str
     motion: Motion
     plant: _LinearFile
-    force: _ForceLoopFile | None
+    force: ForceLoopFile | None
     rst: _ControllerFile | None
     pid: _ControllerFile | None
     refused: Mapping[str, str]
-    recommended: Literal["rst", "pid", "none"]
+    recommended: Recommended
     compensator: _CompensatorFile
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
+    command: CommandFile | None = None
+    present: PresentFile | None = None
+    recommendation: Recommendation | None = None
     schema: Literal["design/2"] = "design/2"
 
 
 @dataclass(frozen=True)
 class _Units:
-    """Units of design.json's parameters on a linear or rotary machine."""
+    """Units of design.json's parameters on a machine of this motion and command."""
 
     length: str
     speed: str
     stiffness: str
-    force_gain: str
     friction: Mapping[str, str]
+    drive: DriveUnits
 
     @classmethod
-    def of(cls, motion: Motion) -> "_Units":
+    def of(cls, motion: Motion, command: str | None) -> "_Units":
         units = shown(motion == "rotary")
-        friction = friction_units(motion)
-        return cls(units.position, units.velocity, units.stiffness, units.force_gain, friction)
+        drive = DriveUnits(motion, command or "V")
+        return cls(units.position, units.velocity, units.stiffness, friction_units(motion), drive)
 
 
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document: dict[str, Any] = _plain(_as_file(found, _Units.of(found.motion)))
+    document: dict[str, Any] = _plain(_as_file(found, _units_of(found)))
     return {"schema": document.pop("schema"), **document}
+
+
+def _units_of(found: "Design | _DesignFile") -> _Units:
+    return _Units.of(found.motion, found.command.unit if found.command else None)
 
 
 def read_design(path: Path) -> Design:
     """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
     written = read_result(path, _DesignFile, DESIGN_SCHEMA)
-    units = _Units.of(written.motion)
+    units = _units_of(written)
     try:
         found = _from_file(written, units)
+        _refuse_other_laws(written, found, units)
         pairs = tuple(_pairs(written, _as_file(found, units), ""))
         _refuse_changed_units(pairs, found)
-    except BadModel as error:
+    except (BadModel, BadSpecification) as error:
         raise BadModel(f"{path}: {error}") from None
     if not found.controllers:
         raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
@@ -315,6 +372,24 @@ def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], fou
         refuse_unequal("[plant.h]", other, same, used(ours), f"[{name}.h]")
 
 
+def _refuse_other_laws(written: _DesignFile, found: Design, units: _Units) -> None:
+    """Raises BadModel where a law is not the controller beside it."""
+    for name, one in (("rst", written.rst), ("pid", written.pid)):
+        if one is None or one.law is None:
+            continue
+        if found.command is None:
+            raise BadModel(f"[{name}.law] needs [command]; run 'workbench design' again")
+        law = law_of(one.law, units.drive, f"{name}.law")
+        ours = found.controllers[name].law(found.command)
+        for key in "RST":
+            mine, other = getattr(ours, key), getattr(law, key)
+            if len(mine) != len(other) or not np.allclose(mine, other, rtol=1e-9, atol=0.0):
+                raise BadModel(
+                    f"[{name}.law] {key} is not [{name}] {key} in the unit of the command; run"
+                    " 'workbench design' again"
+                )
+
+
 def _plain(value: object) -> Any:
     """Dataclasses as dictionaries, parameters as results carry them."""
     if isinstance(value, Estimate):
@@ -327,27 +402,33 @@ def _plain(value: object) -> Any:
 
 
 def _as_file(found: Design, units: _Units) -> _DesignFile:
-    p, force, c = found.plant, found.force, found.compensator
+    p, c, drive = found.plant, found.compensator, units.drive
+    limit = found.command.limit if found.command else None
+
+    def controller(one: Controller | None) -> _ControllerFile | None:
+        return None if one is None else _controller_file(one, found.command, found.output, units)
+
     return _DesignFile(
         card=found.card,
         motion=found.motion,
         plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v),
-        force=None if force is None else _force_loop_file(force, units),
-        rst=None if found.rst is None else _controller_file(found.rst, units),
-        pid=None if found.pid is None else _controller_file(found.pid, units),
+        force=None if found.force is None else force_file(found.force, limit, drive),
+        rst=controller(found.rst),
+        pid=controller(found.pid),
         refused=found.refused,
         recommended=found.recommended,
         compensator=_CompensatorFile(
-            Estimate(c.N_c, "1"), Estimate(c.e_T, units.length), c.friction
+            Estimate(c.N_c, "1"),
+            Estimate(c.e_T, units.length),
+            c.friction,
+            None if c.filters is None or c.h is None else filters_file(c.filters, c.h),
         ),
         remarks=found.remarks,
         versions=found.versions,
+        command=None if found.command is None else command_file(found.command, drive),
+        present=None if found.present is None else present_file(found.present, limit, drive),
+        recommendation=found.recommendation,
     )
-
-
-def _force_loop_file(force: ForceLoop, units: _Units) -> _ForceLoopFile:
-    k_i = Estimate(force.k_i, units.force_gain)
-    return _ForceLoopFile(k_i, Estimate(force.T_i, "s"), Estimate(force.h, "s"))
 
 
 def _gains_file(gains: PIDGains, units: _Units) -> _GainsFile:
@@ -356,7 +437,9 @@ def _gains_file(gains: PIDGains, units: _Units) -> _GainsFile:
     )
 
 
-def _controller_file(one: Controller, units: _Units) -> _ControllerFile:
+def _controller_file(
+    one: Controller, command: Command | None, output: Output, units: _Units
+) -> _ControllerFile:
     w_n, zeta = one.dominant
     reason = None if one.rate is not None else "no limit of force or command to keep"
     return _ControllerFile(
@@ -373,6 +456,7 @@ def _controller_file(one: Controller, units: _Units) -> _ControllerFile:
         missed=one.missed,
         gains=None if one.gains is None else _gains_file(one.gains, units),
         note=one.note,
+        law=law_file(one.law(command), output, command.limit, units.drive) if command else None,
     )
 
 
@@ -382,7 +466,7 @@ def _gain_units(units: _Units) -> list[tuple[str, str]]:
 
 
 def _from_file(found: _DesignFile, units: _Units) -> Design:
-    p, force, c = found.plant, found.force, found.compensator
+    p, c, drive = found.plant, found.compensator, units.drive
     mass, viscous = units.friction["m"], units.friction["F_vp"]
     return Design(
         card=found.card,
@@ -392,22 +476,27 @@ def _from_file(found: _DesignFile, units: _Units) -> Design:
             p.why,
             p.A,
             p.B,
-            _positive(p.h, "s", "plant.h"),
+            positive(p.h, "s", "plant.h"),
             None if p.m is None else in_unit(p.m, mass, "[plant.m]"),
             None if p.F_v is None else in_unit(p.F_v, viscous, "[plant.F_v]"),
         ),
-        force=None if force is None else _force_loop(force, units),
+        force=None if found.force is None else force_of(found.force, drive, "force"),
         rst=None if found.rst is None else _controller(found.rst, units, "rst"),
         pid=None if found.pid is None else _controller(found.pid, units, "pid"),
         refused=found.refused,
         recommended=found.recommended,
         compensator=CompensatorValues(
-            _number(c.N_c, "1", "compensator.N_c"),
-            _number(c.e_T, units.length, "compensator.e_T"),
+            number(c.N_c, "1", "compensator.N_c"),
+            number(c.e_T, units.length, "compensator.e_T"),
             {name: _nine(e, name, units) for name, e in c.friction.items()},
+            None if c.filters is None else filters_of(c.filters),
+            None if c.filters is None else positive(c.filters.h, "s", "compensator.filters.h"),
         ),
         remarks=found.remarks,
         versions=found.versions,
+        command=None if found.command is None else command_of(found.command, found.motion),
+        present=None if found.present is None else present_of(found.present, drive, "present"),
+        recommendation=found.recommendation,
     )
 
 
@@ -420,33 +509,26 @@ def _controller(one: _ControllerFile, units: _Units, where: str) -> Controller:
         R=one.R,
         S=one.S,
         T=one.T,
-        h=_positive(one.h, "s", f"{where}.h"),
+        h=positive(one.h, "s", f"{where}.h"),
         dominant=(
-            _positive(dominant.w_n, "rad/s", f"{where}.dominant.w_n"),
-            _positive(dominant.zeta, "1", f"{where}.dominant.zeta"),
+            positive(dominant.w_n, "rad/s", f"{where}.dominant.w_n"),
+            positive(dominant.zeta, "1", f"{where}.dominant.zeta"),
         ),
         auxiliary=one.auxiliary,
         margins=one.margins,
-        rate=None if rate.value is None else _positive(rate, units.speed, at),
-        lag=_number(one.reference_lag, "s", f"{where}.reference_lag"),
+        rate=None if rate.value is None else positive(rate, units.speed, at),
+        lag=number(one.reference_lag, "s", f"{where}.reference_lag"),
         overshoot=one.overshoot,
         missed=one.missed,
         gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
         note=one.note,
-    )
-
-
-def _force_loop(found: _ForceLoopFile, units: _Units) -> ForceLoop:
-    return ForceLoop(
-        _number(found.k_i, units.force_gain, "force.k_i"),
-        _positive(found.T_i, "s", "force.T_i"),
-        _positive(found.h, "s", "force.h"),
+        W=None if one.law is None else one.law.W,
     )
 
 
 def _gains(found: _GainsFile, units: _Units, where: str) -> PIDGains:
     values = {
-        name: _number(getattr(found, name), unit, f"{where}.{name}")
+        name: number(getattr(found, name), unit, f"{where}.{name}")
         for name, unit in _gain_units(units)
     }
     return PIDGains(**values)
@@ -459,18 +541,3 @@ def _nine(found: Estimate, name: str, units: _Units) -> Estimate:
     if found.value is None and (not found.reason or found.assumed is None):
         raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
     return in_unit(found, units.friction[name], where)
-
-
-def _number(found: Estimate, unit: str, where: str) -> float:
-    """A chosen value in `unit`; raises BadModel where there is none, or in another kind of unit."""
-    value = in_unit(found, unit, f"[{where}]").value
-    if value is None:
-        raise BadModel(f"[{where}] is null; a number in {unit!r} needed")
-    return value
-
-
-def _positive(found: Estimate, unit: str, where: str) -> float:
-    value = _number(found, unit, where)
-    if not value > 0:
-        raise BadModel(f"[{where}] {value:g} {unit}: must be > 0")
-    return value

@@ -13,11 +13,11 @@ from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
 from identification.model.karnopp import NAMES, Karnopp
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Actuator, Motor, Plant, actuator_units
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
-from workbench.cards.parameter_units import actuator_units, all_converted, friction_units, in_unit
+from workbench.cards.parameter_units import all_converted, friction_units, in_unit
 from workbench.documents.contradictions import refuse_changed_units
 from workbench.documents.reading import read_result
 
@@ -322,11 +322,12 @@ def in_si(found: ModelFile, library: Library) -> Model:
     another unit than ours contradicts the rest.
     """
     motion = found.rig.motion
-    friction, actuator = friction_units(motion), actuator_units(motion)
+    friction = friction_units(motion)
+    actuator = actuator_units(motion, found.rig.command_unit)
     drive = found.actuator
     try:
         effects = {
-            key: estimates_in_si(key, values, library, motion)
+            key: estimates_in_si(key, values, library, motion, found.rig.command_unit)
             for key, values in found.effects.items()
         }
     except BadModel as error:

@@ -178,7 +178,7 @@ def _to_si(values: Array, name: str, spec: SignalSpec, card: Card, path: Path) -
     if spec.offset != 0.0:
         values = values - spec.offset
     try:
-        factor, shift = spec.scale(name, rig.motion)
+        factor, shift = spec.scale(name, rig)
     except BadCard as error:
         raise BadCard(f"{card.path}: {error}") from None
     if factor != 1.0:

@@ -56,7 +56,7 @@ def _rows(found: Demonstration) -> list[Row]:
 def _effects(found: Demonstration) -> list[Row]:
     """Parameters of the effects found, and what they are in truth."""
     traced = found.traced
-    rows = iter(effect_rows(traced.trace, traced.model.rig.motion))
+    rows = iter(effect_rows(traced.trace, traced.model.rig))
     out: list[Row] = []
     for e in traced.trace.effects:
         for p in e.effect.params:

@@ -50,7 +50,7 @@ def trace_report(traced: Traced) -> str:
     )
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
-        rows = effect_rows(found, model.rig.motion)
+        rows = effect_rows(found, model.rig)
         sections.append(_table(title, EFFECT_HEAD, rows, effect_lines(found)))
     sections.append(friction_before_after(traced))
     plain = "Parameters before and after" if found.effects else "Parameters"

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.tracing.regression.significance import DRAWS
 from identification.tracing.result import Change, EffectRival, Errors, FoundEffect, Trace
 from identification.tracing.verdict import listed
 from workbench.cards.parameter_units import shown
-from workbench.cards.units import Motion
 from workbench.output import Row, table, written
 from workbench.report.model_tables import in_digits
 from workbench.steps.trace import Traced, effect_estimates
@@ -225,11 +225,11 @@ def _cell(errors: Errors, key: str, factor: float) -> str:
     return "-" if value is None else f"{factor * value:.3g}"
 
 
-def effect_rows(found: Trace, motion: Motion) -> list[Row]:
+def effect_rows(found: Trace, rig: Rig) -> list[Row]:
     """Every effect's parameters."""
     out: list[Row] = []
     for e in found.effects:
-        estimates = effect_estimates(e, motion)
+        estimates = effect_estimates(e, rig)
         for p in e.effect.params:
             value, interval = _value_cells(estimates[p.name])
             unit = "" if p.unit == "1" else estimates[p.name].unit
@@ -352,7 +352,7 @@ def trace_view(traced: Traced, folder: Path) -> "Group":
     parts: list[RenderableType] = [trace_sentence(traced)]
     parts.append(table(errors_head(bool(traced.test)), error_rows(found, rotary)))
     sections: Sequence[tuple[Sequence[str], list[Row]]] = (
-        (EFFECT_HEAD, effect_rows(found, traced.model.rig.motion)),
+        (EFFECT_HEAD, effect_rows(found, traced.model.rig)),
         (RIVAL_HEAD, rival_rows(found, rotary)),
         (change_head(found), change_rows(found)),
         (DRIFT_HEAD, drift_rows(found)),

@@ -1,22 +1,75 @@
 """A design in its loop on a machine: what `design.loop` needs, put together from results."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from design.compensator import Compensator
+from design.drive_law import DriveLaw
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
-from design.rst import RST
-from design.servo import Compensation, Servo, simulate_servo
+from design.servo import Compensation, Servo, ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.model.plant import Actuator, Motor, Plant
+from identification.model.plant import Actuator, Motor
 from workbench.documents.design import Controller, Design
+from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model
+from workbench.steps.design import command_of
+
+
+@dataclass(frozen=True)
+class DrivenLoop:
+    """A law in the loop that it closes: what stands between the sensors and the machine.
+
+    force: the loop below it, None where its output is the command. rate: the reference is moved at
+    most at this speed [m/s]. limit: of the command, in its unit. k_a: by which the compensation's
+    force becomes a command; None: the motor's own.
+    """
+
+    law: DriveLaw
+    force: ForceLoop | None = None
+    rate: float | None = None
+    limit: float | None = None
+    compensation: Compensation | None = None
+    k_a: float | None = None
+
+    @property
+    def h(self) -> float:
+        """The period of the loop's samples [s]."""
+        return self.force.h if self.force else self.law.h
+
+    @property
+    def servo(self) -> Servo:
+        """The loop as `simulate_servo` and `design.controller_program` take it."""
+        return Servo(
+            self.law.rst,
+            None if self.force is None else ForcePI(self.force.k_i, self.force.T_i),
+            friction=self.compensation,
+            control_limit=self.limit,
+            W=self.law.W,
+            k_a=self.k_a,
+            rate=self.rate,
+        )
+
+
+def driven_loop(
+    machine: Model, found: Design, one: Controller, compensator: Compensator | None = None
+) -> DrivenLoop:
+    """A design's controller as its drive runs it; of an older file as it is run on the machine."""
+    command = found.command or command_of(machine, found.force)
+    filters = found.compensator.filters or filters_at(one.h)
+    return DrivenLoop(
+        law=one.law(command),
+        force=found.force,
+        rate=one.rate,
+        limit=command.limit,
+        compensation=None if compensator is None else Compensation(compensator, filters),
+        k_a=command.force_per_command,
+    )
 
 
 def run_loop(
@@ -27,43 +80,32 @@ def run_loop(
     rng: np.random.Generator,
     compensator: Compensator | None = None,
 ) -> LoopRun:
-    """One reference r [m], (n,) at `loop_period`, through the loop, with the machine's noise.
+    """One reference r [m], (n,) at `loop_period`, through the design's loop; see `run_driven`."""
+    return run_driven(machine, driven_loop(machine, found, one, compensator), r, rng)
+
+
+def run_driven(machine: Model, loop: DrivenLoop, r: Array, rng: np.random.Generator) -> ServoRun:
+    """One reference r [m], (n,) every loop.h, through the loop, with the machine's noise.
 
     The controller sees it moved at its own rate; the run has it as given. A machine without an
-    actuator takes the force reference as its force, and the rig's limit of the command [V] says
-    nothing of it. The compensator runs with the position controller, behind `filters_at`. Raises
-    BadModel where the design has a force loop and the machine nothing for it to drive, or the other
-    way round.
+    actuator takes the law's output as its force. Raises BadModel where there is a force loop and
+    nothing for it to drive, or the other way round.
     """
     plant = replace(machine.simulated, effects=in_the_loop(machine))
-    servo, whole = _servo(plant, found, one)
-    limit = None if plant.actuator is None else machine.rig.control_limit
-    if compensator is not None:
-        servo = replace(servo, friction=Compensation(compensator, filters_at(one.h)))
+    if isinstance(plant.actuator, Actuator):
+        if loop.force is None:
+            raise BadModel("the machine has an actuator, the design no force loop for it")
+    elif loop.force is not None:
+        raise BadModel("the design has a force loop, the machine no actuator for it")
     return simulate_servo(
-        whole,
-        replace(servo, control_limit=limit, rate=one.rate),
+        plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
+        loop.servo,
         r,
-        loop_period(found),
+        loop.h,
         noise=LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng),
         start=(float(r[0]), 0.0, 0.0),
         signals=_chambers(machine.rig),
     )
-
-
-def _servo(plant: Plant, found: Design, one: Controller) -> tuple[Servo, Plant]:
-    """The design's loops for this plant, and the plant that they drive."""
-    if isinstance(plant.actuator, Actuator):
-        if found.force is None:
-            raise BadModel("the machine has an actuator, the design no force loop for it")
-        force = ForcePI(found.force.k_i, found.force.T_i)
-        return Servo(one.rst, force, anti_windup=1.0 / one.dominant[0]), plant
-    if found.force is not None:
-        raise BadModel("the design has a force loop, the machine no actuator for it")
-    motor = plant.actuator or Motor(1.0)
-    rst = one.rst
-    volts = RST(rst.R / motor.k_a, rst.S, rst.T / motor.k_a, rst.h)
-    return Servo(volts, None, anti_windup=0.0), replace(plant, actuator=motor)
 
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:

@@ -59,7 +59,7 @@ def demonstrate(card: Card, folder: Path, seed: int, on_progress: Progress) -> D
     """Simulate two runs of the card's recipe into `folder`, read them back, trace what the plain
     model lacks, then design on the model found, and validate."""
     path, other = simulated_log(card, folder), simulated_log(card, folder, held_out=True)
-    known = truth(card.name, recipe_of(card), motion=card.rig().motion)
+    known = truth(card.name, recipe_of(card), rig=card.rig())
     (folder / "truth.json").write_text(dumps(known) + "\n", encoding="utf-8")
     train, test = (read_sources([str(one.absolute())], str(card.path)) for one in (path, other))
     traced = trace_sources(train, test, built_in(), seed, on_progress)

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
+from design.filters import filters_at
 from design.linear import ForceGains, force_gains, linear_plant
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
@@ -19,11 +21,11 @@ from workbench.documents.design import (
     CompensatorValues,
     Controller,
     Design,
-    ForceLoop,
     From,
     Linear,
     margin_values,
 )
+from workbench.documents.drive import Command, ForceLoop
 from workbench.documents.model import Model, used, versions
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.steps.identify import check_period
@@ -56,6 +58,7 @@ def design(
     _check_period(period, model)
     plant, force = linear_of(model, source, period)
     goals = goals or Goals(effort=effort_limit(model))
+    command = command_of(model, force)
     found: dict[str, Controller] = {}
     refused: dict[str, str] = {}
     a, b = np.array(plant.A), np.array(plant.B)
@@ -72,7 +75,7 @@ def design(
         except BadSpecification as error:
             refused[name] = str(error)
             continue
-        found[name] = _controller(tuned, shown(model.rotary))
+        found[name] = _controller(tuned, command, shown(model.rotary))
     by_hand = asked.dominant is not None or asked.auxiliary is not None
     if not found or ("rst" in refused and by_hand):
         raise BadSpecification(refused["rst"])
@@ -86,7 +89,7 @@ def design(
         pid=found.get("pid"),
         refused=refused,
         recommended=recommended,
-        compensator=_compensator(model),
+        compensator=_compensator(model, plant.h),
         remarks=(
             *model.read,
             *stored_remarks(model),
@@ -94,7 +97,19 @@ def design(
             *_remarks(model, plant, found),
         ),
         versions=versions(),
+        command=command,
     )
+
+
+def command_of(model: Model, force: ForceLoop | None) -> Command:
+    """What the machine's drive takes: a command, or a force where no command is logged."""
+    drive, rig = model.simulated.actuator, model.rig
+    if isinstance(drive, Motor):
+        return Command(rig.command_unit, rig.control_limit, drive.k_a)
+    if force is not None:
+        return Command(rig.command_unit, rig.control_limit, None)
+    unit = shown(model.rotary).force
+    return Command(unit, rig.control_limit if rig.command_unit == unit else None, 1.0)
 
 
 def _check_period(period: float | None, model: Model) -> None:
@@ -273,9 +288,9 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned, units: Shown) -> Controller:
+def _controller(tuned: Tuned, command: Command, units: Shown) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
-    return Controller(
+    found = Controller(
         R=tuple(rst.R.tolist()),
         S=tuple(rst.S.tolist()),
         T=tuple(rst.T.tolist()),
@@ -290,6 +305,7 @@ def _controller(tuned: Tuned, units: Shown) -> Controller:
         gains=None if pid is None else pid.gains,
         note="; ".join(_notes(tuned, units)),
     )
+    return replace(found, W=found.law(command).W)
 
 
 def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
@@ -335,9 +351,10 @@ def _ends(found: Estimate) -> tuple[float, float]:
     return low, high
 
 
-def _compensator(model: Model) -> CompensatorValues:
+def _compensator(model: Model, h: float) -> CompensatorValues:
     low, high = model.travel
-    return CompensatorValues(N_C, E_T_PER_TRAVEL * (high - low), model.friction)
+    e_T = E_T_PER_TRAVEL * (high - low)
+    return CompensatorValues(N_C, e_T, model.friction, filters_at(h), h)
 
 
 def _remarks(model: Model, plant: Linear, found: Mapping[str, Controller]) -> list[str]:

@@ -23,10 +23,10 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive, Estimate, KarnoppFit
 from identification.model.inverse_model import ForceError, Smoothing, force_error
 from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, Motor, units_of
+from identification.model.plant import Actuator, Motor, actuator_units, units_of
 from identification.signals.differentiate import differentiate
 from identification.tracing.constant_force import constant_force, constant_remark
-from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.cards.parameter_units import friction_units
 from workbench.documents.model import (
     ArxPlant,
     ArxTests,
@@ -153,7 +153,7 @@ def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
 
 def _actuator(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate] | None:
     """k1 and k2, or k_a; None where no command is logged."""
-    units = actuator_units(rig.motion)
+    units = actuator_units(rig.motion, rig.command_unit)
     match fit.actuator:
         case Motor(k_a):
             return {"k_a": Estimate(k_a, units["k_a"], reason="given by the card")}

@@ -15,15 +15,14 @@ from identification.errors import BadCard, BadModel
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, Motor
+from identification.model.plant import Actuator, Motor, actuator_units
 from identification.signals.excitation import reference_signal
 from identification.simulation.free_run import FreeRun, free_run
 from workbench.cards import recipe as recipes
 from workbench.cards.card import Card
 from workbench.cards.effect_values import exact
-from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
-from workbench.cards.units import Motion
 from workbench.documents.model import as_number
 from workbench.files import ABSURD
 
@@ -179,7 +178,7 @@ def as_columns(log: Log, card: Card) -> dict[str, Array]:
                 f" {', '.join(log.signals)}); take it out of the recipe's card"
             )
         try:
-            factor, shift = spec.scale(name, card.rig().motion)
+            factor, shift = spec.scale(name, card.rig())
         except BadCard as error:
             raise BadCard(f"{card.path}: {error}") from None
         out[str(spec.column)] = (log[name] - shift) / factor + spec.offset
@@ -187,13 +186,14 @@ def as_columns(log: Log, card: Card) -> dict[str, Array]:
 
 
 def truth(
-    name: str, recipe: Recipe, seed: int | None = None, *, motion: Motion = "linear"
+    name: str, recipe: Recipe, seed: int | None = None, *, rig: Rig | None = None
 ) -> dict[str, Any]:
     """What the log does not hold: parameters, effects, loop, noise and seed.
 
     A parameter is as in every result, without an interval: what a recipe sets is known exactly.
     """
-    friction, actuator = friction_units(motion), actuator_units(motion)
+    motion, command = (rig.motion, rig.command_unit) if rig else ("linear", "V")
+    friction, actuator = friction_units(motion), actuator_units(motion, command)
     drive = asdict(recipe.plant.actuator) if recipe.plant.actuator else None
     return {
         "schema": "truth/1",
@@ -201,7 +201,7 @@ def truth(
         "friction": {n: _exact(getattr(recipe.plant.friction, n), friction[n]) for n in NAMES},
         "actuator": {n: _exact(v, actuator[n]) for n, v in drive.items()} if drive else None,
         "effects": {
-            one.key: {n: as_number(e) for n, e in exact(one, motion).items()}
+            one.key: {n: as_number(e) for n, e in exact(one, motion, command).items()}
             for one in recipe.plant.effects
         },
         "noise": {"y": recipe.noise_y, "F": recipe.noise_F, "p": recipe.noise_p},

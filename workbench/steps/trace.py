@@ -8,15 +8,16 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.model.plant import actuator_units
 from identification.progress import KeepGoing, without_end
 from identification.signals.bad_samples import BadSamples
 from identification.tracing.result import Errors, FoundEffect, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
-from workbench.cards.units import Motion
 from workbench.documents.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
 from workbench.documents.plausible import model_remarks
 from workbench.logs.fetch import card_path
@@ -117,7 +118,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
     rig = sources.rig
     actuator = {k: v for k, v in found.parameters_after.items() if k not in NAMES}
     if rig.kind == "motor" and rig.force_per_command is not None:
-        unit = "N m/V" if rig.motion == "rotary" else "N/V"
+        unit = actuator_units(rig.motion, rig.command_unit)["k_a"]
         actuator = {"k_a": Estimate(rig.force_per_command, unit, reason="given by the card")}
     errors = found.after["train"]
     plant, reason = _arx(sources)
@@ -143,7 +144,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
         ),
         log=tuple(_entry(source, errors, chi) for source in sources.runs),
         versions=versions(),
-        effects={e.effect.key: effect_estimates(e, rig.motion) for e in found.effects},
+        effects={e.effect.key: effect_estimates(e, rig) for e in found.effects},
         library=library,
     )
 
@@ -180,14 +181,14 @@ def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
     )
 
 
-def effect_estimates(found: FoundEffect, motion: Motion) -> dict[str, Estimate]:
-    """An effect's parameters under the units of the machine's motion."""
-    return relabelled(found.effect, found.params, motion)
+def effect_estimates(found: FoundEffect, rig: Rig) -> dict[str, Estimate]:
+    """An effect's parameters under the machine's own units."""
+    return relabelled(found.effect, found.params, rig.motion, rig.command_unit)
 
 
 def trace_document(traced: Traced) -> dict[str, Any]:
     """The trace as trace.json writes it: the keys of the contract, and what it allows beside."""
-    found, motion = traced.trace, traced.model.rig.motion
+    found, rig = traced.trace, traced.model.rig
     return {
         "schema": TRACE_SCHEMA,
         "card": traced.model.card,
@@ -200,7 +201,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
         "effects": [
             {
                 "key": e.effect.key,
-                "params": _numbers(effect_estimates(e, motion)),
+                "params": _numbers(effect_estimates(e, rig)),
                 "explained": e.explained,
                 "p_value": e.p_value,
             }

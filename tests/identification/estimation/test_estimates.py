@@ -5,6 +5,7 @@ import pytest
 
 from identification.arrays import IntArray
 from identification.estimation.estimates import Events, estimates, events_of
+from identification.log import Rig
 from identification.model.karnopp import NAMES
 from identification.simulation.karnopp_step import BAND_P, SLIP_N, SLIP_P, STUCK
 from tests.identification.plants import table
@@ -30,7 +31,7 @@ def test_events_are_counted_by_direction() -> None:
 
 
 def test_an_interval_holds_its_value_and_the_sign() -> None:
-    found = estimates(NAMES, table(1).array, spread(0.01), PLENTY, False, "log")
+    found = estimates(NAMES, table(1).array, spread(0.01), PLENTY, Rig("force"), "log")
     for name, value in zip(NAMES, table(1).array, strict=True):
         one = found[name]
         assert one.value == value
@@ -50,7 +51,7 @@ def test_an_interval_holds_its_value_and_the_sign() -> None:
     ],
 )
 def test_missing_events_silence_their_parameters(events: Events, silent: set[str]) -> None:
-    found = estimates(NAMES, table(1).array, spread(0.01), events, False, "run3.csv")
+    found = estimates(NAMES, table(1).array, spread(0.01), events, Rig("force"), "run3.csv")
     assert {name for name in NAMES if found[name].value is None} == silent
     for name in silent:
         reason = found[name].reason
@@ -62,7 +63,7 @@ def test_missing_events_silence_their_parameters(events: Events, silent: set[str
 def test_a_wide_interval_silences_a_parameter() -> None:
     samples = spread(0.01)
     samples[:, 5] *= np.random.default_rng(2).uniform(0, 2, len(samples))
-    found = estimates(NAMES, table(1).array, samples, PLENTY, False, "log")
+    found = estimates(NAMES, table(1).array, samples, PLENTY, Rig("force"), "log")
     assert {name for name in NAMES if found[name].value is None} == {"dv_p"}
     assert found["dv_p"].assumed == table(1).dv_p
 
@@ -71,7 +72,7 @@ def test_of_a_viscous_term_that_is_surely_small_its_largest_size_is_told() -> No
     center, samples = table(1).array.copy(), spread(0.001)
     center[3] = 0.1
     samples[:, 3] = np.abs(0.1 + 0.1 * np.random.default_rng(3).standard_normal(len(samples)))
-    found = estimates(NAMES, center, samples, PLENTY, False, "log")
+    found = estimates(NAMES, center, samples, PLENTY, Rig("force"), "log")
     small = found["F_vp"]
     assert small.value is None and small.known
     assert small.assumed == 0.1
@@ -80,6 +81,8 @@ def test_of_a_viscous_term_that_is_surely_small_its_largest_size_is_told() -> No
 
 
 def test_rotary_units() -> None:
-    found = estimates(NAMES, table(1).array, spread(0.01), PLENTY, True, "log")
+    found = estimates(
+        NAMES, table(1).array, spread(0.01), PLENTY, Rig("force", motion="rotary"), "log"
+    )
     assert found["m"].unit == "kg m^2"
     assert found["dv_p"].unit == "rad/s"

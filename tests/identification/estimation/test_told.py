@@ -20,6 +20,7 @@ from identification.estimation.estimates import (
     of_effect,
     told_estimate,
 )
+from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE
 from tests.conftest import ROOT
 from tests.told import broken
@@ -60,7 +61,7 @@ def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> 
     sign = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
     center = sign * np.array([size for size, _ in drawn])
     samples = normal_samples(center, np.array([sd for _, sd in drawn]))
-    for one in estimates(NAMES, center, samples, PLENTY, False, "log").values():
+    for one in estimates(NAMES, center, samples, PLENTY, Rig("force"), "log").values():
         assert broken(one) is None
 
 

@@ -7,9 +7,9 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from identification.model.plant import Actuator
+from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, identified, model_of
-from workbench.cards.parameter_units import actuator_units, friction_units
+from workbench.cards.parameter_units import friction_units
 from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.page import Section, page

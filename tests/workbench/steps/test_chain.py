@@ -300,7 +300,7 @@ def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
     bare = {"sd": None, "low": None, "high": None}
     assert known["friction"]["F_sn"] == {"value": -23.0, "unit": "N", **bare}
     assert known["actuator"]["k1"] == {"value": 19530.0, "unit": "N/(V s)", **bare}
-    turning = truth("x", recipe, 2, motion="rotary")
+    turning = truth("x", recipe, 2, rig=Rig("force", motion="rotary"))
     assert turning["friction"]["F_vp"]["unit"] == "N m s/rad"
     assert turning["actuator"]["k2"]["unit"] == "N m/rad"
 

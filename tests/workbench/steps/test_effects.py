@@ -144,7 +144,7 @@ def test_the_truth_has_every_parameter_with_its_unit() -> None:
             "delta": {"value": 2.0, "unit": "1", **bare},
         }
     }
-    turning = truth("x", with_effects(acting("spring")), motion="rotary")
+    turning = truth("x", with_effects(acting("spring")), rig=Rig("force", motion="rotary"))
     assert turning["effects"]["spring"]["k"]["unit"] == "N m/rad"
 
 

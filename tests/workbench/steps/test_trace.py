@@ -11,6 +11,7 @@ import pytest
 from identification.effects._library import built_in
 from identification.errors import BadLog
 from identification.estimation.estimates import HELD, of_effect
+from identification.log import Rig
 from identification.model.karnopp import NAMES
 from identification.tracing.result import Dependence, Errors, Left, Residual, TraceVerdict
 from tests.told import broken_in
@@ -104,7 +105,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
     document = trace_document(found)
     assert document["effects"][0]["params"]["v_s"]["unit"] == "rad/s"
     assert found.model.effects["spring"]["k"].unit == "N m/rad"
-    assert [row[2] for row in effect_rows(found.trace, "rotary")] == [
+    assert [row[2] for row in effect_rows(found.trace, Rig("force", motion="rotary"))] == [
         "N m",
         "rad/s",
         "",
@@ -252,7 +253,7 @@ def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
         **effect.params,
         "v_s": of_effect(v_s, v_s.high, 1.0),
     }
-    rows = effect_rows(replace(found, effects=(replace(effect, params=params),)), "linear")
+    rows = effect_rows(replace(found, effects=(replace(effect, params=params),)), Rig("force"))
     assert [row[1] for row in rows[1:3]] == ["-", "0"]
     assert rows[1][3].startswith("at its bound 100: ")
     assert rows[2][3] == HELD
