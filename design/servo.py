@@ -197,7 +197,7 @@ def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
     return Memory(
         x=np.zeros(1), pid=np.zeros(3), z_r=settled(Sampled(law.b_r, law.a_r), y_0),
         z_v=settled(Sampled(law.b_v, law.a_v), first), z_e=settled(Sampled(law.b_e, law.a_e), y_0),
-        z_c=settled(Sampled(law.b_c, law.a_c), 0.0), kalman=kalman, last=np.zeros(4),
+        z_c=np.zeros(law.b_c.size), kalman=kalman, last=np.zeros(4),
         held=np.array([y_0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
 
