@@ -1,6 +1,7 @@
 """A controller as C99: one header, one source, no allocation, no dependency."""
 
 from collections.abc import Iterator
+from typing import Any
 
 from design.program import State, Variable
 from workbench.export.c_syntax import C, c_syntax
@@ -16,7 +17,7 @@ def c_files(what: Exported) -> dict[str, str]:
     program = what.program
     c = c_syntax(program, what.precision)
     test = what.test
-    common = {
+    common: dict[str, Any] = {
         "title": title_of(what),
         "lead": lead_of(what),
         "name": program.name,

@@ -6,12 +6,12 @@ from design.program import Program
 from workbench.export.exported import Precision
 from workbench.export.syntax import Syntax, braced, state_names
 
-# Keywords, and functions of the library that a linter would take a local name for.
-KEYWORDS = frozenset(
-    "error free auto break case char const continue default do double else enum extern float for goto if"
-    " inline int long register restrict return short signed sizeof static struct switch typedef"
-    " union unsigned void volatile while".split()
-)
+# Python's names that are keywords of C, and one of a function of its library.
+KEYWORDS = (
+    "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto",
+    "inline", "int", "long", "register", "restrict", "short", "signed", "sizeof", "static",
+    "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "free",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)

@@ -63,6 +63,6 @@ def lead_of(what: Exported) -> Sequence[str]:
         f"Made by servo-workbench {version('servo-workbench')} from a design of this machine.",
         f"Runs every {program.h:.12g} s{turns}.",
         "Letters are the paper's: r reference, y position, F_e force on the body, u command;",
-        "R, S, T polynomials in z^-1; v velocity, e_y error, F_c, F_s, dv as in Karnopp's friction.",
+        "R, S, T polynomials in z^-1; v velocity, e_y error; F_c, F_s, dv of Karnopp's friction.",
         *what.remarks,
     )
