@@ -20,7 +20,7 @@ from design.program import (
     Variable,
     expressions,
 )
-from design.servo import Servo, servo_law, servo_memory
+from design.servo import Compensation, Servo, servo_law, servo_memory
 from design.servo_kernels import PID_LAW, Law, Memory, servo_step
 from identification.arrays import Array
 from identification.errors import BadModel
@@ -43,7 +43,7 @@ class ProgramUnits:
 
 COMPENSATOR_SLOTS = (*NAMES, "dv_p1", "dv_n1", "e_T", "inner", "stick")
 PID_SLOTS = ("k_R", "h_per_T_i", "T_d_per_eps", "exp_h_eps", "zone", "rule")
-TABLES = {
+LAW_TABLES = {
     "R": ("poly_R", "R of S F_ref = T r - R y, ascending powers of z^-1"),
     "S": ("poly_S", "S of the same"),
     "W": ("poly_W", "W u = T r - R y + (W - S) taken: forgets what was not carried out"),
@@ -56,14 +56,14 @@ TABLES = {
     "b_c": ("b_c", "F_compf: filter C of the compensator's force"),
     "a_c": ("a_c", "denominator of the same"),
 }
-STATES: Mapping[str, tuple[str, str]] = {
+STATE_ARRAYS: Mapping[str, tuple[str, str]] = {
     "x": ("x", "state of S F_ref = T r - R y in observer form"),
     "z_r": ("z_r", "state of T"),
     "z_v": ("z_v", "state of filter A and the slope (5)"),
     "z_e": ("z_e", "state of filter B"),
     "z_c": ("z_c", "state of filter C"),
 }
-SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
+STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "pid": (
         ("pid_sum", "sum of the error over T_i"),
         ("pid_slope", "filtered slope of the error times T_d"),
@@ -90,11 +90,10 @@ def controller_program(
     """The servo's step as `design.servo.simulate_servo` runs it every h [s].
 
     name: of the machine; k_a: of a motor [N per unit of the command], else 0. Raises BadModel
-    where the servo has a dither, an integral with a rule, or another countermeasure than the
-    compensator.
+    where the servo has a dither, or another countermeasure than the compensator.
     """
-    if servo.dither is not None:
-        raise BadModel("a dither has no form in a program; take it out")
+    if servo.dither is not None or not isinstance(servo.friction, Compensation | None):
+        raise BadModel("a program has no dither, and no friction observer; take it out")
     law = servo_law(servo, h, k_a)
     memory = servo_memory(servo, law, 1.0, 0.0)
     inputs = (
@@ -143,8 +142,8 @@ def _named_law(law: Law) -> list[Any]:
     """The law's values under the names of the program; what chooses between equations stays."""
     found: list[Any] = []
     for field, value in law._asdict().items():
-        if field in TABLES:
-            name, meaning = TABLES[field]
+        if field in LAW_TABLES:
+            name, meaning = LAW_TABLES[field]
             found.append(NamedArray(name, len(value), meaning, tuple(value.tolist())))
         elif field == "law" and len(value) > 1:
             meaning = "F_comp: friction compensator, eqs. (1), (3) and (4)"
@@ -165,11 +164,11 @@ def _slotted(name: str, value: Array, slots: tuple[str, ...], meaning: str) -> N
 def _named_memory(memory: Memory) -> list[Any]:
     found: list[Any] = []
     for field, value in memory._asdict().items():
-        if field in STATES:
-            name, meaning = STATES[field]
+        if field in STATE_ARRAYS:
+            name, meaning = STATE_ARRAYS[field]
             found.append(NamedArray(name, len(value), meaning))
         else:
-            slots = tuple(name for name, _ in SLOTS.get(field, ()))
+            slots = tuple(name for name, _ in STATE_SLOTS.get(field, ()))
             found.append(NamedArray(field, len(value), "", (), slots, field == "turn"))
     return found
 
@@ -177,10 +176,10 @@ def _named_memory(memory: Memory) -> list[Any]:
 def _states(memory: Memory) -> Iterator[State]:
     """The states that a program may have, at rest at position 1."""
     for field, value in memory._asdict().items():
-        if field in STATES:
-            name, meaning = STATES[field]
+        if field in STATE_ARRAYS:
+            name, meaning = STATE_ARRAYS[field]
             yield State(name, "real", tuple(value.tolist()), True, meaning)
-        for at, (name, meaning) in enumerate(SLOTS.get(field, ())):
+        for at, (name, meaning) in enumerate(STATE_SLOTS.get(field, ())):
             whole = np.issubdtype(value.dtype, np.integer)
             kind: Kind = "integer" if whole else "real"
             yield State(name, kind, (float(value[at]),), False, meaning)

@@ -24,10 +24,15 @@ from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 
 SHORTEST_TEST = 120  # samples
-TURNS = 24  # of the position controller, where that is not too long
-LONGEST_TEST = 240
-SPEEDS = (0.0, 3.0, 0.75, 0.25, 0.0)  # of the test's motion, in parts of the band's limits
-PUSHES = (1.0, 10.0, 100.0, 1000.0)  # of its error and force, the first that reaches every branch
+TEST_TURNS = 24  # of the position controller, at least
+TEST_PASSES = 4  # through its longest filter, at least
+TEST_SPEEDS = (0.0, 3.0, 0.75, 0.25, 0.0)  # of the test's motion, in parts of the band's limits
+TEST_PUSHES = (
+    1.0,
+    10.0,
+    100.0,
+    1000.0,
+)  # of its error and force, the first that reaches every branch
 
 
 class ProgramRun:
@@ -139,7 +144,7 @@ def self_test(
     p: the friction, e_T [m] the error scale, by which the motion is measured. The outputs are
     those of a machine that rounds to `real`.
     """
-    for scale in PUSHES:
+    for scale in TEST_PUSHES:
         inputs = _motion(program, p, e_T, scale)
         run = ProgramRun(program, 0.0, real)
         found = SelfTest(inputs, np.array([float(run.step(*row)) for row in inputs.tolist()]))
@@ -151,11 +156,12 @@ def self_test(
 def _motion(program: Program, p: Karnopp, e_T: float, scale: float) -> Array:
     """Inputs (n, inputs): rest, sliding, creep in the wide band and the narrow one, forwards and
     back; in its last part error and force are `scale` times as large."""
-    n = int(np.clip(TURNS * program.ratio, SHORTEST_TEST, LONGEST_TEST))
+    turns = max([TEST_TURNS, *(TEST_PASSES * len(one.values) for one in program.tables)])
+    n = max(SHORTEST_TEST, turns * program.ratio)
     part = np.arange(n) / n
-    edges = np.linspace(0.0, 0.5, len(SPEEDS) + 1)
-    place = np.clip(np.searchsorted(edges, part % 0.5, side="right") - 1, 0, len(SPEEDS) - 1)
-    y = np.cumsum(np.where(part < 0.5, p.dv_p, p.dv_n) * np.array(SPEEDS)[place]) * program.h
+    edges = np.linspace(0.0, 0.5, len(TEST_SPEEDS) + 1)
+    place = np.clip(np.searchsorted(edges, part % 0.5, side="right") - 1, 0, len(TEST_SPEEDS) - 1)
+    y = np.cumsum(np.where(part < 0.5, p.dv_p, p.dv_n) * np.array(TEST_SPEEDS)[place]) * program.h
     push = np.where(part < 0.8, 1.0, scale)
     side = np.where(part % 0.1 < 0.05, 1.0, -1.0)
     error = push * side * e_T * np.where(part % 0.3 < 0.15, 0.4, 6.0)

@@ -26,7 +26,7 @@ SUM, SLOPE, ERROR = range(3)
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
 # What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
-R_MOVED, INTEGRAL_SUM, COMMAND = range(3)
+R_MOVED, INTEGRAL_SUM, U_BEFORE = range(3)
 
 
 class Law(NamedTuple):
@@ -172,7 +172,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
     if c.friction != NO_COUNTERMEASURE:
-        force = c.k_a * s.held[COMMAND] if c.k_a != 0.0 else F
+        force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
         added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
     if c.k_a != 0.0:
         free = asked + added / c.k_a if c.friction != NO_COUNTERMEASURE else asked
@@ -193,7 +193,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     if acts:
         position_moved(c, s, y, asked, taken)
     if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE:
-        s.held[COMMAND] = u
+        s.held[U_BEFORE] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0
     return float(u)

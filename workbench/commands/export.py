@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 TARGETS = ("c", "st", "plcopen", "fmu", "json", "mat")
 SINGLE = ("c", "st", "plcopen")  # targets that have single precision too
-NEXT = {
+WHAT_NEXT = {
     "c": "compile it with -ffp-contract=off and call {name}_self_test() once: 0 where all is well",
     "st": "import it; FB_{name}_test.passed tells whether the controller computes as it should",
     "plcopen": "import it as PLCopen XML; FB_{name}_test.passed tells whether it computes as it"
@@ -142,6 +142,6 @@ def _view(
         f"every {program.h:.6g} s: {given} -> {program.output.name} [{program.output.unit}]",
         *(f"remark: {one}" for one in what.remarks),
         written(folder, *files),
-        *(f"{target}: {NEXT[target].format(name=program.name)}" for target in targets),
+        *(f"{target}: {WHAT_NEXT[target].format(name=program.name)}" for target in targets),
     ]
     return "\n".join(lines)

@@ -20,9 +20,9 @@ from workbench.steps.closed_loop import DrivenLoop
 
 Precision = Literal["double", "single"]
 REAL: Mapping[Precision, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}
-PREFIX = "servo_"  # before a name that begins with no letter
+BEFORE_DIGIT = "servo_"  # before a name that begins with no letter
 LONGEST_NAME = 31  # characters that every linker and PLC tells apart
-AGAIN = "run 'workbench design' again"
+DESIGN_AGAIN = "run 'workbench design' again"
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def exported(
 def _loop_of(found: Design, chosen: str) -> DrivenLoop:
     """The chosen controller without the compensator."""
     if found.command is None:
-        raise BadModel(f"the design does not say what the drive takes; {AGAIN}")
+        raise BadModel(f"the design does not say what the drive takes; {DESIGN_AGAIN}")
     limit, k_a = found.command.limit, found.command.force_per_command
     if chosen == "present":
         if found.present is None:
@@ -120,4 +120,4 @@ def identifier(name: str) -> str:
     found = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:LONGEST_NAME].rstrip("_")
     if not found:
         raise BadModel(f"the name {name!r} has no letter or digit; give one by --name")
-    return found if found[0].isalpha() else PREFIX + found
+    return found if found[0].isalpha() else BEFORE_DIGIT + found

@@ -8,7 +8,9 @@ from workbench.export.filled import filled, lead_of, rows, title_of
 from workbench.export.st_syntax import StructuredText, st_syntax
 from workbench.export.syntax import INDENT
 
-AT_REST = "_at_1"  # behind a state's name: its entries where the machine has stood at position 1
+AT_POSITION_1 = (
+    "_at_1"  # behind a state's name: its entries where the machine has stood at position 1
+)
 NEVER = "begun"  # whether the block has run before
 EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
 
@@ -87,7 +89,11 @@ def _controller(what: Exported, st: StructuredText) -> Block:
     ]
     tables = [(one.name, one.values, one.meaning) for one in program.tables]
     tables += [
-        (one.name + AT_REST, one.at_rest, f"{one.name} where the machine has stood at position 1")
+        (
+            one.name + AT_POSITION_1,
+            one.at_rest,
+            f"{one.name} where the machine has stood at position 1",
+        )
         for one in program.states
         if one.array and any(one.at_rest)
     ]
@@ -122,7 +128,9 @@ def _reset(one: State, st: StructuredText) -> list[str]:
     """Lines that put a state at rest at y."""
     place, y = st.name(one.name), st.name("y")
     if one.array:
-        value = f"{st.name(one.name + AT_REST)}[j] * {y}" if any(one.at_rest) else st.number(0.0)
+        value = (
+            f"{st.name(one.name + AT_POSITION_1)}[j] * {y}" if any(one.at_rest) else st.number(0.0)
+        )
         return st.repeated("j", len(one.at_rest), [st.assigned(f"{place}[j]", value)])
     if one.kind == "integer":
         return [st.assigned(place, "0")]

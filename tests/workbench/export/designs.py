@@ -54,13 +54,15 @@ def simulated(one: Case, what: Exported, n: int, seed: int = 0) -> tuple[ServoRu
     t = h * np.arange(n)
     levels = 0.05 * rng.integers(-2, 3, size=n // round(2.0 / h) + 1)
     r = np.repeat(levels, round(2.0 / h))[:n] + 0.01 * np.sin(3.0 * t)
+    noise = LoopNoise(1e-5 * rng.standard_normal(n), 1e-2 * rng.standard_normal(n))
+    noise.y[0] = 0.0  # a block that begins at the position that it measures begins there too
     plant: Plant = one.model.simulated
     run = simulate_servo(
         plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
         what.loop.servo,
         r,
         h,
-        noise=LoopNoise.draw(n, 1e-5, 1e-2, rng),
+        noise=noise,
         start=(START, 0.0, 0.0),
     )
     columns = {"r": r, "y": run.y_measured, "F_e": run.F_measured}

@@ -69,7 +69,8 @@ class FunctionBlock:
     """An instance: `values` by name in small letters; called with its inputs."""
 
     def __init__(self, blocks: Blocks, node: Node) -> None:
-        self._blocks, self.values = blocks, {}
+        self._blocks = blocks
+        self.values: Values = {}
         self._real: Callable[[str], Any] = float
         declared = [one for part in node.children for one in part.children]
         for one in declared:
