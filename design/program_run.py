@@ -21,6 +21,7 @@ from design.program import (
     flat,
 )
 from identification.arrays import Array
+from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
 
 SHORTEST_TEST = 120  # samples
@@ -142,12 +143,18 @@ def self_test(
     """A vector that leads the program through friction's bands both ways, and to its limits.
 
     p: the friction, e_T [m] the error scale, by which the motion is measured. The outputs are
-    those of a machine that rounds to `real`.
+    those of a machine that rounds to `real`. Raises BadModel where they are no numbers.
     """
     for scale in TEST_PUSHES:
         inputs = _motion(program, p, e_T, scale)
         run = ProgramRun(program, 0.0, real)
-        found = SelfTest(inputs, np.array([float(run.step(*row)) for row in inputs.tolist()]))
+        with np.errstate(all="ignore"):
+            found = SelfTest(inputs, np.array([float(run.step(*row)) for row in inputs.tolist()]))
+        if not np.all(np.isfinite(found.outputs)):
+            raise BadModel(
+                f"the controller gives no number after {int(np.sum(np.isfinite(found.outputs)))}"
+                " samples; check its coefficients, gains and friction"
+            )
         if len(run.visited) == 2 * sum(isinstance(one, Choice) for one in flat(program.statements)):
             break
     return found

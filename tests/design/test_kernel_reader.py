@@ -1,4 +1,4 @@
-"""The program of a servo does what the simulation's kernels do, in every bit; the reader's rules."""
+"""The program of a servo does what the simulation does, in every bit; the reader's rules."""
 
 from collections.abc import Sequence
 from typing import Any
