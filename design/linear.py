@@ -67,12 +67,27 @@ def linear_plant(
     return _transfer(loop, drive)
 
 
+def commanded_plant(m: float, f: float, h: float, actuator: Actuator) -> tuple[Array, Array]:
+    """(A, B) in z^-1 from the held command to the position, without a force loop; see above.
+
+    Raises BadSpecification where m or h is not positive, or f is negative.
+    """
+    h = check_period(h)
+    if not (m > 0 and f >= 0):
+        raise BadSpecification(f"m = {m:g} kg, f = {f:g} N s/m: need m > 0 and f >= 0")
+    return _transfer(*_held(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), h))
+
+
+def _driven_body(m: float, f: float, actuator: Actuator) -> Array:
+    """y, v, F of a sliding body and its actuator, in continuous time (3, 3)."""
+    return np.array([[0.0, 1.0, 0.0], [0.0, -f / m, 1.0 / m], [0.0, -actuator.k2, 0.0]])
+
+
 def _force_loop(
     m: float, f: float, h: float, actuator: Actuator, force: ForceGains
 ) -> tuple[Array, Array]:
     """One sample of y, v, F and the integral of the force error, under a force reference."""
-    body = np.array([[0.0, 1.0, 0.0], [0.0, -f / m, 1.0 / m], [0.0, -actuator.k2, 0.0]])
-    step, entry = _held(body, np.array([0.0, 0.0, actuator.k1]), h)
+    step, entry = _held(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), h)
     error = np.array([0.0, 0.0, -1.0, 0.0])
     command = force.k_i * (error + np.array([0.0, 0.0, 0.0, 1.0]))
     loop = np.zeros((4, 4))

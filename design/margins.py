@@ -104,6 +104,20 @@ class _Loop:
         """(|L|^2 - 1)|A S|^2 at theta."""
         return np.square(np.abs(self.forward(theta))) - np.square(np.abs(self.back(theta)))
 
+    def imaginary_noise(self, theta: Array) -> Array:
+        """Rounding of `imaginary` at theta."""
+        forward, back = self.sizes()
+        return ROUNDING * (forward * np.abs(self.back(theta)) + back * np.abs(self.forward(theta)))
+
+    def excess_noise(self, theta: Array) -> Array:
+        """Rounding of `excess` at theta: far below its own size where both of its squares are."""
+        forward, back = self.sizes()
+        return (
+            2.0
+            * ROUNDING
+            * (forward * np.abs(self.forward(theta)) + back * np.abs(self.back(theta)))
+        )
+
     def sizes(self) -> tuple[float, float]:
         """Bounds of |B R| and |A S| on the unit circle: what rounding is measured against."""
         norms = [float(np.abs(c).sum()) for c in (self.B, self.R, self.A, self.S)]
@@ -205,7 +219,7 @@ def _maximum(curve: Curve, grid: Array) -> tuple[float, float]:
     return best, place
 
 
-def _zeros(curve: Curve, grid: Array, noise: float) -> Array:
+def _zeros(curve: Curve, grid: Array, noise: Curve) -> Array:
     """Where the curve changes sign inside (0, pi); values below `noise` are taken as unknown.
 
     Dips that come near zero between grid points are zoomed into, so that a pair of crossings
@@ -213,7 +227,7 @@ def _zeros(curve: Curve, grid: Array, noise: float) -> Array:
     """
     theta = grid[(grid > 0) & (grid < np.pi)]
     value = curve(theta)
-    known = np.abs(value) > noise
+    known = np.abs(value) > noise(theta)
     theta, value = theta[known], value[known]
     if theta.size < 3:
         return np.zeros(0)
@@ -226,7 +240,7 @@ def _zeros(curve: Curve, grid: Array, noise: float) -> Array:
     if extra:
         theta = np.unique(np.concatenate([theta, *extra]))
         value = curve(theta)
-        known = np.abs(value) > noise
+        known = np.abs(value) > noise(theta)
         theta, value = theta[known], value[known]
     change = np.flatnonzero(np.sign(value[:-1]) != np.sign(value[1:]))
     return _narrow(curve, theta[change], theta[change + 1], np.sign(value[change]))
@@ -250,9 +264,7 @@ def _gain_margins(
 ) -> tuple[float | None, float | None, float | None, float | None]:
     """Least destabilising gain above 1, greatest below 1, each with its theta."""
     forward, back = loop.sizes()
-    theta = np.concatenate(
-        [[0.0], _zeros(loop.imaginary, grid, ROUNDING * forward * back), [np.pi]]
-    )
+    theta = np.concatenate([[0.0], _zeros(loop.imaginary, grid, loop.imaginary_noise), [np.pi]])
     n, d = loop.forward(theta), loop.back(theta)
     known = (np.abs(n) > ROUNDING * forward) & (np.abs(d) > ROUNDING * back)
     theta, gain = theta[known], -np.real(d[known] / n[known])
@@ -271,8 +283,7 @@ def _phase_and_delay_margins(
     loop: _Loop, grid: Array
 ) -> tuple[float | None, float | None, float | None, float | None]:
     """Least phase [rad] and least delay [samples] over all crossings of |L| = 1, with theta."""
-    forward, back = loop.sizes()
-    theta = _zeros(loop.excess, grid, ROUNDING * max(forward, back) ** 2)
+    theta = _zeros(loop.excess, grid, loop.excess_noise)
     lag = np.mod(np.angle(loop.forward(theta) * np.conj(loop.back(theta))) + np.pi, 2 * np.pi)
     phase, phase_theta = _least(np.minimum(lag, 2 * np.pi - lag), theta)
     delay, delay_theta = _least(lag / theta, theta)

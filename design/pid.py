@@ -11,7 +11,16 @@ from numpy.typing import ArrayLike
 from scipy.optimize import lsq_linear, minimize
 
 from design.place import solve_diophantine, solve_sylvester
-from design.polynomial import add, check_period, describe_root, divide, multiply, roots, trim
+from design.polynomial import (
+    add,
+    check_period,
+    describe_root,
+    divide,
+    largest_root,
+    multiply,
+    roots,
+    trim,
+)
 from design.rst import RST, closed_loop, closed_loop_poles
 from design.specification import (
     Tracking,
@@ -242,8 +251,7 @@ def _place_dominant(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tup
     def radius(x: Array, upper: float) -> float:
         s1, t = (float(value) for value in x)
         outside = max(s1 - upper, -0.999 - s1, 0.0)
-        z = roots(Q_0 + s1 * Q_1 + t * size * Q_2)
-        return float(np.abs(z).max(initial=0.0)) + 1e3 * outside
+        return largest_root(Q_0 + s1 * Q_1 + t * size * Q_2) + 1e3 * outside
 
     freedom = np.stack([Q_1, Q_2 * size], axis=1)
     limits = ([-0.95, -np.inf], [-0.1, np.inf])

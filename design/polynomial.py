@@ -104,6 +104,17 @@ def roots(c: Array) -> ComplexArray:
     return np.asarray(found, dtype=np.complex128)
 
 
+def largest_root(c: Array) -> float:
+    """|z| of the largest root, 0 where there is none; as `roots`, without their order."""
+    kept = np.flatnonzero(c)
+    if kept.size < 2:
+        return 0.0
+    c = c[kept[0] : kept[-1] + 1]
+    companion = np.eye(c.size - 1, k=-1)
+    companion[0] = -c[1:] / c[0]
+    return float(np.abs(np.linalg.eigvals(companion)).max())
+
+
 def root_values(z: ArrayLike, name: str = "poles") -> ComplexArray:
     """z as one row of complex numbers; raises BadSpecification where they are not numbers."""
     try:

@@ -43,6 +43,7 @@ class Compensation:
     filters: CompensatorFilters
 
 
+DIRECT = ForcePI(0.0, 1.0)  # as the kernels take it that there is no force loop
 Countermeasure = Compensation | DisturbanceObserver | FrictionObserver
 
 
@@ -56,8 +57,9 @@ class Servo:
     force reference [N]. anti_windup [s]: in which time an RST's integrator forgets what a clipped
     command did not carry out; 0: the whole controller forgets it at once; None: never. A PID stops
     its sum while it would drive the command further out. W: in place of anti_windup, that of a
-    `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own. rate:
-    the reference is moved at most at this speed [m/s], None: at any.
+    `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own.
+    direct: an actuator takes the position controller's output as its command, without a force loop.
+    rate: the reference is moved at most at this speed [m/s], None: at any.
 
     Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
@@ -72,6 +74,13 @@ class Servo:
     W: tuple[float, ...] | None = None
     k_a: float | None = None
     rate: float | None = None
+    direct: bool = False
+
+    def __post_init__(self) -> None:
+        if self.direct and (self.force is not None or self.friction is not None):
+            raise BadModel(
+                "a command without a force loop takes no force of a loop or a countermeasure"
+            )
 
     @property
     def linear(self) -> RST:
@@ -134,7 +143,7 @@ def simulate_servo(
     cannot be followed.
     """
     ratio = max(1, round(servo.linear.h / h))
-    cascade = Cascade(servo.linear, servo.force, servo.control_limit)
+    cascade = Cascade(servo.linear, DIRECT if servo.direct else servo.force, servo.control_limit)
     loop, p = prepared_loop([plant], cascade, reference, h, noise, start, ratio)
     n, table = len(loop.reference), effect_table(plant.effects)
     codes = np.where(table.codes == ON_ACTUATOR, -1, table.codes) if loop.motor else table.codes

@@ -161,8 +161,9 @@ def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> N
 def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) -> float:
     """Command [V] of one sample at reference r, position y [m] and force F [N]; shake: the dither.
 
-    A motor's force is not measured: it is that of the command before. Where the command is
-    clipped, what was carried out is the force reference that gives it.
+    Without a force loop, k_i = 0, the position controller gives the command. A motor's force is not
+    measured: it is that of the command before. Where the command is clipped, what was carried out
+    is the force reference that gives it.
     """
     aim = r
     if c.rate < math.inf:
@@ -174,8 +175,8 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     if c.friction != NO_COUNTERMEASURE:
         force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
         added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
-    if c.k_a != 0.0:
-        free = asked + added / c.k_a if c.friction != NO_COUNTERMEASURE else asked
+    if c.k_a != 0.0 or c.k_i == 0.0:
+        free = asked + added / c.k_a if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE else asked
         u = min(max(free, -c.limit), c.limit)
         taken = asked + (u - free)
         s.last[WANTED] = asked

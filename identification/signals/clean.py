@@ -54,11 +54,12 @@ class Repaired(NamedTuple):
 @dataclass(frozen=True)
 class Prepared:
     """Runs on an even clock, in `remarks` what had to be done for it, a line each, and in `bad`
-    which samples were set aside."""
+    which samples were set aside; period: of the samples in the file [s], where it is known."""
 
     runs: tuple[Log, ...]
     remarks: tuple[str, ...]
     bad: tuple[BadSamples, ...] = ()
+    period: float | None = None
 
 
 def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:

@@ -12,7 +12,8 @@ from identification.effects import spring as spring_module
 from tests.chain import CARD
 from workbench.cli import COMMANDS, main
 from workbench.steps import demo as demonstration
-from workbench.steps.validate import Limits, validate
+from workbench.steps.loop_figures import Limits
+from workbench.steps.validate import validate
 
 WITHOUT_FILES = ("reidentify", "watch", "effects")  # they write to the registry, or nothing
 

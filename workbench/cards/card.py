@@ -21,6 +21,7 @@ Beyond the contract's example a card may say (all optional, all additive):
     [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
     [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
     [recipe] see workbench/cards/recipe.py
+    [controller] the one that the machine has now: see workbench/cards/controller.py
 """
 
 import re
@@ -37,6 +38,7 @@ from identification.effects._library import Library
 from identification.errors import BadCard, BadModel
 from identification.log import Rig, RigKind
 from identification.model.plant import over
+from workbench.cards.controller import CardController, ControllerSection
 from workbench.cards.nearest import nearest
 from workbench.cards.quantities import in_unit_of
 from workbench.cards.recipe import CardTable, Positive, Recipe, RecipeSection
@@ -184,11 +186,15 @@ class _CardFile(CardTable):
     files: tuple[FileEntry, ...] = ()
     split: dict[str, tuple[str, ...]] = Field(default_factory=dict)
     recipe: RecipeSection | None = None
+    controller: ControllerSection | None = None
 
 
 @dataclass(frozen=True)
 class Card:
-    """A card as read: `signals` by canonical name, `files` the set, `split` its named groups."""
+    """A card as read: `signals` by canonical name, `files` the set, `split` its named groups.
+
+    `controller`: the one that the machine has now.
+    """
 
     path: Path
     about: About
@@ -198,6 +204,7 @@ class Card:
     split: Mapping[str, tuple[str, ...]]
     recipe: Recipe | None
     rigs: Mapping[str, Rig]
+    controller: CardController | None = None
 
     @property
     def name(self) -> str:
@@ -244,12 +251,20 @@ def load_card(path: Path, library: Library | None = None, *, with_recipe: bool =
         split=MappingProxyType(parsed.split),
         recipe=recipe,
         rigs=MappingProxyType(rigs),
+        controller=_controller(path, parsed, rigs[""]),
     )
 
 
 def _rig(path: Path, section: RigSection, signals: Mapping[str, SignalSpec]) -> Rig:
     try:
         return section.value(signals)
+    except BadCard as error:
+        raise BadCard(f"{path}: {error}") from None
+
+
+def _controller(path: Path, parsed: _CardFile, rig: Rig) -> CardController | None:
+    try:
+        return None if parsed.controller is None else parsed.controller.value(rig)
     except BadCard as error:
         raise BadCard(f"{path}: {error}") from None
 

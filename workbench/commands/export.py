@@ -42,9 +42,8 @@ WHAT_NEXT = {
 )
 @click.option(
     "--compensator/--no-compensator",
-    default=True,
-    show_default=True,
-    help="With the friction compensator beside it.",
+    default=None,
+    help="With the friction compensator beside it.  [default: with, but beside the present one]",
 )
 @click.option(
     "--precision",
@@ -59,7 +58,7 @@ def command(
     design_file: Path,
     targets: tuple[str, ...],
     controller: str | None,
-    compensator: bool,
+    compensator: bool | None,
     precision: Literal["double", "single"],
     name: str | None,
     as_json: bool,

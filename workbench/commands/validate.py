@@ -73,7 +73,8 @@ def command(
     from workbench.documents.model import read_model
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
-    from workbench.steps.validate import Limits, validate, validation_document
+    from workbench.steps.loop_figures import Limits
+    from workbench.steps.validate import validate, validation_document
 
     known = library(effects)
     model, found = read_model(model_file, known), read_design(design_file)

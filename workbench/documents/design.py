@@ -46,7 +46,7 @@ from workbench.documents.drive import (
     present_file,
     present_of,
 )
-from workbench.documents.model import as_number, used
+from workbench.documents.model import plain, used
 from workbench.documents.reading import read_result
 
 DESIGN_SCHEMA = "design/2"
@@ -314,7 +314,7 @@ class _Units:
 
 def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
-    document: dict[str, Any] = _plain(_as_file(found, _units_of(found)))
+    document: dict[str, Any] = plain(_as_file(found, _units_of(found)))
     return {"schema": document.pop("schema"), **document}
 
 
@@ -388,17 +388,6 @@ def _refuse_other_laws(written: _DesignFile, found: Design, units: _Units) -> No
                     f"[{name}.law] {key} is not [{name}] {key} in the unit of the command; run"
                     " 'workbench design' again"
                 )
-
-
-def _plain(value: object) -> Any:
-    """Dataclasses as dictionaries, parameters as results carry them."""
-    if isinstance(value, Estimate):
-        return as_number(value)
-    if is_dataclass(value):
-        return {field.name: _plain(getattr(value, field.name)) for field in fields(value)}
-    if isinstance(value, Mapping):
-        return {key: _plain(entry) for key, entry in value.items()}
-    return value
 
 
 def _as_file(found: Design, units: _Units) -> _DesignFile:

@@ -1,7 +1,7 @@
 """The model of one machine: what identification found, and model.json, which holds all of it."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal
@@ -19,6 +19,7 @@ from workbench.cards.effect_values import estimates_in_si, known_effect
 from workbench.cards.nearest import nearest
 from workbench.cards.parameter_units import all_converted, friction_units, in_unit
 from workbench.documents.contradictions import refuse_changed_units
+from workbench.documents.drive import DriveUnits, Present, PresentFile, present_of
 from workbench.documents.reading import read_result
 
 MODEL_SCHEMA = "model/1"
@@ -72,7 +73,8 @@ class LogEntry:
 
     position_rms is None where no free run follows the log: the motion is imposed on the body.
     travel: lowest and highest measured position [m]; force_peak: largest applied force [N];
-    duration, h [s]; speed: what 1 % of the measured speeds exceed [m/s], None in older files.
+    duration, h [s]; speed: what 1 % of the measured speeds exceed [m/s]; period: of the samples in
+    the file [s], where h is that of the samples fitted; both None in older files.
     """
 
     file: str
@@ -87,6 +89,7 @@ class LogEntry:
     force_rms: float | None
     chi_square: float
     speed: float | None = None
+    period: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("h", "duration"):
@@ -158,6 +161,7 @@ class ModelFile:
     correlation: ParameterCorrelation | None = None
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
+    controller: PresentFile | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -184,9 +188,9 @@ class Model(ModelFile):
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
     posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
-    the logs lie from the model, each alone; bad_samples: what was set aside of them. library:
-    where the effects' equations are. read: what to say of its file, a line for each value in
-    another unit than ours.
+    the logs lie from the model, each alone; bad_samples: what was set aside of them; controller:
+    the one that the machine has now. library: where the effects' equations are. read: what to say
+    of its file, a line for each value in another unit than ours.
     """
 
     library: Library = field(default_factory=built_in, compare=False, repr=False)
@@ -194,7 +198,7 @@ class Model(ModelFile):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        _ = self.simulated
+        _ = self.simulated, self.present
 
     @property
     def karnopp(self) -> Karnopp:
@@ -230,9 +234,26 @@ class Model(ModelFile):
         return max(entry.force_peak for entry in self.log)
 
     @property
+    def period(self) -> float:
+        """The shortest sampling period of its logs [s], as they were written, in four digits."""
+        return float(f"{min(entry.period or entry.h for entry in self.log):.4g}")
+
+    @property
     def imposed(self) -> bool:
         """Whether the logged motion was imposed, so that only the force equation was fitted."""
         return all(entry.position_rms is None for entry in self.log)
+
+    @property
+    def present(self) -> Present | None:
+        """The controller that the machine has now; None where its card named none."""
+        if self.controller is None:
+            return None
+        return present_of(self.controller, self.drive_units, "controller")
+
+    @property
+    def drive_units(self) -> DriveUnits:
+        """Units of what its drive runs."""
+        return DriveUnits(self.rig.motion, self.rig.command_unit)
 
     @property
     def rotary(self) -> bool:
@@ -277,7 +298,20 @@ def model_document(model: Model) -> dict[str, Any]:
         key: {name: as_number(value) for name, value in found.items()}
         for key, found in model.effects.items()
     }
+    if model.controller is not None:
+        document["controller"] = plain(model.controller)
     return {"schema": document.pop("schema"), **document}
+
+
+def plain(value: object) -> Any:
+    """Dataclasses as dictionaries, parameters as results carry them."""
+    if isinstance(value, Estimate):
+        return as_number(value)
+    if is_dataclass(value):
+        return {field.name: plain(getattr(value, field.name)) for field in fields(value)}
+    if isinstance(value, Mapping):
+        return {key: plain(entry) for key, entry in value.items()}
+    return value
 
 
 def _fields_of(model: ModelFile) -> dict[str, Any]:

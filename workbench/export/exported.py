@@ -50,13 +50,14 @@ def exported(
     found: Design,
     controller: str | None = None,
     *,
-    compensated: bool = True,
+    compensated: bool | None = None,
     precision: Precision = "double",
     name: str | None = None,
 ) -> Exported:
     """The controller of the design, by default the recommended one, as a program.
 
-    controller: "rst", "pid" or "present". Raises BadModel where the design has no such controller,
+    controller: "rst", "pid" or "present". compensated: with the friction compensator, by default
+    beside all but the present one. Raises BadModel where the design has no such controller,
     recommends none, or is of a version that does not say what the drive runs.
     """
     chosen = controller or found.recommended
@@ -64,7 +65,9 @@ def exported(
         have = ", ".join(found.controllers)
         raise BadModel(f"the design recommends no controller; choose one by --controller ({have})")
     loop = _loop_of(found, chosen)
-    if compensated:
+    if compensated or (compensated is None and chosen != "present"):
+        if loop.direct:
+            raise BadModel("a command without a force loop takes no compensator beside it")
         filters = found.compensator.filters or filters_at(loop.law.h)
         loop = replace(loop, compensation=Compensation(found.compensator.value, filters))
     assert found.command is not None
@@ -89,8 +92,8 @@ def _loop_of(found: Design, chosen: str) -> DrivenLoop:
             raise BadModel(
                 "the design has no present controller; name it in the card's [controller]"
             )
-        now = found.present
-        return DrivenLoop(now.law, now.force, now.rate, limit, None, k_a)
+        now, direct = found.present, found.present.output == "command" and k_a is None
+        return DrivenLoop(now.law, now.force, now.rate, limit, None, k_a, direct)
     one = found.controllers.get(chosen)
     if one is None:
         reason = found.refused.get(chosen, "it is not there")

@@ -19,8 +19,7 @@ from identification.model.estimates import Drive
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import loop_period, run_loop
-from workbench.steps.predict import default_drive, predict
-from workbench.steps.validate import (
+from workbench.steps.loop_figures import (
     DWELLS,
     SHORTEST_DWELL,
     SMOOTH_SHARE,
@@ -29,8 +28,9 @@ from workbench.steps.validate import (
     judged_of,
     slowest,
     travel,
-    validate,
 )
+from workbench.steps.predict import default_drive, predict
+from workbench.steps.validate import validate
 
 WINDOW = 2.0  # s between fresh starts of a free run, as everywhere on held-out logs
 LEAST_HELD_OUT = 2.0  # s

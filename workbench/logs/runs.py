@@ -62,9 +62,8 @@ def read_runs(path: Path, card: Card) -> Prepared:
     prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
     remarks = (*repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
-    return Prepared(
-        prepared.runs, tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    )  # fmt: skip
+    remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
+    return Prepared(prepared.runs, remarks, bad, repaired.log.h)
 
 
 def _repaired(raw: Log, first_row: int, path: Path, card: Card) -> Repaired:

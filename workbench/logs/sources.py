@@ -16,12 +16,16 @@ from workbench.logs.runs import fingerprint, read_runs
 
 @dataclass(frozen=True)
 class Source:
-    """One run of a file: its log on an even clock, the file's name, hash and rows."""
+    """One run of a file: its log on an even clock, the file's name, hash and rows.
+
+    period: of the samples in the file [s]; None where it is that of the log.
+    """
 
     log: Log
     file: str
     sha256: str
     rows: int
+    period: float | None = None
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
         prepared = read_runs(path, card)
         remarks.extend(prepared.remarks)
         bad.extend(prepared.bad)
-        found.extend((whole, _source(path, run)) for run in prepared.runs)
+        found.extend((whole, _source(path, run, prepared.period)) for run in prepared.runs)
     names_of = Counter(path.name for path in rigs)
     runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
@@ -68,9 +72,9 @@ def read_sources(names: Sequence[str], card_name: str) -> Sources:
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 
 
-def _source(path: Path, run: Log) -> Source:
+def _source(path: Path, run: Log, period: float | None) -> Source:
     found = fingerprint(path, run)
-    return Source(run, found.file, found.sha256, found.rows)
+    return Source(run, found.file, found.sha256, found.rows, period)
 
 
 def _told_apart(source: Source, path: Path) -> Source:

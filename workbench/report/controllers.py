@@ -8,7 +8,13 @@ from design.rst import closed_loop
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design
-from workbench.report.design_tables import DESIGN_HEAD, design_lines, margin_rows, polynomial_lines
+from workbench.report.design_tables import (
+    DESIGN_HEAD,
+    design_lines,
+    drive_lines,
+    margin_rows,
+    polynomial_lines,
+)
 from workbench.report.figures import (
     CONTROLLER_COLOURS,
     OTHER,
@@ -32,6 +38,11 @@ def coefficients(found: Design) -> Section:
     """The polynomials, for whoever programs the controller."""
     text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
     return Section("Coefficients", render("lines", lines=text))
+
+
+def drive_section(found: Design) -> Section:
+    """The same as difference equations, in the unit that the drive takes."""
+    return Section("As the drive runs it", render("lines", lines=drive_lines(found)))
 
 
 def sensitivity_section(found: Design, rotary: bool = False) -> Section:

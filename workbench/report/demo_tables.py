@@ -8,9 +8,8 @@ from workbench.report.design_tables import design_lines
 from workbench.report.model_tables import in_digits
 from workbench.report.trace_tables import effect_rows, error_rows, errors_head, trace_sentence
 from workbench.report.validation_tables import (
-    VALIDATION_HEAD,
     validation_lines,
-    validation_rows,
+    validation_table,
     validation_verdict,
 )
 from workbench.steps.demo import Demonstration
@@ -35,7 +34,7 @@ def demo_view(found: Demonstration, folder: Path) -> "Group":
         *design_lines(found.design, rotary),
         "",
         validation_verdict(found.validation),
-        table(VALIDATION_HEAD, validation_rows(found.validation, rotary)),
+        validation_table(found.validation, rotary),
         *validation_lines(found.validation, rotary),
         written(folder, "report.html", "design.html", "validation.html"),
     )

@@ -3,8 +3,9 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.cards.parameter_units import shown
+from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Controller, Design
+from workbench.documents.drive import DriveUnits, equation_lines, force_lines
 from workbench.output import Row, table, written
 
 if TYPE_CHECKING:
@@ -45,9 +46,10 @@ def _margins(one: Controller) -> Row:
 
 def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
-    p, c, units = found.plant, found.compensator, shown(rotary)
+    p, c = found.plant, found.compensator
+    units = shown(rotary, found.command.unit if found.command else "V")
     lines = [f"recommended: {_recommended(found)}", f"plant: {p.source}, {p.why}"]
-    lines.append(f"position loop every {1e3 * p.h:.4g} ms")
+    lines.append(f"position loop every {1e3 * p.h:.4g} ms{_output(found, units)}")
     if found.force:
         f = found.force
         lines.append(
@@ -72,7 +74,40 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
 def _recommended(found: Design) -> str:
     if found.recommended == "none":
         return "none, no controller keeps every goal"
-    return found.recommended.upper()
+    return found.recommendation.why if found.recommendation else found.recommended.upper()
+
+
+def _output(found: Design, units: Shown) -> str:
+    """What the controllers give, and its limit, in words."""
+    command = found.command
+    if command is None:
+        return ""
+    limit = "no limit" if command.limit is None else f"at most {command.limit:.4g} {command.unit}"
+    if found.force is None:
+        return f", its output the command in {command.unit}, {limit}"
+    return (
+        f", its output the force reference in {units.force} for the force loop, whose command is in"
+        f" {command.unit}, {limit}"
+    )
+
+
+def drive_lines(found: Design, only: str | None = None) -> list[str]:
+    """The difference equation of each controller, or of one, as its drive runs it."""
+    if found.command is None:
+        return []
+    units, limit = DriveUnits(found.motion, found.command.unit), found.command.limit
+    out = []
+    laws = {n: (c.law(found.command), found.output) for n, c in found.controllers.items()}
+    if found.present:
+        laws[f"present {found.present.kind}"] = found.present.law, found.present.output
+    laws = {name: law for name, law in laws.items() if only in (None, name)}
+    for name, (law, output) in laws.items():
+        first, *rest = equation_lines(law, output, limit, units)
+        out += [f"{name.upper() if name in found.controllers else name}, {first}", *rest]
+    if found.force:
+        first, *rest = force_lines(found.force, limit, units)
+        out += [f"force loop, {first}", *rest]
+    return out
 
 
 def polynomial_lines(found: Design) -> list[str]:
@@ -88,7 +123,8 @@ def design_view(found: Design, folder: Path, rotary: bool = False) -> "Group":
     """The design for a terminal."""
     from rich.console import Group
 
-    lines = (*design_lines(found, rotary), *polynomial_lines(found))
+    chosen = None if found.recommended == "none" else found.recommended
+    lines = (*design_lines(found, rotary), *drive_lines(found, chosen))
     return Group(
         table(DESIGN_HEAD, margin_rows(found)),
         *lines,

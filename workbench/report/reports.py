@@ -6,6 +6,7 @@ from workbench.documents.design import Design
 from workbench.report.controllers import (
     coefficients,
     controllers,
+    drive_section,
     sensitivity_section,
     step_response,
 )
@@ -18,8 +19,9 @@ from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
 from workbench.report.validation_tables import validation_verdict
 from workbench.steps.identify_sources import Identified
+from workbench.steps.loop_figures import Traces
 from workbench.steps.predict import fitted_run
-from workbench.steps.validate import Traces, Validation
+from workbench.steps.validate import Validation
 
 
 def identification_report(found: Identified) -> str:
@@ -43,11 +45,14 @@ def design_report(found: Design, rotary: bool = False) -> str:
         f"{found.recommended.upper()} recommended, position loop every"
         f" {1e3 * found.plant.h:.4g} ms; designed on the {found.plant.source} plant."
     )
+    if found.recommendation:
+        lead += f" {found.recommendation.why}."
     sections = (
         controllers(found, rotary),
         step_response(found),
         sensitivity_section(found, rotary),
         coefficients(found),
+        drive_section(found),
     )
     return page(f"Design for {found.card}", lead, sections)
 
@@ -57,5 +62,7 @@ def validation_report(
 ) -> str:
     """HTML: whether the design holds in simulation, and what the loop does."""
     places = dict.fromkeys(place for _, place in traces)
-    sections = (judged(found, rotary), *(loop(traces, place, rotary) for place in places))
-    return page(f"Validation for {found.card}", f"{validation_verdict(found)}.", sections)
+    sections = (judged(found, rotary), *(loop(found, traces, place, rotary) for place in places))
+    return page(
+        f"Validation for {found.card}", f"{validation_verdict(found)}. {found.why}.", sections
+    )

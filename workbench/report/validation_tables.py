@@ -5,72 +5,110 @@ from typing import TYPE_CHECKING
 
 from workbench.cards.parameter_units import Shown, shown
 from workbench.output import Row, table, written
-from workbench.steps.validate import COMPENSATED, LoopFigures, Validation
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
+from workbench.steps.recommend import in_thousandths, percent, settled
+from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
     from rich.console import Group
+    from rich.table import Table
 
-VALIDATION_HEAD = (
-    "loop",
-    "on",
-    "passes",
-    "modulus margin",
-    "delay margin",
-    "standstill error",
-    "overshoot",
-    "settling",
-    "smooth error",
-    "peak force",
-    "limit cycle",
-)
+
+def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
+    """Names of the columns of `validation_rows`."""
+    units, one = shown(rotary), _any(found)
+    where = ("on",) if len(found.figures[found.judged]) > 1 else ()
+    command = () if one.command_peak is None else (f"command {one.command_unit}",)
+    return (
+        "loop",
+        *where,
+        "ok",
+        "modulus",
+        "delay",
+        "at rest",
+        "over",
+        "settled",
+        "smooth",
+        f"force {units.force}",
+        *command,
+        "limit cycle",
+    )
 
 
 def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
-    """One row a controller and plant, by `VALIDATION_HEAD`."""
+    """One row a controller and plant, by `validation_head`."""
+    alone = len(found.figures[found.judged]) == 1
     return [
-        (_shown(name), place, *_row(one, shown(rotary)))
+        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
         for name, places in found.figures.items()
         for place, one in places.items()
     ]
 
 
+def validation_table(found: Validation, rotary: bool = False) -> "Table":
+    """The table for a terminal."""
+    return table(validation_head(found, rotary), validation_rows(found, rotary), right=())
+
+
+def _any(found: Validation) -> LoopFigures:
+    return next(iter(found.figures[found.judged].values()))
+
+
 def _shown(name: str) -> str:
     """A loop's name as a narrow column takes it."""
     alone = name.removesuffix(COMPENSATED)
-    return alone.upper() if alone == name else f"{alone.upper()} + comp"
+    if alone == PRESENT:
+        return PRESENT
+    return alone.upper() if alone == name else f"{alone.upper()}+comp"
 
 
 def _row(one: LoopFigures, units: Shown) -> Row:
-    m = one.margins
-    delay = "-"
+    m, passes = one.margins, "yes" if one.passed else "no"
+    modulus, delay = f"{m.modulus:.3f}" if m else "unstable", "-"
+    command = () if one.command_peak is None else (_command(one),)
     if m:
         delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g} h"
-    cycle = "none"
-    if one.limit_cycle:
-        cycle = (
-            f"{one.limit_cycle.amplitude:.2g} {units.position} every {one.limit_cycle.period:.2g} s"
-        )
+    if not one.stable:
+        return (passes, modulus, delay, *["-"] * (6 + len(command)))
     return (
-        "yes" if one.passed else "no",
-        f"{m.modulus:.3f}" if m else "unstable",
+        passes,
+        modulus,
         delay,
-        f"{100 * one.standstill_relative:.3g} %" if one.stable else "-",
-        f"{100 * one.overshoot:.3g} %" if one.stable else "-",
-        f"{one.settling:.3g} s" if one.stable else "-",
-        f"{100 * one.smooth_relative:.3g} %" if one.stable else "-",
-        f"{one.force_peak:.4g} {units.force}" if one.stable else "-",
-        cycle if one.stable else "-",
+        percent(one.standstill_relative),
+        percent(max(one.overshoot, 0.0)),
+        settled(one),
+        percent(one.smooth_relative),
+        f"{one.force_peak:.3g}",
+        *command,
+        _cycle(one, units),
     )
+
+
+def _command(one: LoopFigures) -> str:
+    """Largest command, and for how long it is at its limit."""
+    return f"{one.command_peak:.3g}{f' ({100 * one.limited:.1g} %)' if one.limited else ''}"
+
+
+def _cycle(one: LoopFigures, units: Shown) -> str:
+    if not one.limit_cycle:
+        return "none"
+    size, unit = in_thousandths(one.limit_cycle.amplitude, units)
+    return f"{size:.2g} {unit}, {one.limit_cycle.period:.2g} s"
 
 
 def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     """What fails and what to know, in words."""
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
-    lines = [line for name in alone for line in _missed(found, name)]
-    first = next(iter(found.figures[found.judged].values()))
-    unit = shown(rotary).position
+    lines = [found.why] if found.why else []
+    lines += [line for name in alone for line in _missed(found, name)]
+    one, units = _any(found), shown(rotary)
+    limit = (
+        "" if one.command_limit is None else f"; limit {one.command_limit:.4g} {one.command_unit}"
+    )
+    limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
     lines.append(
-        f"steps of {first.step:.3g} {unit}; standstill and overshoot are relative to the step"
+        f"steps of {one.step:.3g} {units.position}; error at rest and overshoot relative to the"
+        f" step, smooth error to its amplitude; +comp with the compensator{limit}"
     )
     return [*lines, *(f"note: {line}" for line in found.remarks)]
 
@@ -82,7 +120,7 @@ def missed(found: Validation) -> str | None:
 
 def _missed(found: Validation, name: str) -> list[str]:
     return [
-        f"{name.upper()} on the {place}: {limit}"
+        f"{name if name == PRESENT else name.upper()} on the {place}: {limit}"
         for place, one in found.figures[name].items()
         for limit in one.missed
     ]
@@ -100,7 +138,7 @@ def validation_view(found: Validation, folder: Path, rotary: bool = False) -> "G
 
     return Group(
         validation_verdict(found),
-        table(VALIDATION_HEAD, validation_rows(found, rotary)),
+        validation_table(found, rotary),
         *validation_lines(found, rotary),
         written(folder, "validation.json", "report.html"),
     )

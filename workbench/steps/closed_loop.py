@@ -16,9 +16,9 @@ from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.plant import Actuator, Motor
 from workbench.documents.design import Controller, Design
-from workbench.documents.drive import ForceLoop
+from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model
-from workbench.steps.design import command_of
+from workbench.steps.linear_loop import command_of
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class DrivenLoop:
 
     force: the loop below it, None where its output is the command. rate: the reference is moved at
     most at this speed [m/s]. limit: of the command, in its unit. k_a: by which the compensation's
-    force becomes a command; None: the motor's own.
+    force becomes a command; None: the motor's own. direct: an actuator takes the law's output.
     """
 
     law: DriveLaw
@@ -36,6 +36,7 @@ class DrivenLoop:
     limit: float | None = None
     compensation: Compensation | None = None
     k_a: float | None = None
+    direct: bool = False
 
     @property
     def h(self) -> float:
@@ -52,6 +53,7 @@ class DrivenLoop:
             control_limit=self.limit,
             W=self.law.W,
             k_a=self.k_a,
+            direct=self.direct,
             rate=self.rate,
         )
 
@@ -72,6 +74,12 @@ def driven_loop(
     )
 
 
+def present_loop(machine: Model, now: Present) -> DrivenLoop:
+    """The controller that the machine has now, as its drive runs it."""
+    limit = command_of(machine, now.force).limit
+    return DrivenLoop(now.law, now.force, now.rate, limit, direct=now.output == "command")
+
+
 def run_loop(
     machine: Model,
     found: Design,
@@ -84,28 +92,46 @@ def run_loop(
     return run_driven(machine, driven_loop(machine, found, one, compensator), r, rng)
 
 
-def run_driven(machine: Model, loop: DrivenLoop, r: Array, rng: np.random.Generator) -> ServoRun:
-    """One reference r [m], (n,) every loop.h, through the loop, with the machine's noise.
+def run_driven(
+    machine: Model, loop: DrivenLoop, r: Array, rng: np.random.Generator | None
+) -> ServoRun:
+    """One reference r [m], (n,) every loop.h, through the loop; with the machine's noise by rng.
 
     The controller sees it moved at its own rate; the run has it as given. A machine without an
     actuator takes the law's output as its force. Raises BadModel where there is a force loop and
     nothing for it to drive, or the other way round.
     """
     plant = replace(machine.simulated, effects=in_the_loop(machine))
+    direct = isinstance(plant.actuator, Actuator) and loop.direct
     if isinstance(plant.actuator, Actuator):
-        if loop.force is None:
+        if loop.force is None and not direct:
             raise BadModel("the machine has an actuator, the design no force loop for it")
     elif loop.force is not None:
         raise BadModel("the design has a force loop, the machine no actuator for it")
     return simulate_servo(
         plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
-        loop.servo,
+        replace(loop.servo, control_limit=limit_on(machine, loop), direct=direct),
         r,
         loop.h,
-        noise=LoopNoise.draw(len(r), machine.fit.noise_y, machine.fit.noise_F, rng),
+        noise=_noise(machine, len(r), rng),
         start=(float(r[0]), 0.0, 0.0),
         signals=_chambers(machine.rig),
     )
+
+
+def limit_on(machine: Model, loop: DrivenLoop) -> float | None:
+    """The limit of the command of a loop on a machine: the law's, and that of the machine's drive.
+
+    A machine without an actuator takes a force, of which a limit of its command says nothing.
+    """
+    own = None if machine.simulated.actuator is None else machine.rig.control_limit
+    return min((one for one in (loop.limit, own) if one is not None), default=None)
+
+
+def _noise(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise | None:
+    if rng is None:
+        return None
+    return LoopNoise.draw(n, machine.fit.noise_y, machine.fit.noise_F, rng)
 
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:

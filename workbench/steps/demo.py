@@ -17,9 +17,10 @@ from workbench.logs.sources import read_sources
 from workbench.output import dumps
 from workbench.steps.design import design
 from workbench.steps.identify import Progress
+from workbench.steps.loop_figures import Traces
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import Traced, trace_sources
-from workbench.steps.validate import Traces, Validation, validate
+from workbench.steps.validate import Validation, validate
 
 if TYPE_CHECKING:
     pass

@@ -184,6 +184,7 @@ def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
         force_rms=found.force_rms,
         chi_square=found.chi_square,
         speed=speed_of(log),
+        period=source.period,
     )
 
 

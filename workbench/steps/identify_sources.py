@@ -12,6 +12,7 @@ from workbench.documents.model import Model, as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
+from workbench.steps.present import present_of_card
 
 __all__ = ["Identified", "Options", "identify_sources"]
 
@@ -46,7 +47,8 @@ def identify_sources(
         options=options,
         on_progress=on_progress,
     )
-    model = replace(model, bad_samples=(*sources.bad, *fit.bad))
+    now = present_of_card(sources.card, sources.rig, model.period)
+    model = replace(model, bad_samples=(*sources.bad, *fit.bad), controller=now)
     if posterior:
         model = replace(model, posterior=_posterior(sources, fit, seed, on_progress))
     return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)))

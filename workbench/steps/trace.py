@@ -23,6 +23,7 @@ from workbench.documents.plausible import model_remarks
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import arx_plant, speed_of
+from workbench.steps.present import present_of_card
 
 TRACE_SCHEMA = "trace/1"
 Progress = Callable[[str, float], None]
@@ -91,7 +92,8 @@ def trace_sources(
     remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
     model = traced_model(found, train, library)
     bad = (*train.bad, *(test.bad if test else ()))
-    model = replace(model, bad_samples=train.bad)
+    now = present_of_card(train.card, train.rig, model.period)
+    model = replace(model, bad_samples=train.bad, controller=now)
     return Traced(found, model, train.runs, seen, (*remarks, *model_remarks(model)), bad)
 
 
@@ -178,6 +180,7 @@ def _entry(source: Source, errors: Errors, chi: float) -> LogEntry:
         force_rms=None,
         chi_square=chi,
         speed=speed_of(log),
+        period=source.period,
     )
 
 

@@ -38,7 +38,7 @@ def written(path: Path, change: Callable[[dict[str, Any]], None] = lambda _: Non
 def test_every_parameter_has_its_unit() -> None:
     document = json.loads(dumps(design_document(found())))
     assert document["schema"] == "design/2"
-    assert document["plant"]["h"] == {"value": 0.01, "unit": "s", **BARE}
+    assert document["plant"]["h"] == {"value": 0.005, "unit": "s", **BARE}
     mass, viscous = document["plant"]["m"], document["plant"]["F_v"]
     assert mass["value"] == 3.5 and mass["unit"] == "kg" and mass["low"] < 3.5 < mass["high"]
     assert viscous["unit"] == "N s/m"
@@ -59,7 +59,8 @@ def test_every_parameter_has_its_unit() -> None:
 
 def test_numbers_without_a_unit_are_coefficients_and_results_only() -> None:
     document = json.loads(dumps(design_document(found())))
-    free = {"R", "S", "T", "A", "B", "auxiliary", "margins", "overshoot"}
+    free = {"R", "S", "T", "W", "A", "B", "C", "slope"}  # coefficients
+    free |= {"auxiliary", "margins", "overshoot", "recommendation"}
 
     def bare(value: object, name: str) -> list[str]:
         if isinstance(value, Mapping):
@@ -75,14 +76,14 @@ def test_numbers_without_a_unit_are_coefficients_and_results_only() -> None:
 
 def test_other_units_are_converted(tmp_path: Path) -> None:
     def change(document: dict[str, Any]) -> None:
-        document["rst"]["h"] |= {"value": 10.0, "unit": "ms"}
+        document["rst"]["h"] |= {"value": 5.0, "unit": "ms"}
         document["plant"]["m"] |= {"value": 3500.0, "unit": "g", "low": 3400.0, "high": 3600.0}
         document["compensator"]["e_T"] |= {"value": 6.0, "unit": "mm"}
         document["pid"]["gains"]["k_R"]["unit"] = "kN/m"
 
     back = read_design(written(tmp_path, change))
     plain = found()
-    assert back.rst is not None and back.rst.h == pytest.approx(0.01)
+    assert back.rst is not None and back.rst.h == pytest.approx(0.005)
     assert back.plant.m is not None and back.plant.m.low == pytest.approx(3.4)
     assert back.compensator.e_T == pytest.approx(6e-3)
     assert back.pid is not None and back.pid.gains is not None

@@ -81,6 +81,7 @@ def turned(found: Identified) -> Identified:
     turning = replace(
         model,
         rig=replace(model.rig, motion="rotary"),
+        controller=None,
         friction={name: replace(e, unit=friction[name]) for name, e in model.friction.items()},
         actuator={n: replace(e, unit=actuator[n]) for n, e in (model.actuator or {}).items()},
     )

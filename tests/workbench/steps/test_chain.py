@@ -21,9 +21,9 @@ from workbench.documents.design import design_document, read_design
 from workbench.documents.model import Model
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
-from workbench.steps import validate as validating
-from workbench.steps.closed_loop import run_loop
-from workbench.steps.design import corners, design, effort_limit, linear_of
+from workbench.steps import loop_figures
+from workbench.steps.closed_loop import run_driven, run_loop
+from workbench.steps.design import design, effort_limit
 from workbench.steps.identify import (
     arx_plant,
     closed_loop_remarks,
@@ -31,9 +31,11 @@ from workbench.steps.identify import (
     decimated,
     decimation,
 )
+from workbench.steps.linear_loop import corners, linear_of
+from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import PREDICTION_COLUMNS, predict, prediction_csv
 from workbench.steps.simulate import record, truth
-from workbench.steps.validate import Limits, validate, validation_document
+from workbench.steps.validate import validate, validation_document
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 
@@ -343,11 +345,11 @@ def test_both_runs_must_stay(monkeypatch: pytest.MonkeyPatch) -> None:
 
     def lost(*arguments: Any) -> LoopRun:
         nonlocal count
-        run = run_loop(*arguments)
+        run = run_driven(*arguments)
         count += 1
         return run if count % 2 else replace(run, y=np.full_like(run.y, np.nan))
 
-    monkeypatch.setattr(validating, "run_loop", lost)
+    monkeypatch.setattr(loop_figures, "run_driven", lost)
     result, _ = validate(model, found, rng())
     assert not result.figures["rst"]["model"].stable
     assert result.figures["rst"]["model"].missed == ("the simulated loop runs away",)

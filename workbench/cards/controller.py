@@ -1,0 +1,199 @@
+"""The controller that a machine has now, as its card names it under `[controller]`.
+
+A gain is a number in SI (with the unit of the command in place of V), or a text with a unit.
+
+    [controller]
+    kind = "PD"                 # k_d (1 + T_d s/(eps s + 1)) (r - y)
+    k_d = "8 A/mm"
+    T_d = "12 ms"
+    eps = 1e-3
+
+    kind = "PID"                # k_R (b r - y + (r - y)/(T_i s) + T_d s/(eps s + 1) (c r - y))
+    k_R, T_i, T_d, eps; b = 1.0, c = 1.0
+
+    kind = "P-PI"               # k_p (1 + 1/(T_i s)) (v_ref - v), v_ref = k_v (r - y) + v_ff dr/dt
+    k_v = "40 1/s"
+    k_p = "120 A s/m"
+    T_i = "8 ms"
+    eps = 0.0                   # v is the difference of y behind 1/(eps s + 1)
+    v_ff = 0.0                  # share of the reference's speed that is fed forward
+
+    kind = "RST"                # S u = T r - R y, in z^-1
+    R, S, T = [...]
+
+For all of them:
+
+    period_s = 5e-4             # default: that of the logs
+    output = "command"          # what it gives; "force": a motor's force, or that for a force loop
+    force = { k_i = "0.02 V/N", T_i = 0.05, period_s = 1e-3 }    # the force loop below it
+    reference_rate = "0.5 m/s"  # at most this speed of the reference
+    anti_windup_s = 0.05        # in which the sum forgets what a limit cut off; "none"; default T_i
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from identification.errors import BadCard
+from identification.log import Rig
+from identification.model.estimates import Estimate
+from identification.model.plant import over
+from workbench.cards.parameter_units import shown
+from workbench.cards.quantities import in_unit_of
+from workbench.cards.recipe import CardTable, NotNegative, Positive
+
+Quantity = Positive | str
+QuantityOrNone = NotNegative | str
+Kind = Literal["PD", "PID", "P-PI", "RST"]
+
+
+@dataclass(frozen=True)
+class CardForceLoop:
+    """A force loop: k_i [command per N], T_i, period [s] (None: that of the position loop)."""
+
+    k_i: float
+    T_i: float
+    period: float | None
+
+
+@dataclass(frozen=True)
+class CardController:
+    """What `[controller]` says: gains by name in SI, polynomials of an RST, and what is around it.
+
+    period [s]: None for that of the logs; output: "command" or "force"; rate: of the reference
+    [m/s]; forget [s]: of the anti-windup, None for none.
+    """
+
+    kind: Kind
+    gains: Mapping[str, Estimate]
+    polynomials: Mapping[str, tuple[float, ...]]
+    period: float | None
+    output: Literal["command", "force"]
+    force: CardForceLoop | None
+    rate: float | None
+    forget: float | None
+
+
+class _ForceSection(CardTable):
+    k_i: Quantity
+    T_i: Quantity
+    period_s: Positive | None = None
+
+
+class _Common(CardTable):
+    kind: Kind
+    period_s: Positive | None = None
+    output: Literal["command", "force"] | None = None
+    force: _ForceSection | None = None
+    reference_rate: Quantity | None = None
+    anti_windup_s: NotNegative | Literal["none"] | None = None
+
+    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
+        """Names of the gains and their units; output: unit of what the controller gives."""
+        return iter(())
+
+    def value(self, rig: Rig) -> CardController:
+        """The controller; raises BadCard where a gain's unit is of another kind."""
+        units = shown(rig.motion == "rotary", rig.command_unit)
+        output = self.output or ("command" if self.force is None else "force")
+        if self.force is not None and (rig.kind == "motor" or output == "command"):
+            raise BadCard(
+                "controller.force: a force loop takes the force that the position controller asks"
+                ' for, output = "force"; a motor has none'
+            )
+        given = units.force if output == "force" else units.command
+        gains = {
+            name: Estimate(_quantity(getattr(self, name), unit, name), unit)
+            for name, unit in self.units(over(given, units.position), given)
+        }
+        T_i = gains["T_i"].value if "T_i" in gains else None
+        forget = T_i if self.anti_windup_s is None else self.anti_windup_s
+        rate = self.reference_rate
+        return CardController(
+            kind=self.kind,
+            gains=gains,
+            polynomials={key: getattr(self, key) for key in "RST" if hasattr(self, key)},
+            period=self.period_s,
+            output=output,
+            force=self._force(units.force_gain),
+            rate=None if rate is None else _quantity(rate, units.velocity, "reference_rate"),
+            forget=None if isinstance(forget, str) else forget,
+        )
+
+    def _force(self, gain: str) -> CardForceLoop | None:
+        if self.force is None:
+            return None
+        k_i = _quantity(self.force.k_i, gain, "force.k_i")
+        return CardForceLoop(k_i, _quantity(self.force.T_i, "s", "force.T_i"), self.force.period_s)
+
+
+class PresentPD(_Common):
+    """A PD as a card writes it."""
+
+    kind: Literal["PD"]
+    k_d: Quantity
+    T_d: QuantityOrNone
+    eps: Quantity
+
+    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
+        """See `_Common.units`."""
+        yield from (("k_d", per_length), ("T_d", "s"), ("eps", "s"))
+
+
+class PresentPID(_Common):
+    """A PID as a card writes it."""
+
+    kind: Literal["PID"]
+    k_R: Quantity
+    T_i: Quantity
+    T_d: QuantityOrNone
+    eps: Quantity
+    b: NotNegative = 1.0
+    c: NotNegative = 1.0
+
+    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
+        """See `_Common.units`."""
+        times = (("T_i", "s"), ("T_d", "s"), ("eps", "s"))
+        yield from (("k_R", per_length), *times, ("b", "1"), ("c", "1"))
+
+
+class PresentPPI(_Common):
+    """A position P above a speed PI as a card writes it."""
+
+    kind: Literal["P-PI"]
+    k_v: Quantity
+    k_p: Quantity
+    T_i: Quantity
+    eps: QuantityOrNone = 0.0
+    v_ff: NotNegative = 0.0
+
+    def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
+        """See `_Common.units`."""
+        over_length, _, length = per_length.rpartition("/")
+        speed_gain = f"{over_length} s/{length}" if over_length not in ("", "1") else f"s/{length}"
+        yield from (("k_v", "1/s"), ("k_p", speed_gain), ("T_i", "s"), ("eps", "s"), ("v_ff", "1"))
+
+
+class PresentRST(_Common):
+    """An RST as a card writes it."""
+
+    kind: Literal["RST"]
+    R: tuple[float, ...] = Field(min_length=1)
+    S: tuple[float, ...] = Field(min_length=1)
+    T: tuple[float, ...] = Field(min_length=1)
+
+
+ControllerSection = Annotated[
+    PresentPD | PresentPID | PresentPPI | PresentRST, Field(discriminator="kind")
+]
+
+
+def _quantity(written: float | str, unit: str, name: str) -> float:
+    """The number in `unit`; raises BadCard where it is none, or below 0."""
+    value = in_unit_of(written, unit, f"controller.{name}")
+    assert value is not None
+    if value < 0.0:
+        raise BadCard(f"controller.{name} = {written!r}: must be >= 0")
+    return value

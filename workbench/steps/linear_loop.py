@@ -1,0 +1,207 @@
+"""The linear plants of a machine under its loops: nominal, and at its parameters' intervals."""
+
+import math
+
+import numpy as np
+
+from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
+from identification.arrays import Array
+from identification.errors import BadSpecification, NotIdentifiable
+from identification.estimation.estimates import told_estimate
+from identification.model.estimates import Estimate
+from identification.model.plant import Actuator, Motor
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import From, Linear
+from workbench.documents.drive import Command, ForceLoop
+from workbench.documents.model import Model, used
+
+FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design
+IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has then done 80 %
+LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
+MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
+
+
+def command_of(model: Model, force: ForceLoop | None) -> Command:
+    """What the machine's drive takes: a command, or a force where no command is logged."""
+    drive, rig = model.simulated.actuator, model.rig
+    if isinstance(drive, Motor):
+        return Command(rig.command_unit, rig.control_limit, drive.k_a)
+    if force is not None:
+        return Command(rig.command_unit, rig.control_limit, None)
+    unit = shown(model.rotary).force
+    return Command(unit, rig.control_limit if rig.command_unit == unit else None, 1.0)
+
+
+def linear_of(
+    model: Model, source: From | None = None, period: float | None = None
+) -> tuple[Linear, ForceLoop | None]:
+    """The linear plant for a design and the force loop inside it, where there is an actuator.
+
+    period [s]: of the position loop, by default the first of `periods`. The physical plant where
+    the mass is identified: it holds the force loop and no noise. Raises NotIdentifiable where
+    neither it nor an ARX plant that follows the logs is there.
+    """
+    known = model.friction["m"].value is not None
+    if source == "arx" or (source is None and not known):
+        plant = _arx(model, period, known)
+        return plant, _force_loop(model, plant.h)
+    if not known:
+        raise NotIdentifiable(f"no physical plant to design on: m: {model.friction['m'].reason}")
+    h = periods(model)[0] if period is None else period
+    force = _force_loop(model, h)
+    a, b = _physical(*_nominal(model), h, model, force)
+    why = _why_physical(model, force)
+    m, viscous = model.friction["m"], _viscous(model)
+    return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, viscous), force
+
+
+def periods(model: Model) -> tuple[float, ...]:
+    """Sampling periods [s] of a position loop to try, the drive's own first, then multiples of it.
+
+    The drive's own is that of the card's controller, else that of the logs: a log is not written
+    faster than its drive runs. A position loop above a force loop leaves it a few samples.
+    """
+    now = model.present
+    base = now.law.h if now else model.period
+    if isinstance(model.simulated.actuator, Actuator):
+        base = max(base, IN_FORCE_SAMPLES * force_period(model))
+    return tuple(n * base for n in MULTIPLES if n == 1 or n * base <= LONGEST_PERIOD)
+
+
+def force_period(model: Model) -> float:
+    """Sampling period of a force loop [s]: that of the card's own, else of the logs."""
+    now = model.present
+    return now.force.h if now and now.force else model.period
+
+
+def _why_physical(model: Model, force: ForceLoop | None) -> str:
+    """Why the physical plant, and which of its parameters the logs do not tell."""
+    known = "mass and viscous friction are identified"
+    if names := unknown_viscous(model):
+        known = f"the mass is identified, {' and '.join(names)} assumed"
+    inside = "with the force as its input"
+    if force:
+        told = all(e.known for e in (model.actuator or {}).values())
+        actuator = "the actuator" if told else "an actuator of assumed k1 and k2"
+        inside = f"with {actuator} and its force loop"
+    return f"{known}: sliding body, {inside}, sampled exactly"
+
+
+def unknown_viscous(model: Model) -> list[str]:
+    """Names of the viscous coefficients that no log told."""
+    return [name for name in ("F_vp", "F_vn") if not model.friction[name].known]
+
+
+def plants_of(
+    machine: Model, h: float, force: ForceLoop | None, arx: bool = False
+) -> list[tuple[Array, Array]]:
+    """Linear plants (A, B) of a machine, from a law's output to the position, run every h [s].
+
+    The nominal one first, then those at the corners of its intervals. The output is the force
+    reference where there is a force loop, else the command. arx: the machine's own ARX plant alone,
+    where it has one at this period. Raises BadSpecification where the force loop is unstable.
+    """
+    own = machine.plant
+    gain = machine.simulated.actuator
+    per = gain.k_a if isinstance(gain, Motor) else 1.0
+    if arx and own is not None and own.input == "F" and abs(own.h - h) < 1e-6 * own.h:
+        return [(np.array(own.A), per * np.array(own.B))]
+    bodies = [_nominal(machine), *_corner_bodies(machine)]
+    plants = [_physical(m, f, h, machine, force) for m, f in bodies]
+    return [(a, per * b) for a, b in plants]
+
+
+def _physical(
+    m: float, f: float, h: float, model: Model, force: ForceLoop | None
+) -> tuple[Array, Array]:
+    actuator = model.simulated.actuator
+    if not isinstance(actuator, Actuator):
+        return linear_plant(m, f, h)
+    if force is None:
+        return commanded_plant(m, f, h, actuator)
+    gains = ForceGains(force.k_i, force.T_i)
+    return linear_plant(m, f, h, actuator, gains, max(1, round(h / force.h)))
+
+
+def _force_loop(model: Model, h: float) -> ForceLoop | None:
+    """The force loop inside a position loop of period h [s]; None for a motor."""
+    actuator = model.simulated.actuator
+    if not isinstance(actuator, Actuator):
+        return None
+    ratio = max(1, round(h / force_period(model)))
+    gains = force_gains(actuator, h / ratio)
+    return ForceLoop(gains.k_i, gains.T_i, h / ratio)
+
+
+def _nominal(model: Model) -> tuple[float, float]:
+    """Mass and the mean of both viscous coefficients."""
+    p = model.karnopp
+    return p.m, 0.5 * (p.F_vp + p.F_vn)
+
+
+def _viscous(model: Model) -> Estimate:
+    """The viscous coefficient of the linear plant: the mean over both directions."""
+    one, other = model.friction["F_vp"], model.friction["F_vn"]
+    mean = _nominal(model)[1]
+    if unknown := unknown_viscous(model):
+        reason = f"{' and '.join(unknown)} not identified"
+        return Estimate(None, one.unit, reason=reason, assumed=mean)
+    if one.sd is None or other.sd is None:
+        return Estimate(mean, one.unit)
+    return told_estimate(mean, one.unit, 0.5 * math.hypot(one.sd, other.sd))
+
+
+def _arx(model: Model, period: float | None, known: bool) -> Linear:
+    found = model.plant
+    why_not = model.friction["m"].reason or "mass identified"
+    if model.imposed:
+        raise NotIdentifiable(
+            "no plant to design on: the logged motion was imposed on the body; log a run in which"
+            " the drive moves it freely"
+        )
+    if found is None:
+        raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); m: {why_not}")
+    if found.simulation_relative is None or found.simulation_relative > FOLLOWS:
+        error = found.simulation_relative
+        said = "runs away" if error is None else f"leaves {100 * error:.0f} % of the motion"
+        raise NotIdentifiable(
+            f"the ARX plant, run freely on held-out samples, {said} (at most {100 * FOLLOWS:.0f} %"
+            f" needed), so it carries no design; m: {why_not}; log a run in which the drive moves"
+            " the body freely"
+        )
+    if period is not None and abs(period - found.h) > 1e-6 * period:
+        raise BadSpecification(
+            f"the ARX plant is sampled every {found.h:g} s, {period:g} s asked; identify again with"
+            f" --design-period {period:g}"
+        )
+    if found.input == "u":
+        raise NotIdentifiable("the ARX plant's input is the command, a force is needed to design")
+    why = "asked for" if known else "the mass is not identified; the ARX plant follows the logs"
+    return Linear("arx", why, found.A, found.B, found.h, None, None)
+
+
+def corners(
+    model: Model, plant: Linear, force: ForceLoop | None
+) -> tuple[tuple[Array, Array], ...]:
+    """Linear plants at the corners of the intervals of mass and viscous friction; () for ARX.
+
+    Raises BadSpecification where the force loop is unstable on one.
+    """
+    if plant.source == "arx":
+        return ()
+    return tuple(_physical(m, f, plant.h, model, force) for m, f in _corner_bodies(model))
+
+
+def _corner_bodies(model: Model) -> list[tuple[float, float]]:
+    """Mass and viscous friction at the corners of their intervals."""
+    ends = [_ends(model.friction[name]) for name in ("F_vp", "F_vn")]
+    least, most = min(low for low, _ in ends), max(high for _, high in ends)
+    return [(m, f) for m in _ends(model.friction["m"]) for f in (max(least, 0.0), most)]
+
+
+def _ends(found: Estimate) -> tuple[float, float]:
+    """Interval of a parameter; that of its assumed value where there is none."""
+    if found.at_most is not None:
+        return 0.0, found.at_most
+    low, high = (used(found) if end is None else end for end in (found.low, found.high))
+    return low, high

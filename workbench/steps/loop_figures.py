@@ -1,0 +1,326 @@
+"""What a loop comes to in simulation: its runs along steps and a smooth reference, its figures."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any, Literal
+
+import numpy as np
+
+from design.loop import LoopRun
+from design.margins import margins
+from design.rst import closed_loop_poles
+from design.tune import worst_modulus
+from identification.arrays import Array
+from identification.errors import BadSpecification
+from identification.model.plant import Motor
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Design, MarginValues, margin_values
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
+from workbench.steps.limit_cycle import LimitCycle, limit_cycle
+from workbench.steps.linear_loop import plants_of
+
+STEP_SHARE = 0.25  # of the travel seen in the logs
+SMOOTH_SHARE = 0.4
+SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
+DWELLS = 15.0  # length of a step, in time constants of the slowest loop
+SHORTEST_DWELL = 1.0  # s
+LAST_DWELL = 10.0  # s
+JUDGED_SHARE = 0.5  # part of a dwell that is judged
+WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
+SETTLING_BAND = 0.05  # of a step, in which a settled position stays
+STANDSTILL_SECONDS = 2.0  # s at rest over which the noise in the command is taken
+COMPENSATED = " + compensator"  # behind a controller's name
+PRESENT = "present"  # the controller that the machine has now
+ALMOST = 0.9  # of a limit, from which it is told that a loop comes near it
+ESCAPED = 10.0  # times the step
+
+
+@dataclass(frozen=True)
+class Limits:
+    """What a loop must keep to pass.
+
+    Margins; error at standstill and overshoot relative to the step; error along the smooth
+    reference relative to its amplitude; largest force relative to that in the machine's logs.
+    """
+
+    modulus: float = 0.5
+    delay: float = 2.0
+    standstill: float = 0.05
+    tracking: float = 0.15
+    overshoot: float = 0.1
+    force: float = 1.2
+
+
+@dataclass(frozen=True)
+class LoopFigures:
+    """A controller on a plant: errors in m, relative ones to step and amplitude; force in N.
+
+    standstill: largest error in the last half of a dwell. overshoot: relative to the step.
+    settling: longest time [s] until a step stays within 5 %. force_seen: the largest in the
+    machine's logs; force_limit: what a motor gives at the limit of its command. command_peak,
+    command_noise: largest command and its standard deviation at rest, None where the machine takes
+    a force; limited: share of the time at its limit, along steps and smooth reference. margins is
+    None where the linear loop is unstable.
+    """
+
+    stable: bool
+    margins: MarginValues | None
+    step: float
+    standstill: float
+    standstill_relative: float
+    overshoot: float
+    settling: float
+    step_rms: float
+    smooth_rms: float
+    smooth_relative: float
+    force_rms: float
+    force_peak: float
+    force_seen: float
+    command_peak: float | None
+    command_limit: float | None
+    command_noise: float | None
+    limit_cycle: LimitCycle | None
+    missed: tuple[str, ...]
+    command_unit: str = "V"
+    limited: float = 0.0
+    force_limit: float | None = None
+
+    @property
+    def passed(self) -> bool:
+        """Whether every limit is kept."""
+        return not self.missed
+
+
+@dataclass(frozen=True)
+class Traces:
+    """The simulated loops behind one entry of a validation; rest: a reference that stands still."""
+
+    step: LoopRun
+    smooth: LoopRun
+    rest: LoopRun
+
+
+def loop_runs(
+    machine: Model,
+    loop: DrivenLoop,
+    reference: tuple[Array, Array, Array],
+    rng: np.random.Generator | None,
+) -> Traces:
+    """The runs of a loop on a machine, along `references` of loop.h; rng None: no noise."""
+    return Traces(*(run_driven(machine, loop, r, rng) for r in reference))
+
+
+def present_figures(
+    machine: Model,
+    model: Model,
+    found: Design,
+    limits: Limits,
+    rng: np.random.Generator | None,
+) -> tuple[LoopFigures, Traces] | None:
+    """The controller that the model's machine has now, on a machine, along the design's motion.
+
+    None where the card named none.
+    """
+    now = model.present
+    if now is None:
+        return None
+    loop = present_loop(model, now)
+    runs = loop_runs(machine, loop, references(model, found, loop.h), rng)
+    return loop_figures(machine, loop, runs, limits), runs
+
+
+def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, Array]:
+    """Steps, the smooth reference and rest [m] every h [s], one motion for every loop and plant.
+
+    Levels from the travel that the logs have shown; the last one is held for long, since a limit
+    cycle of an integrator against stiction may take seconds.
+    """
+    low, high = machine.travel
+    step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
+    n = round(
+        (max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / JUDGED_SHARE) / h
+    )
+    counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
+    levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
+    w = SMOOTH_SPEED * min(one.dominant[0] for one in found.controllers.values())
+    t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
+    rise = np.clip(t * w / np.pi, 0.0, 1.0)
+    smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
+    return levels, smooth, np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
+
+
+def travel(found: Design, step: float) -> float:
+    """Longest time [s] for which a step [m] is on its way, moved at the controllers' rates."""
+    return max(step / one.rate if one.rate else 0.0 for one in found.controllers.values())
+
+
+def slowest(found: Design) -> float:
+    """Time constant [s] of the slowest pole of all loops on the design's plant."""
+    radius = max(
+        float(np.abs(closed_loop_poles(found.plant.A, found.plant.B, one.rst)[0]))
+        for one in found.controllers.values()
+    )
+    return -found.plant.h / float(np.log(min(radius, 0.9999)))
+
+
+def judged_of(found: Design) -> Literal["rst", "pid"]:
+    """The controller that decides: the recommended one, or the one there is."""
+    if found.recommended == "pid" and found.pid:
+        return "pid"
+    return "rst" if found.rst else "pid"
+
+
+def loop_figures(
+    machine: Model, loop: DrivenLoop, run: Traces, limits: Limits, *, arx: bool = False
+) -> LoopFigures:
+    """What the runs of a loop on a machine come to; arx: margins on the machine's ARX plant."""
+    step = float(np.max(run.step.r))
+    amplitude = float(np.max(np.abs(run.smooth.r)))
+    stable = _stays(run.step, step) and _stays(run.smooth, amplitude)
+    judged = _judged(run.step)
+    standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
+    smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
+    runs = (run.step, run.smooth)
+    drive = machine.simulated.actuator
+    driven = drive is not None
+    limit = limit_on(machine, loop) if driven else None
+    found = LoopFigures(
+        stable=stable,
+        margins=_linear_margins(machine, loop, arx),
+        step=step,
+        standstill=standstill,
+        standstill_relative=standstill / step,
+        overshoot=_overshoot(run.step),
+        settling=_settling(run.step),
+        step_rms=float(np.sqrt(np.mean((run.step.r - run.step.y) ** 2))),
+        smooth_rms=smooth,
+        smooth_relative=smooth / amplitude,
+        force_rms=float(np.sqrt(np.mean(run.step.F**2))),
+        force_peak=max(float(np.max(np.abs(each.F))) for each in runs),
+        force_seen=machine.force_peak,
+        command_peak=max(float(np.max(np.abs(each.u))) for each in runs) if driven else None,
+        command_limit=limit,
+        command_noise=float(np.std(run.rest.u[len(run.rest.u) // 2 :])) if driven else None,
+        limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
+        missed=(),
+        command_unit=machine.rig.command_unit,
+        limited=_limited(runs, limit),
+        force_limit=abs(drive.k_a) * limit if isinstance(drive, Motor) and limit else None,
+    )
+    return replace(found, missed=_missed(found, limits, machine))
+
+
+def _limited(runs: Sequence[LoopRun], limit: float | None) -> float:
+    """Share of the samples at which the command is at its limit."""
+    if limit is None:
+        return 0.0
+    return float(np.mean(np.concatenate([np.abs(run.u) >= limit for run in runs])))
+
+
+def _stays(trace: LoopRun, size: float) -> bool:
+    """Whether a loop stays near a reference of this size [m]; not where it is lost to NaN."""
+    return bool(np.all(np.abs(trace.y) < ESCAPED * size))
+
+
+def _judged(trace: LoopRun) -> Any:
+    """The last half of every dwell, True at its samples."""
+    keep = np.zeros(len(trace.r), dtype=bool)
+    for low, high in _dwells(trace):
+        keep[high - round(JUDGED_SHARE * (high - low)) : high] = True
+    return keep
+
+
+def _dwells(trace: LoopRun) -> list[tuple[int, int]]:
+    """First sample of every level of the reference, and the one after its last."""
+    change = np.flatnonzero(np.diff(trace.r)) + 1
+    return list(pairwise([0, *change.tolist(), len(trace.r)]))
+
+
+def _after_steps(trace: LoopRun) -> list[tuple[float, Array]]:
+    """Height of every step [m] and the error y - r after it [m]."""
+    return [
+        (float(trace.r[low] - trace.r[low - 1]), trace.y[low:high] - trace.r[low:high])
+        for low, high in _dwells(trace)[1:]
+    ]
+
+
+def _overshoot(trace: LoopRun) -> float:
+    """Largest overshoot of a step, relative to its height."""
+    return max(float(np.max(error / height)) for height, error in _after_steps(trace))
+
+
+def _settling(trace: LoopRun) -> float:
+    """Longest time [s] from a step until the position stays within `SETTLING_BAND` of it."""
+    h = float(trace.t[1] - trace.t[0])
+    outside = [
+        np.flatnonzero(np.abs(e) > SETTLING_BAND * abs(height)) for height, e in _after_steps(trace)
+    ]
+    return h * max(float(late[-1] + 1) if late.size else 0.0 for late in outside)
+
+
+def _linear_margins(machine: Model, loop: DrivenLoop, arx: bool) -> MarginValues | None:
+    """Margins of the law on the machine's own linear plant; None where it is unstable."""
+    law = loop.law.rst
+    try:
+        plants = plants_of(machine, law.h, loop.force, arx)
+        margin = margins(*plants[0], law)
+    except BadSpecification:
+        return None
+    return margin_values(margin, worst_modulus(plants, law))
+
+
+def _missed(result: LoopFigures, limits: Limits, machine: Model) -> tuple[str, ...]:
+    """What a controller does not keep, in words."""
+    unit = shown(machine.rotary).position
+    if not result.stable:
+        return ("the simulated loop runs away",)
+    missed: list[str] = []
+    if result.margins is None:
+        missed.append("the linear loop is unstable")
+    else:
+        if not (result.margins.modulus >= limits.modulus):
+            said = f"{result.margins.modulus:.3f}, at least {limits.modulus:g} needed"
+            missed.append(f"modulus margin {said}")
+        samples = result.margins.delay_samples
+        if samples is not None and not (samples >= limits.delay):
+            missed.append(f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed")
+    if not (result.standstill_relative <= limits.standstill):
+        missed.append(
+            f"error at standstill {result.standstill:.3g} {unit},"
+            f" {100 * result.standstill_relative:.1f} % of the step, at most"
+            f" {100 * limits.standstill:g} % allowed"
+        )
+    if not (result.smooth_relative <= limits.tracking):
+        missed.append(
+            f"error along the smooth reference {100 * result.smooth_relative:.1f} % of its"
+            f" amplitude, at most {100 * limits.tracking:g} % allowed"
+        )
+    if not (result.overshoot <= limits.overshoot):
+        missed.append(
+            f"overshoot {100 * result.overshoot:.1f} % of the step, at most"
+            f" {100 * limits.overshoot:g} % allowed"
+        )
+    return (*missed, *_too_much(result, limits, machine.rotary))
+
+
+def _in_force(one: LoopFigures, unit: str) -> str:
+    """What the limit of a motor's command is as a force."""
+    return "" if one.force_limit is None else f", {one.force_limit:.3g} {unit}"
+
+
+def _too_much(result: LoopFigures, limits: Limits, rotary: bool) -> Iterator[str]:
+    """Force beyond what the logs have shown, command at its limit, in words."""
+    units, seen = shown(rotary), result.force_seen
+    if seen > 0 and not (result.force_peak <= limits.force * seen):
+        yield (
+            f"peak force {result.force_peak:.4g} {units.force}, the logs show {seen:.4g} at most,"
+            f" {limits.force:g} times that allowed"
+        )
+    limit, peak = result.command_limit, result.command_peak
+    if limit is not None and peak is not None and not (peak < limit):
+        yield (
+            f"the command reaches its limit of {limit:g} {result.command_unit}"
+            f"{_in_force(result, units.force)}, for {100 * result.limited:.2g} % of the time"
+        )

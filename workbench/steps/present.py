@@ -1,0 +1,62 @@
+"""The controller of a card as the law that its drive runs."""
+
+import numpy as np
+
+from design.drive_law import drive_law
+from design.pid import pd_to_rst, pid_to_rst
+from design.present import cascade_to_rst
+from design.rst import RST
+from identification.errors import BadCard, BadSpecification
+from identification.log import Rig
+from workbench.cards.card import Card
+from workbench.cards.controller import CardController
+from workbench.documents.drive import DriveUnits, ForceLoop, Present, PresentFile, present_file
+
+
+def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
+    """What model.json holds of the card's controller; h [s]: period of the logs.
+
+    None where the card names none. Raises BadCard where it is none, or does not fit the rig.
+    """
+    if card.controller is None:
+        return None
+    units = DriveUnits(rig.motion, rig.command_unit)
+    try:
+        return present_file(present(card.controller, rig, h), rig.control_limit, units)
+    except (BadCard, BadSpecification) as error:
+        raise BadCard(f"{card.path}: controller: {error}") from None
+
+
+def present(given: CardController, rig: Rig, h: float) -> Present:
+    """The controller as the law that the drive runs every h [s], or at its own period.
+
+    One that gives a motor's force is the law of its command. Raises BadSpecification where it is no
+    controller, BadCard where it gives a force that the card does not make of a command.
+    """
+    h = given.period or h
+    output, per = given.output, 1.0
+    if output == "force" and rig.kind == "motor":
+        if not rig.force_per_command:
+            raise BadCard('output = "force" needs the force_per_command of the motor')
+        output, per = "command", rig.force_per_command
+    law = drive_law(_polynomials(given, h), given.forget, per)
+    force = None
+    if given.force is not None:
+        fast = given.force.period or h
+        if abs(round(h / fast) * fast - h) > 1e-6 * h or fast > h:
+            raise BadCard(f"force.period_s = {fast:g} s must divide the period of {h:g} s")
+        force = ForceLoop(given.force.k_i, given.force.T_i, h / round(h / fast))
+    return Present(given.kind, given.gains, output, law, force, given.rate)
+
+
+def _polynomials(given: CardController, h: float) -> RST:
+    g = {name: one.value or 0.0 for name, one in given.gains.items()}
+    match given.kind:
+        case "PD":
+            return pd_to_rst(g["k_d"], g["T_d"], g["eps"], h)
+        case "PID":
+            return pid_to_rst(g["k_R"], g["T_i"], g["T_d"], g["eps"], h, b=g["b"], c=g["c"])
+        case "P-PI":
+            return cascade_to_rst(g["k_v"], g["k_p"], g["T_i"], h, eps=g["eps"], v_ff=g["v_ff"])
+    R, S, T = (np.array(given.polynomials[key]) for key in "RST")
+    return RST(R, S, T, h)

@@ -1,0 +1,173 @@
+"""Which of several controllers, by what their loops come to in simulation, and why, in one line."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+import numpy as np
+
+from workbench.cards.parameter_units import Shown, shown
+from workbench.documents.design import Design, Recommendation, Recommended
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import driven_loop
+from workbench.steps.loop_figures import (
+    COMPENSATED,
+    PRESENT,
+    SETTLING_BAND,
+    Limits,
+    LoopFigures,
+    loop_figures,
+    loop_runs,
+    present_figures,
+    references,
+)
+
+EQUAL = 0.05  # mean relative difference of the measures below which two loops are as good
+LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no better
+CONTROLLERS: tuple[Recommended, ...] = ("rst", "pid")
+
+
+def recommended(model: Model, found: Design) -> Recommendation:
+    """The controller of a design to take, by its loop on the model, without noise.
+
+    Of those that keep every goal: one whose loop keeps the limits of `validate` and comes to rest,
+    where there is one, and of these the one that is better in the mean of standstill error,
+    settling time, peak force and error along the smooth reference; where they are as good, the one
+    with the larger modulus margin. The compensator only where it is clearly better with it.
+    """
+    kept = [name for name in CONTROLLERS if (one := found.controllers.get(name)) and not one.missed]
+    if not kept:
+        said = "; ".join(
+            f"{n.upper()}: {', '.join(c.missed)}" for n, c in found.controllers.items()
+        )
+        return Recommendation("none", False, f"none keeps every goal ({said})")
+    figures = compared(model, found)
+    alone = _best(kept, figures)
+    both = (alone, alone + COMPENSATED)
+    usable = figures[both[1]].passed and figures[both[1]].limit_cycle is None
+    better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
+    said = reasons(alone, better, figures, shown(model.rotary))
+    return Recommendation(alone, better, f"{said}: {_decisive(alone, found, figures)}")
+
+
+def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
+    """Figures of every loop of a design on its model, and of the present one, without noise."""
+    out: dict[str, LoopFigures] = {}
+    arx = found.plant.source == "arx"
+    for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
+        for name, one in found.controllers.items():
+            loop = driven_loop(model, found, one, compensator)
+            runs = loop_runs(model, loop, references(model, found, loop.h), None)
+            out[name + suffix] = loop_figures(model, loop, runs, Limits(), arx=arx)
+    now = present_figures(model, model, found, Limits(), None)
+    return out if now is None else {PRESENT: now[0], **out}
+
+
+def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], units: Shown) -> str:
+    """Why this controller, in one line with its numbers and those of the others."""
+    taken = name + (COMPENSATED if compensator else "")
+    others = [
+        other for other in (*CONTROLLERS, twin, PRESENT) if other in figures and other != name
+    ]
+    if compensator and twin not in others:
+        others.append(twin)
+    one = figures[taken]
+    said = (
+        f"{_called(taken)}: {_rest(one, units)} of the step off at standstill, settled in"
+        f" {settled(one)}, {percent(one.smooth_relative)} off along the smooth reference, peak"
+        f" force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
+    )
+    beside = [
+        f"{_called(other)}: {_rest(it, units)}, {settled(it)}, {percent(it.smooth_relative)},"
+        f" {it.force_peak:.3g} {units.force}, {_modulus(it):.2f}"
+        for other, it in ((other, figures[other]) for other in others)
+    ]
+    return f"{said} ({'; '.join(beside)})" if beside else said
+
+
+def settled(one: LoopFigures) -> str:
+    """The settling time in words; never, where a step is still off by the band in the end."""
+    if not one.stable or one.standstill_relative > SETTLING_BAND:
+        return "never"
+    return f"{one.settling:.2g} s"
+
+
+def _best(kept: Sequence[Recommended], figures: Mapping[str, LoopFigures]) -> Recommended:
+    """The best of the controllers alone."""
+    passing = [n for n in kept if figures[n].passed]
+    calm = [n for n in passing if figures[n].limit_cycle is None]
+    pool = calm or passing or list(kept)
+    costs = {n: _cost(n, pool, figures) for n in pool}
+    first = min(pool, key=lambda n: costs[n])
+    equal = [n for n in pool if costs[n] - costs[first] < EQUAL]
+    return max(equal, key=lambda n: _modulus(figures[n]))
+
+
+def _decisive(name: Recommended, found: Design, figures: Mapping[str, LoopFigures]) -> str:
+    """What decided against the other controller."""
+    other: Recommended = "pid" if name == "rst" else "rst"
+    called, rival = other.upper(), found.controllers.get(other)
+    if rival is None:
+        return f"there is no {called}"
+    if rival.missed:
+        return f"the {called} misses a goal, {rival.missed[0]}"
+    one, its = figures[name], figures[other]
+    if one.passed and not its.passed:
+        return f"the {called} misses a limit, {its.missed[0]}"
+    if one.limit_cycle is None and its.limit_cycle is not None:
+        return f"the {called} does not come to rest"
+    ahead = _cost(other, (name, other), figures) - _cost(name, (name, other), figures)
+    if ahead >= EQUAL:
+        return f"better by {100 * (np.exp(ahead) - 1):.0f} % in the mean of the first four"
+    return f"as good as the {called} in the mean of the first four, and the larger margin"
+
+
+def _cost(name: str, pool: Iterable[str], figures: Mapping[str, LoopFigures]) -> float:
+    """Mean of the logarithms of a loop's measures, each over the least of the pool."""
+    least = np.min([_measures(figures[n]) for n in pool], axis=0)
+    with np.errstate(invalid="ignore"):
+        ratios = np.log(_measures(figures[name]) / least)
+    return float(np.mean(ratios)) if np.all(np.isfinite(ratios)) else np.inf
+
+
+def _measures(one: LoopFigures) -> np.ndarray:
+    errors = (one.standstill_relative, one.smooth_relative)
+    return np.array(
+        [*(max(e, LEAST_ERROR) for e in errors), max(one.settling, 1e-6), one.force_peak]
+    )
+
+
+def _modulus(one: LoopFigures) -> float:
+    return one.margins.modulus if one.margins else 0.0
+
+
+def _called(name: str) -> str:
+    """A loop's name in a sentence."""
+    alone = name.removesuffix(COMPENSATED)
+    if name == PRESENT:
+        return "the present controller"
+    return alone.upper() + (" with the compensator" if alone != name else "")
+
+
+def _rest(one: LoopFigures, units: Shown) -> str:
+    """The error at standstill, and the limit cycle in which it is."""
+    if not one.stable:
+        return "runs away"
+    if not one.limit_cycle:
+        return percent(one.standstill_relative)
+    size, unit = in_thousandths(one.limit_cycle.amplitude, units)
+    cycle = f"limit cycle of {size:.2g} {unit} every {one.limit_cycle.period:.2g} s"
+    return f"{percent(one.standstill_relative)} in a {cycle}"
+
+
+def in_thousandths(length: float, units: Shown) -> tuple[float, str]:
+    """A length [m, rad] in mm or mrad."""
+    return 1e3 * length, f"m{units.position}"
+
+
+def percent(share: float) -> str:
+    """A share with two digits; a hundredth of a percent is the least that is told."""
+    return f"{100 * share:.2g} %" if share >= 1e-4 else "< 0.01 %"
+
+
+def _force(one: LoopFigures, units: Shown) -> str:
+    most = "" if one.force_limit is None else f" of {one.force_limit:.3g}"
+    return f"{one.force_peak:.3g}{most} {units.force}"
