@@ -43,7 +43,8 @@ WHAT_NEXT = {
 @click.option(
     "--compensator/--no-compensator",
     default=None,
-    help="With the friction compensator beside it.  [default: with, but beside the present one]",
+    help="With the friction compensator beside it.  [default: as recommended; of another"
+    " controller with, of the present one without]",
 )
 @click.option(
     "--precision",

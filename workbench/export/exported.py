@@ -57,15 +57,17 @@ def exported(
     """The controller of the design, by default the recommended one, as a program.
 
     controller: "rst", "pid" or "present". compensated: with the friction compensator, by default
-    beside all but the present one. Raises BadModel where the design has no such controller,
-    recommends none, or is of a version that does not say what the drive runs.
+    as recommended, and beside all others but the present one. Raises BadModel where the design has
+    no such controller, recommends none, or is of a version that does not say what the drive runs.
     """
     chosen = controller or found.recommended
     if chosen == "none":
         have = ", ".join(found.controllers)
         raise BadModel(f"the design recommends no controller; choose one by --controller ({have})")
     loop = _loop_of(found, chosen)
-    if compensated or (compensated is None and chosen != "present"):
+    if compensated is None:
+        compensated = _compensated(found, chosen)
+    if compensated:
         if loop.direct:
             raise BadModel("a command without a force loop takes no compensator beside it")
         filters = found.compensator.filters or filters_at(loop.law.h)
@@ -80,6 +82,14 @@ def exported(
         loop.k_a or 0.0,
     )
     return Exported(program, loop, found, chosen, _remarks(found, chosen, loop), precision)
+
+
+def _compensated(found: Design, chosen: str) -> bool:
+    """Whether the controller goes with the compensator where nobody says."""
+    told = found.recommendation
+    if told is not None and told.controller == chosen:
+        return told.compensator
+    return chosen != "present"
 
 
 def _loop_of(found: Design, chosen: str) -> DrivenLoop:
@@ -107,9 +117,15 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
     assert found.command is not None
     if chosen not in (found.recommended, "present"):
         out.append(f"the design recommends {found.recommended!r}, not this controller")
+    told = found.recommendation
+    beside = loop.compensation is not None
+    if told is not None and told.controller == chosen and told.compensator != beside:
+        out.append(
+            f"the design recommends it {'with' if told.compensator else 'without'} the compensator"
+        )
     if found.command.limit is None:
         out.append("no limit of the command is known: it is not clipped")
-    if loop.compensation is not None and found.compensator.assumed:
+    if beside and found.compensator.assumed:
         names = ", ".join(found.compensator.assumed)
         out.append(f"compensator: assumed, not identified: {names}")
     return tuple(out)

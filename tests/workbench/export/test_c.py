@@ -92,7 +92,7 @@ def test_a_million_steps_are_the_simulations_in_every_bit(
 
 def test_a_limited_command_reaches_its_limit() -> None:
     one = case("limited")
-    run, _ = simulated(one, exported(one.design, "rst"), 20_000)
+    run, _ = simulated(one, exported(one.design, "rst", compensated=True), 20_000)
     assert np.max(np.abs(run.u)) == 0.4
 
 
@@ -102,14 +102,20 @@ def test_a_limited_command_reaches_its_limit() -> None:
 def test_the_code_passes_its_own_test(
     build: str, precision: str, name: str, tmp_path: Path
 ) -> None:
-    what = exported(case(name).design, precision="single" if precision == "single" else "double")
+    what = exported(
+        case(name).design,
+        compensated=True,
+        precision="single" if precision == "single" else "double",
+    )
     assert library(what, tmp_path, build).tested() == 0
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_its_own_test_finds_a_changed_constant(precision: str, tmp_path: Path) -> None:
     what = exported(
-        case("limited").design, precision="single" if precision == "single" else "double"
+        case("limited").design,
+        compensated=True,
+        precision="single" if precision == "single" else "double",
     )
     code = library(what, tmp_path, "gcc -O0")
     assert code.tested() == 0
@@ -126,7 +132,7 @@ def test_its_own_test_finds_a_changed_constant(precision: str, tmp_path: Path) -
 
 
 def test_it_needs_no_header_and_allocates_nothing(tmp_path: Path) -> None:
-    files = c_files(exported(case("limited").design))
+    files = c_files(exported(case("limited").design, compensated=True))
     for text in files.values():
         included = [line for line in text.splitlines() if line.startswith("#include")]
         assert all("<" not in line for line in included)
@@ -136,7 +142,7 @@ def test_it_needs_no_header_and_allocates_nothing(tmp_path: Path) -> None:
 def test_c_plus_plus_takes_the_header(tmp_path: Path) -> None:
     if shutil.which("g++") is None:
         pytest.skip("no g++ on PATH")
-    what = exported(case("emps").design)
+    what = exported(case("emps").design, compensated=True)
     for file, text in c_files(what).items():
         (tmp_path / file).write_text(text)
     (tmp_path / "main.cpp").write_text(f'#include "{what.program.name}.h"\n')

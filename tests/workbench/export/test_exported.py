@@ -35,6 +35,19 @@ def test_the_recommended_controller_is_taken() -> None:
         exported(replace(found, recommended="none"))
 
 
+def test_the_compensator_goes_along_as_recommended() -> None:
+    found = case("limited").design
+    told = found.recommendation
+    assert told is not None
+    for beside in (True, False):
+        one = replace(found, recommendation=replace(told, compensator=beside))
+        assert (exported(one).loop.compensation is not None) == beside
+        assert not any("compensator" in line for line in exported(one).remarks)
+        against = exported(one, compensated=not beside).remarks
+        assert any("recommends it with" in line for line in against)
+    assert exported(replace(found, recommendation=None)).loop.compensation is not None
+
+
 def test_what_is_not_there_is_refused() -> None:
     found = case("limited").design
     with pytest.raises(BadModel, match="too slow"):
@@ -65,16 +78,19 @@ def test_what_to_know_of_it_stands_in_every_file() -> None:
             values.N_c, values.e_T, {**values.friction, "F_sn": blank}, values.filters, values.h
         ),
     )
-    lead = "\n".join(lead_of(exported(told)))
+    lead = "\n".join(lead_of(exported(told, compensated=True)))
     assert "F_sn" in lead and "not clipped" in lead
     assert "F_sn" not in "\n".join(lead_of(exported(told, compensated=False)))
 
 
 def test_a_motor_needs_no_force_and_a_force_loop_does() -> None:
-    assert [one.name for one in exported(case("emps").design).program.inputs] == ["r", "y"]
+    assert [one.name for one in exported(case("emps").design, compensated=True).program.inputs] == [
+        "r",
+        "y",
+    ]
     above = exported(case("limited").design, compensated=False).program
     assert [one.name for one in above.inputs] == ["r", "y", "F_e"]
-    assert above.output.unit == "V" and above.ratio == 10
+    assert above.output.unit == "V" and above.ratio == 5
 
 
 @given(st.lists(st.text("0123456789.", min_size=1, max_size=30), max_size=40))

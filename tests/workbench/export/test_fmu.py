@@ -47,7 +47,7 @@ def test_it_gives_the_simulations_commands(
     compiled: Path, part: int, request: pytest.FixtureRequest
 ) -> None:
     name = request.node.callspec.params["compiled"]
-    one, what = case(name), exported(case(name).design)
+    one, what = case(name), exported(case(name).design, compensated=True)
     run, inputs = simulated(one, what, N)
     h = what.loop.h
     signals = np.zeros(N, dtype=[("time", float)] + [(s.name, float) for s in what.program.inputs])

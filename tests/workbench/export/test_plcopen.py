@@ -21,7 +21,7 @@ TC6 = {"p": "http://www.plcopen.org/xml/tc6_0201", "x": "http://www.w3.org/1999/
 
 
 def written(name: str, precision: Precision = "double") -> tuple[Exported, str]:
-    what = exported(case(name).design, precision=precision)
+    what = exported(case(name).design, compensated=True, precision=precision)
     (text,) = plcopen_file(what, NOW).values()
     return what, text
 

@@ -12,7 +12,9 @@ from workbench.export.structured_text import st_file
 
 
 def blocks(name: str, precision: Precision = "double", controller: str = "rst") -> Blocks:
-    (source,) = st_file(exported(case(name).design, controller, precision=precision)).values()
+    (source,) = st_file(
+        exported(case(name).design, controller, compensated=True, precision=precision)
+    ).values()
     return Blocks(source)
 
 
@@ -20,7 +22,7 @@ def blocks(name: str, precision: Precision = "double", controller: str = "rst") 
 @pytest.mark.parametrize("controller", ["rst", "pid"])
 def test_the_block_gives_what_the_simulation_gave(name: str, controller: str) -> None:
     one = case(name)
-    what = exported(one.design, controller)
+    what = exported(one.design, controller, compensated=True)
     run, inputs = simulated(one, what, 4000)
     block = blocks(name, controller=controller).made(f"FB_{what.program.name}")
     names = [{"r": "r_ref"}.get(signal.name, signal.name) for signal in what.program.inputs]
@@ -42,7 +44,7 @@ def test_the_block_passes_its_own_test(name: str, precision: Precision) -> None:
 
 
 def test_its_own_test_finds_a_changed_constant() -> None:
-    what = exported(case("limited").design)
+    what = exported(case("limited").design, compensated=True)
     (source,) = st_file(what).values()
     line = next(one for one in source.splitlines() if "F_sp : LREAL" in one)
     changed = source.replace(line, "F_sp : LREAL := 20.8;")
@@ -52,7 +54,7 @@ def test_its_own_test_finds_a_changed_constant() -> None:
 
 
 def test_a_reset_begins_anew() -> None:
-    what = exported(case("limited").design)
+    what = exported(case("limited").design, "rst", compensated=True)
     name = f"FB_{what.program.name}"
     block = blocks("limited").made(name)
     anew = ProgramRun(what.program, 0.02)
