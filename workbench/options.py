@@ -42,6 +42,14 @@ def card_option(command: Command) -> Command:
     )(command)
 
 
+def present_card_option(command: Command) -> Command:
+    """The option `--card` of commands that read a model, for another present controller."""
+    return click.option(
+        "--card",
+        help="Card whose [controller] is shown as the present one, in place of the model's.",
+    )(command)
+
+
 def effects_option(command: Command) -> Command:
     """The option `--effects`, folders of effects of the user's own, as `effects`: see
     `workbench.cards.own_effects`."""

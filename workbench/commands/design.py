@@ -6,7 +6,7 @@ from typing import Literal
 
 import click
 
-from workbench.options import POSITIVE, effects_option
+from workbench.options import POSITIVE, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -33,6 +33,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
 @click.option(
     "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
 )
+@present_card_option
 @effects_option
 @output_options
 def command(
@@ -44,6 +45,7 @@ def command(
     design_period: float | None,
     modulus: float,
     delay: float,
+    card: str | None,
     effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
@@ -63,8 +65,9 @@ def command(
     from workbench.report.design_tables import design_view
     from workbench.report.reports import design_report
     from workbench.steps.design import design, effort_limit
+    from workbench.steps.present import with_card
 
-    model = read_model(model_file, library(effects))
+    model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     goals = Goals(modulus, delay, effort_limit(model))
     with OutputFolder("design", out, now=datetime.now()) as folder:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from workbench.options import POSITIVE, effects_option
+from workbench.options import POSITIVE, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -42,6 +42,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
     help="Largest force, relative to the largest in the logs of the machine's model.",
 )  # fmt: skip
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@present_card_option
 @effects_option
 @output_options
 def command(
@@ -55,6 +56,7 @@ def command(
     overshoot: float,
     force: float,
     seed: int,
+    card: str | None,
     effects: tuple[Path, ...],
     as_json: bool,
     out: Path | None,
@@ -74,10 +76,11 @@ def command(
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
     from workbench.steps.loop_figures import Limits
+    from workbench.steps.present import with_card
     from workbench.steps.validate import validate, validation_document
 
     known = library(effects)
-    model, found = read_model(model_file, known), read_design(design_file)
+    model, found = with_card(read_model(model_file, known), card), read_design(design_file)
     plant = read_model(plant_file, known) if plant_file else None
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     with OutputFolder("validate", out, now=datetime.now()) as folder:

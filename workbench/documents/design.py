@@ -121,8 +121,8 @@ class Controller:
     def law(self, command: Command) -> DriveLaw:
         """The controller in the drive's own terms.
 
-        Without a W, above a force loop an integrator forgets in 1/w_n what was not carried out,
-        beside the loop's own anti-windup; else the whole controller forgets it at once.
+        Without a W, as in older files: above a force loop an integrator forgets in 1/w_n what was
+        not carried out, else the whole controller forgets it at once.
         """
         per = command.force_per_command
         forget = 1.0 / self.dominant[0] if per is None else 0.0

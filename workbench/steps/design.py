@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from design.drive_law import drive_law
 from design.filters import filters_at
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
@@ -21,7 +22,7 @@ from workbench.documents.design import (
     Recommendation,
     margin_values,
 )
-from workbench.documents.drive import Command, ForceLoop
+from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, versions
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.steps.identify import check_period
@@ -57,8 +58,7 @@ def design(
     found = _placed(model, asked, goals, source, period)
     command = command_of(model, found.force)
     controllers = {
-        name: _controller(tuned, command, shown(model.rotary))
-        for name, tuned in found.tuned.items()
+        name: _controller(tuned, shown(model.rotary)) for name, tuned in found.tuned.items()
     }
     first = Design(
         card=model.card,
@@ -200,7 +200,7 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned, command: Command, units: Shown) -> Controller:
+def _controller(tuned: Tuned, units: Shown) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
     found = Controller(
         R=tuple(rst.R.tolist()),
@@ -217,7 +217,9 @@ def _controller(tuned: Tuned, command: Command, units: Shown) -> Controller:
         gains=None if pid is None else pid.gains,
         note="; ".join(_notes(tuned, units)),
     )
-    return replace(found, W=found.law(command).W)
+    # Where all of a controller forgot at once what a limit cut off, loops went on at the limit for
+    # ever after large steps (EMPS at 4 V, both ways half of the time).
+    return replace(found, W=drive_law(rst, 1.0 / tuned.dominant[0]).W)
 
 
 def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:

@@ -1,5 +1,7 @@
 """The controller of a card as the law that its drive runs."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from design.drive_law import drive_law
@@ -8,9 +10,11 @@ from design.present import cascade_to_rst
 from design.rst import RST
 from identification.errors import BadCard, BadSpecification
 from identification.log import Rig
-from workbench.cards.card import Card
+from workbench.cards.card import Card, load_card
 from workbench.cards.controller import CardController
 from workbench.documents.drive import DriveUnits, ForceLoop, Present, PresentFile, present_file
+from workbench.documents.model import Model
+from workbench.logs.fetch import card_path
 
 
 def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
@@ -25,6 +29,26 @@ def present_of_card(card: Card, rig: Rig, h: float) -> PresentFile | None:
         return present_file(present(card.controller, rig, h), rig.control_limit, units)
     except (BadCard, BadSpecification) as error:
         raise BadCard(f"{card.path}: controller: {error}") from None
+
+
+def with_card(model: Model, name: str | None) -> Model:
+    """The model with the controller of another card in place of its own; as it is without a card.
+
+    Raises BadCard where the card names none, or its command is in another unit.
+    """
+    if name is None:
+        return model
+    card = load_card(card_path(name), with_recipe=False)
+    own, unit = card.rig().command_unit, model.rig.command_unit
+    if own != unit:
+        raise BadCard(
+            f"{card.path}: its command is in {own!r}, that of the model in {unit!r}; give the card"
+            " of the model's machine"
+        )
+    found = present_of_card(card, model.rig, model.period)
+    if found is None:
+        raise BadCard(f"{card.path}: has no [controller]; add the one that the machine has now")
+    return replace(model, controller=found)
 
 
 def present(given: CardController, rig: Rig, h: float) -> Present:

@@ -45,7 +45,9 @@ def recommended(model: Model, found: Design) -> Recommendation:
     usable = figures[both[1]].passed and figures[both[1]].limit_cycle is None
     better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
     said = reasons(alone, better, figures, shown(model.rotary))
-    return Recommendation(alone, better, f"{said}: {_decisive(alone, found, figures)}")
+    taken = both[1] if better else alone
+    why = f"{said}: {_decisive(alone, found, figures)}{_beside_present(taken, figures)}"
+    return Recommendation(alone, better, why)
 
 
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
@@ -64,11 +66,8 @@ def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
 def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], units: Shown) -> str:
     """Why this controller, in one line with its numbers and those of the others."""
     taken = name + (COMPENSATED if compensator else "")
-    others = [
-        other for other in (*CONTROLLERS, twin, PRESENT) if other in figures and other != name
-    ]
-    if compensator and twin not in others:
-        others.append(twin)
+    every = (*CONTROLLERS, name + COMPENSATED, PRESENT)
+    others = [other for other in every if other in figures and other != taken]
     one = figures[taken]
     said = (
         f"{_called(taken)}: {_rest(one, units)} of the step off at standstill, settled in"
@@ -118,6 +117,16 @@ def _decisive(name: Recommended, found: Design, figures: Mapping[str, LoopFigure
     if ahead >= EQUAL:
         return f"better by {100 * (np.exp(ahead) - 1):.0f} % in the mean of the first four"
     return f"as good as the {called} in the mean of the first four, and the larger margin"
+
+
+def _beside_present(taken: str, figures: Mapping[str, LoopFigures]) -> str:
+    """That the present controller is as good, where it is."""
+    now = figures.get(PRESENT)
+    if now is None or not now.passed or now.limit_cycle is not None:
+        return ""
+    pool = (taken, PRESENT)
+    as_good = _cost(PRESENT, pool, figures) - _cost(taken, pool, figures) < EQUAL
+    return "; the present controller is as good, keep it" if as_good else ""
 
 
 def _cost(name: str, pool: Iterable[str], figures: Mapping[str, LoopFigures]) -> float:
