@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Array
 from tests.workbench.export.designs import NAMES, START, case, simulated
 from workbench.export.c import c_files
-from workbench.export.exported import Exported, exported
+from workbench.export.exported import Exported, Precision, exported
 
 MANY = 1_000_000
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
@@ -98,23 +98,15 @@ def test_a_limited_command_reaches_its_limit() -> None:
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", ["limited", "emps"])
 def test_the_code_passes_its_own_test(
-    build: str, precision: str, name: str, tmp_path: Path
+    build: str, precision: Precision, name: str, tmp_path: Path
 ) -> None:
-    what = exported(
-        case(name).design,
-        compensated=True,
-        precision="single" if precision == "single" else "double",
-    )
+    what = exported(case(name).design, compensated=True, precision=precision)
     assert library(what, tmp_path, build).tested() == 0
 
 
 @pytest.mark.parametrize("precision", ["double", "single"])
-def test_its_own_test_finds_a_changed_constant(precision: str, tmp_path: Path) -> None:
-    what = exported(
-        case("limited").design,
-        compensated=True,
-        precision="single" if precision == "single" else "double",
-    )
+def test_its_own_test_finds_a_changed_constant(precision: Precision, tmp_path: Path) -> None:
+    what = exported(case("limited").design, compensated=True, precision=precision)
     assert library(what, tmp_path, "gcc -O0").tested() == 0
     source = tmp_path / f"{what.program.name}.c"
     text = source.read_text()
