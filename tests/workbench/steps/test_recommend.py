@@ -1,0 +1,161 @@
+"""Which controller is recommended, and that the reason has the numbers it rests on."""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from identification.model.estimates import Estimate
+from identification.model.plant import Actuator
+from tests.chain import EMPS, TABLES, model_of
+from workbench.cards.controller import CardController
+from workbench.documents.design import Design
+from workbench.documents.drive import DriveUnits, present_file
+from workbench.documents.model import Model
+from workbench.report.validation_tables import validation_head, validation_rows
+from workbench.steps import recommend
+from workbench.steps.design import design
+from workbench.steps.limit_cycle import LimitCycle
+from workbench.steps.linear_loop import force_period, periods
+from workbench.steps.loop_figures import PRESENT, LoopFigures
+from workbench.steps.present import present
+from workbench.steps.recommend import recommended
+from workbench.steps.validate import validate
+
+ACTUATOR = Actuator(19530.0, 10405.0)
+
+
+def now(model: Model, k_d: float, period: float | None = None) -> Model:
+    """The model of a machine that has a PD."""
+    gains = {"k_d": Estimate(k_d, "V/m"), "T_d": Estimate(0.03, "s"), "eps": Estimate(0.01, "s")}
+    given = CardController("PD", gains, {}, period, "command", None, None, None)
+    found = present(given, model.rig, model.period)
+    return replace(model, controller=present_file(found, None, DriveUnits("linear", "V")))
+
+
+@cache
+def motor() -> tuple[Model, Design]:
+    model = model_of(EMPS, k_a=35.15)
+    model = replace(model, rig=replace(model.rig, control_limit=10.0, force_per_command=35.15))
+    model = now(model, 150.0)
+    return model, design(model, period=5e-3)
+
+
+def choose(monkeypatch: pytest.MonkeyPatch, **changes: LoopFigures) -> tuple[str, bool, str]:
+    """The recommendation where the loops come to these figures."""
+    model, found = motor()
+    figures = recommend.compared(model, found)
+    calm = {name: replace(one, limit_cycle=None, missed=()) for name, one in figures.items()}
+    same = {name: replace(calm["rst"], margins=one.margins) for name, one in calm.items()}
+    monkeypatch.setattr(recommend, "compared", lambda *_: {**same, **changes})
+    chosen = recommended(model, found)
+    return chosen.controller, chosen.compensator, chosen.why
+
+
+@cache
+def plain() -> LoopFigures:
+    model, found = motor()
+    return replace(recommend.compared(model, found)["rst"], limit_cycle=None, missed=())
+
+
+def test_the_better_loop_is_taken_and_said_with_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = plain()
+    better = replace(
+        one, settling=0.5 * one.settling, force_peak=0.5 * one.force_peak, standstill_relative=0.002
+    )
+    worse = replace(one, standstill_relative=0.011)
+    name, compensator, why = choose(monkeypatch, pid=better, rst=worse, present=worse)
+    assert (name, compensator) == ("pid", False)
+    assert why.startswith("PID: 0.2 % of the step off at standstill")
+    assert "RST: 1.1 %" in why and "the present controller: 1.1 %" in why
+    assert f"of {one.force_limit:.3g} N" in why and "better by" in why
+
+
+def test_of_equal_loops_the_larger_margin_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    one = plain()
+    assert one.margins is not None
+    safer = replace(one, margins=replace(one.margins, modulus=0.9))
+    for name in ("rst", "pid"):
+        with monkeypatch.context() as patch:
+            found, _, why = choose(patch, **{name: safer})
+        assert found == name and "the larger margin" in why
+
+
+def test_a_loop_that_does_not_come_to_rest_is_not_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+    faster = replace(plain(), settling=1e-2, limit_cycle=LimitCycle(1e-4, 0.3))
+    with monkeypatch.context() as patch:
+        name, _, why = choose(patch, pid=faster)
+    assert name == "rst"
+    assert "limit cycle of 0.1 mm every 0.3 s" in why and "does not come to rest" in why
+    failing = replace(plain(), settling=1e-2, missed=("overshoot",))
+    name, _, why = choose(monkeypatch, pid=failing)
+    assert name == "rst" and "misses a limit, overshoot" in why
+
+
+def test_the_compensator_only_where_it_is_clearly_better(monkeypatch: pytest.MonkeyPatch) -> None:
+    half = replace(plain(), settling=0.5 * plain().settling)
+    for one, taken in ((half, True), (replace(half, limit_cycle=LimitCycle(1e-4, 0.3)), False)):
+        both = {"rst + compensator": one, "pid + compensator": one}
+        with monkeypatch.context() as patch:
+            _, compensator, why = choose(patch, **both)
+        assert compensator is taken
+        assert why.startswith(("RST with the compensator", "PID with the compensator")) is taken
+
+
+def test_a_present_controller_that_is_as_good_is_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert choose(monkeypatch)[2].endswith("the present controller is as good, keep it")
+
+
+def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
+    model, found = motor()
+    result, traces = validate(model, found, np.random.default_rng(0), plant=model)
+    assert next(iter(result.figures)) == PRESENT
+    assert set(result.figures[PRESENT]) == {"model", "plant"} and (PRESENT, "plant") in traces
+    row = dict(zip(validation_head(result), validation_rows(result)[0], strict=True))
+    assert row["loop"] == "present" and row["ok"] == "no"
+    # A PD against Coulomb friction stays off by up to F_c/(k_a k_d).
+    off = result.figures[PRESENT]["model"].standstill
+    assert 0.0 < off < 1.2 * 25.0 / (35.15 * 150.0)
+    assert any("present on the model" in line for line in result.remarks) or row["limit cycle"]
+    assert result.why.startswith(found.recommended.upper())
+
+
+def test_its_margins_are_those_of_its_own_period() -> None:
+    model, found = motor()
+    figures, _ = validate(model, found, np.random.default_rng(0))
+    margin = figures.figures[PRESENT]["model"].margins
+    assert margin is not None and margin.delay_s is not None and margin.delay_samples is not None
+    assert margin.delay_s / margin.delay_samples == pytest.approx(model.period)
+
+
+def test_a_command_at_its_limit_is_told_with_force_and_time() -> None:
+    model, found = motor()
+    tight = replace(model, rig=replace(model.rig, control_limit=3.0))
+    result, _ = validate(tight, found, np.random.default_rng(0))
+    one = result.figures[found.recommended]["model"]
+    assert one.limited > 0.0 and one.force_limit == pytest.approx(3.0 * 35.15)
+    assert any("its limit of 3 V, 105 N, for" in said for said in one.missed)
+    assert one.force_peak <= 3.0 * 35.15
+
+
+def test_periods_come_from_the_card_and_the_log() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    assert model.period == 1e-3
+    assert periods(model) == (1e-3, 2e-3, 5e-3, 10e-3, 20e-3)
+    fast = replace(model, log=(replace(model.log[0], h=1e-3, period=5.0002e-4),))
+    assert periods(fast)[0] == 5e-4
+    assert periods(now(model, 100.0, period=2.5e-4))[0] == 2.5e-4
+    slow = replace(model, log=(replace(model.log[0], h=0.05),))
+    assert periods(slow) == (0.05,)
+    cylinder = model_of(TABLES["paper_table2"], ACTUATOR)
+    assert periods(cylinder)[0] == pytest.approx(5e-3)  # five samples of the force loop
+    assert force_period(cylinder) == 1e-3
+
+
+def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    noisy = replace(model, fit=replace(model.fit, noise_y=3e-4))
+    found = design(noisy)
+    assert found.plant.h > 1e-3
+    assert any(line.startswith("not every 1 ms: ") for line in found.remarks)
