@@ -45,12 +45,14 @@ USUAL_DEMAND = Demand()
 class Goals:
     """What a loop must keep: modulus margin [-], delay margin in samples, largest |S_up| [dB].
 
-    effort bounds the force that measurement noise may ask for; None for no bound.
+    effort bounds the force that measurement noise may ask for; None for no bound. fastest: largest
+    dominant w_n [rad/s] of a search, None for any.
     """
 
     modulus: float = 0.5
     delay: float = 2.0
     effort: float | None = None
+    fastest: float | None = None
 
 
 @dataclass(frozen=True)
@@ -234,7 +236,7 @@ def _best(
     A, B = plants[0]
     refusal: BadSpecification | None = None
     found: list[Placed] = []
-    for dominant, candidates in _grid(h, asked, auxiliary):
+    for dominant, candidates in _grid(h, asked, goals.fastest, auxiliary):
         for others in candidates:
             try:
                 controller, pid = design(dominant, others)
@@ -291,10 +293,14 @@ def _laggards(
 
 
 def _grid(
-    h: float, asked: Asked, auxiliary: Callable[[float], tuple[complex, ...]]
+    h: float,
+    asked: Asked,
+    fastest: float | None,
+    auxiliary: Callable[[float], tuple[complex, ...]],
 ) -> Iterator[tuple[tuple[float, float], list[tuple[complex, ...]]]]:
     """Dominant poles, the fastest first, each with the auxiliary poles to try."""
-    frequencies: list[float] = np.geomspace(FASTEST / h, SLOWEST / h, FREQUENCIES_TRIED).tolist()
+    top = FASTEST / h if fastest is None else min(max(fastest, SLOWEST / h), FASTEST / h)
+    frequencies: list[float] = np.geomspace(top, SLOWEST / h, FREQUENCIES_TRIED).tolist()
     pairs = [(w, zeta) for w in frequencies for zeta in DAMPINGS]
     for dominant in [asked.dominant] if asked.dominant else pairs:
         if asked.auxiliary is not None:

@@ -234,6 +234,11 @@ class Model(ModelFile):
         return max(entry.force_peak for entry in self.log)
 
     @property
+    def speed(self) -> float | None:
+        """What 1 % of the measured speeds exceed [m/s], of the fastest log; None where unknown."""
+        return max((entry.speed for entry in self.log if entry.speed), default=None)
+
+    @property
     def period(self) -> float:
         """The shortest sampling period of its logs [s], as they were written, in four digits."""
         return float(f"{min(entry.period or entry.h for entry in self.log):.4g}")

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
 # Okabe and Ito's colours, which colour-blind readers can tell apart.
 MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
-CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL, "present": OTHER}
+GREY = "#7a7a7a"
+CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL, "present": GREY}
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
 STYLE: dict[Any, Any] = {

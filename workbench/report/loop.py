@@ -7,6 +7,7 @@ from design.loop import LoopRun
 from workbench.cards.parameter_units import shown
 from workbench.report.figures import (
     CONTROLLER_COLOURS,
+    GREY,
     OTHER,
     figure,
     inline,
@@ -50,14 +51,14 @@ def loop(
                 _lines([row[column] for row in axes], trace, name, number == 0)
             axes[3][column].set_xlabel("time [s]")
             for edge in () if limit is None else (-limit, limit):
-                axes[3][column].axhline(edge, color=OTHER, ls="--", lw=0.8)
+                axes[3][column].axhline(edge, color=GREY, ls="--", lw=0.8)
         label(axes[0][0], "", f"position [{units.position}]", "steps")
         label(axes[0][1], "", "", "smooth reference")
         label(axes[1][0], "", f"error [{units.position}]")
         label(axes[2][0], "", f"applied force [{units.force}]")
         label(axes[3][0], "time [s]", f"command [{unit}]")
         handles = axes[0][0].get_legend_handles_labels()
-        drawn.legend(*handles, loc="outside upper right", ncols=5)
+        drawn.legend(*handles, loc="outside upper right", ncols=6)
         svg = inline(drawn, f"loop-{place}", "simulated loop: position, error, force, command")
     caption = (
         "The loop with the identified Karnopp friction and the logs' noise; broken lines: with the"

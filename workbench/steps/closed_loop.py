@@ -75,9 +75,20 @@ def driven_loop(
 
 
 def present_loop(machine: Model, now: Present) -> DrivenLoop:
-    """The controller that the machine has now, as its drive runs it."""
-    limit = command_of(machine, now.force).limit
-    return DrivenLoop(now.law, now.force, now.rate, limit, direct=now.output == "command")
+    """The controller that the machine has now, as its drive runs it.
+
+    Where no command is logged its force loop is not known to the model, and gives what is asked.
+    Raises BadModel where the controller gives a command of which the logs do not tell the force.
+    """
+    drive = machine.simulated.actuator
+    force = now.force if isinstance(drive, Actuator) else None
+    command = command_of(machine, force)
+    if drive is None and now.output == "command" and machine.rig.command_unit != command.unit:
+        raise BadModel(
+            f"it gives a command in {machine.rig.command_unit}, and no log tells what force that"
+            " makes; log the command"
+        )
+    return DrivenLoop(now.law, force, now.rate, command.limit, direct=now.output == "command")
 
 
 def run_loop(

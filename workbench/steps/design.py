@@ -1,7 +1,8 @@
 """Model -> Design: PID and RST by pole placement, compensator, margins."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -33,6 +34,9 @@ FINEST = 20  # times faster than its logs that a controller may be designed
 N_C = 2.0  # the paper's, in simulation and on the rig
 E_T_PER_TRAVEL = 0.03  # the paper's 3 mm on steps of 0.1 m
 LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take at once
+SLOWED = 4  # times that a controller is made slower for the sake of its reference
+ENOUGH = 0.95  # of the w_n that would just do
+SLOWEST_CUT = 0.3  # of its w_n that is left at once, at least
 OVERSHOOT = 0.05  # of a step, in the linear loop
 NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
 
@@ -129,6 +133,28 @@ def _placed(
     return min(tried, key=lambda one: one.misses)
 
 
+def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -> Tuned:
+    """The controller, slowed down until it may be moved at the speed [m/s] that the logs show.
+
+    A reference that starts at a speed v asks for about m w_n v of force: the faster the loop, the
+    slower what it may follow.
+    """
+    found = tune(goals=goals)
+    for _ in range(SLOWED):
+        rate = found.followed.rate
+        if speed is None or rate is None or rate >= speed:
+            break
+        try:
+            fastest = ENOUGH * found.dominant[0] * max(rate / speed, SLOWEST_CUT)
+            slower = tune(goals=replace(goals, fastest=fastest))
+        except BadSpecification:
+            break
+        if slower.missed or slower.dominant[0] >= found.dominant[0]:
+            break
+        found = slower
+    return found
+
+
 def _placed_at(
     model: Model, asked: Asked, goals: Goals, plant: Linear, force: ForceLoop | None
 ) -> _Placed:
@@ -144,7 +170,8 @@ def _placed_at(
         if name == "pid" and asked.auxiliary is not None:
             wanted = Asked(asked.dominant, None, asked.integrator)
         try:
-            found[name] = tune(a, b, plant.h, wanted, goals, others, demand)
+            tuned = partial(tune, a, b, plant.h, wanted, corners=others, demand=demand)
+            found[name] = _followable(tuned, goals, None if wanted.dominant else model.speed)
         except BadSpecification as error:
             refused[name] = str(error)
     by_hand = asked.dominant is not None or asked.auxiliary is not None
@@ -226,7 +253,8 @@ def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
     """What to know of a controller's reference and form, in words."""
     pid, rate = tuned.pid, tuned.followed.rate
     if pid is not None and pid.gains is not None:
-        yield f"set-point weights b = {pid.gains.b:.3g}, c = {pid.gains.c:.3g}"
+        b, c = (round(one, 6) + 0.0 for one in (pid.gains.b, pid.gains.c))
+        yield f"set-point weights b = {b:.3g}, c = {c:.3g}"
     yield f"follows a ramp {1e3 * tuned.followed.lag:.3g} ms behind"
     if rate is not None:
         step = rate * tuned.rst.h

@@ -121,7 +121,7 @@ def present_figures(
 ) -> tuple[LoopFigures, Traces] | None:
     """The controller that the model's machine has now, on a machine, along the design's motion.
 
-    None where the card named none.
+    None where the card named none. Raises BadModel where it cannot be simulated.
     """
     now = model.present
     if now is None:
@@ -145,6 +145,8 @@ def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, A
     counts = [n, n, n, max(3 * n, round(LAST_DWELL / h))]
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), counts)
     w = SMOOTH_SPEED * min(one.dominant[0] for one in found.controllers.values())
+    if machine.speed is not None:  # no faster than the machine has been seen to move
+        w = min(w, machine.speed / amplitude)
     t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
     smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
+from identification.errors import BadModel
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design, Recommendation, Recommended
 from workbench.documents.model import Model
@@ -59,7 +60,10 @@ def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
             loop = driven_loop(model, found, one, compensator)
             runs = loop_runs(model, loop, references(model, found, loop.h), None)
             out[name + suffix] = loop_figures(model, loop, runs, Limits(), arx=arx)
-    now = present_figures(model, model, found, Limits(), None)
+    try:
+        now = present_figures(model, model, found, Limits(), None)
+    except BadModel:  # `validate` says why
+        return out
     return out if now is None else {PRESENT: now[0], **out}
 
 

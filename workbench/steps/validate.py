@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from identification.errors import BadModel
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
 from workbench.documents.model import Model, versions
@@ -63,8 +64,13 @@ def validate(
     plants = {"model": model} | ({"plant": plant} if plant else {})
     figures: dict[str, dict[str, LoopFigures]] = {}
     traces: dict[tuple[str, str], Traces] = {}
+    unseen: list[str] = []
     for place, machine in plants.items():
-        now = present_figures(machine, model, found, limits, rng)
+        try:
+            now = present_figures(machine, model, found, limits, rng)
+        except BadModel as error:
+            unseen.append(f"the present controller is not shown on the {place}: {error}")
+            continue
         if now is not None:
             figures.setdefault(PRESENT, {})[place], traces[PRESENT, place] = now
     arx = found.plant.source == "arx"
@@ -89,6 +95,7 @@ def validate(
         figures=figures,
         remarks=(
             *_as_read(model, found, plant),
+            *unseen,
             *_remarks(figures, judged, found, (model, plant)),
         ),
         versions=versions(),

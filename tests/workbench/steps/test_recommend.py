@@ -121,6 +121,19 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     assert result.why.startswith(found.recommended.upper())
 
 
+def test_a_present_controller_that_cannot_be_simulated_is_told() -> None:
+    model, found = motor()
+    unknown = replace(model, actuator=None, rig=replace(model.rig, kind="force"))
+    result, _ = validate(unknown, found, np.random.default_rng(0))
+    assert PRESENT not in result.figures
+    assert any("the present controller is not shown on the model: it gives" in line
+               for line in result.remarks)  # fmt: skip
+    away = now(replace(model, rig=replace(model.rig, control_limit=None)), 1e6)
+    result, _ = validate(away, found, np.random.default_rng(0))
+    shown = result.figures.get(PRESENT)
+    assert shown is None or not shown["model"].passed
+
+
 def test_its_margins_are_those_of_its_own_period() -> None:
     model, found = motor()
     figures, _ = validate(model, found, np.random.default_rng(0))
@@ -159,3 +172,20 @@ def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
     found = design(noisy)
     assert found.plant.h > 1e-3
     assert any(line.startswith("not every 1 ms: ") for line in found.remarks)
+
+
+def test_a_loop_is_no_faster_than_its_reference_may_be_moved() -> None:
+    model = model_of(EMPS, k_a=35.15)
+    precise = replace(model, fit=replace(model.fit, noise_y=1e-8))
+    hasty = design(precise, period=1e-3)
+    seen = replace(precise, log=(replace(model.log[0], speed=0.15),))
+    calm = design(seen, period=1e-3)
+    for name in ("rst", "pid"):
+        fast, slow = hasty.controllers[name], calm.controllers[name]
+        assert fast.rate is not None and fast.rate < 0.15
+        assert slow.rate is not None and slow.rate >= 0.15
+        assert slow.dominant[0] < fast.dominant[0] and not slow.missed
+    result, traces = validate(seen, calm, np.random.default_rng(0))
+    assert result.passed
+    smooth = traces["rst", "model"].smooth
+    assert np.max(np.abs(np.diff(smooth.r))) / 1e-3 < 1.05 * 0.15
