@@ -205,13 +205,14 @@ class KernelReader:
         if count <= 1:
             return
         index = Variable(name, "integer")
-        if self._free(name, index.kind) or self.locals.get(name) == index:
-            self.locals[name] = index
-        else:
+        if not self._free(name, index.kind):
             raise BadModel(f"the index {name!r} of a loop has another meaning")
+        self.locals[name] = index
+        self._in_use.add(name)
         before = {**frame.means, name: index}
         frame.means = dict(before)
         inside = self._aside(self._ending(body, frame))
+        self._in_use.remove(name)
         if any(frame.means[key] != value for key, value in before.items()):
             raise BadModel("a loop that changes what is known has no form in a program")
         self.statements.append(Repeat(index, count, inside))

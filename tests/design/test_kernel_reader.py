@@ -175,6 +175,19 @@ def sums(s: Array, x: float) -> float:
 
 
 @compiled_exact
+def scaled(s: Array, x: float) -> None:
+    for j in range(3):
+        s[j] = s[j] * x
+
+
+@compiled_exact
+def nested(s: Array, x: float) -> None:
+    for j in range(2):
+        s[j] = x
+        scaled(s, x)
+
+
+@compiled_exact
 def branches(s: Array, x: float) -> float:
     level = 1.0
     if x > 0.0:
@@ -198,9 +211,10 @@ def test_a_value_that_would_have_changed_is_refused(kernel: Any) -> None:
         read(kernel, *given)
 
 
-def test_a_sum_over_a_loop_is_refused() -> None:
+@pytest.mark.parametrize("kernel", [sums, nested])
+def test_a_sum_over_a_loop_and_a_loop_in_a_loop_of_one_index_are_refused(kernel: Any) -> None:
     with pytest.raises(BadModel, match="loop"):
-        read(sums, Variable("x"))
+        read(kernel, Variable("x"))
 
 
 @given(st.floats(-3.0, 3.0), st.lists(st.floats(-3.0, 3.0), min_size=2, max_size=2))
