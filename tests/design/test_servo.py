@@ -4,12 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from design.compensator import Compensator
 from design.filters import CompensatorFilters, rig_filters, simulation_filters
+from design.linear import commanded_plant
 from design.loop import Cascade, ForcePI, LoopNoise, simulate_loop
 from design.pid import pd_to_rst, pid_to_rst
 from design.rivals import DisturbanceObserver, Dither, FrictionObserver, IntegralPID
+from design.rst import RST
 from design.servo import (
     Compensation,
     Countermeasure,
@@ -20,7 +23,8 @@ from design.servo import (
 )
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification
-from identification.model.plant import Motor, Plant
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.clean import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 from tests.identification.plants import ACTUATOR, table
 
@@ -215,3 +219,19 @@ def test_parts_that_do_not_fit_are_refused() -> None:
         DisturbanceObserver(1.0, 1.0, 0.0)
     with pytest.raises(BadSpecification, match="must be > 0"):
         FrictionObserver(1.0, 1.0, 1.0, 0.0, 1.0, 1.0)
+
+
+def test_a_command_without_a_force_loop_closes_the_linear_loop() -> None:
+    h, k = 1e-3, 2.0  # V/m
+    drive = Actuator(19530.0, 10405.0)
+    slippery = Plant(Karnopp(1.0, 1e-9, 1e-9, 300.0, 300.0, 1e-9, -1e-9, 1e-9, -1e-9), drive)
+    gain = RST(np.array([k]), np.ones(1), np.array([k]), h)
+    r = np.full(400, 0.05)
+    r[0] = 0.0
+    found = simulate_servo(slippery, Servo(gain, None, direct=True), r, h)
+    A, B = commanded_plant(1.0, 300.0, h, drive)
+    size = max(len(A), len(B))
+    P = np.pad(A, (0, size - len(A))) + k * np.pad(B, (0, size - len(B)))
+    assert np.max(np.abs(found.y - lfilter(k * B, P, r))) < 1e-6
+    with pytest.raises(BadModel, match="without a force loop"):
+        Servo(gain, PI, direct=True)

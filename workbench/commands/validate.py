@@ -90,5 +90,9 @@ def command(
         document = validation_document(result)
         folder.write_json("validation.json", document)
         folder.write_text("report.html", validation_report(result, traces, model.rotary))
-    emit({**document, "out": folder.final}, as_json, lambda: validation_view(result, folder.final))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: validation_view(result, folder.final, model.rotary),
+    )
     return 0 if result.passed else 1

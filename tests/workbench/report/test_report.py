@@ -14,7 +14,11 @@ from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
 from workbench.report.fit import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_report, identification_report, validation_report
-from workbench.report.validation_tables import validation_lines
+from workbench.report.validation_tables import (
+    validation_head,
+    validation_lines,
+    validation_rows,
+)
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified
 from workbench.steps.validate import validate
@@ -148,3 +152,11 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
     part = liveliest(y)
     assert part.start <= 6100 and part.stop >= 6900
     assert liveliest(y[:20]) == slice(0, 20)
+
+
+def test_a_rotary_validation_has_rotary_columns() -> None:
+    model = turned(identified()).model
+    result, _ = validate(model, design(model), np.random.default_rng(0))
+    head = validation_head(result, rotary=True)
+    assert "force N m" in head and "force N" in validation_head(result)
+    assert all(len(row) == len(head) for row in validation_rows(result, rotary=True))

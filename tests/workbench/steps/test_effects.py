@@ -210,7 +210,7 @@ def test_a_log_without_the_effect_s_signals_is_refused() -> None:
 
 def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     plain = model_of(EMPS, k_a=35.15)
-    found = design(plain)
+    found = design(plain, period=10e-3)
     assert found.rst is not None
     spring = built_in()["spring"].acting({"k": 2000.0})
     whole = replace(plain, effects={"spring": exact(spring, "linear")})
