@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 
 from identification.arrays import Array
-from identification.compiled import compiled_inline
+from identification.compiled import compiled_exact
 from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
 from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN, F_SP, F_VN, F_VP
@@ -19,7 +19,7 @@ INNERS: tuple[Inner, ...] = ("zero-velocity", "stick", "none")
 INNER_ZERO, INNER_STICK, INNER_NONE = range(3)
 
 
-@compiled_inline
+@compiled_exact
 def compensation_force(law: Array, v: float, e_y: float, F: float) -> float:
     """F_comp [N] of the compensator `law` (14,) at velocity v [m/s], error e_y [m], force F [N].
 

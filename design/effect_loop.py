@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from design.loop import Cascade, LoopNoise
 from design.loop_signals import Signals
-from design.servo import Servo, ServoRun, simulate_servo
+from design.servo import Countermeasure, Servo, ServoRun, simulate_servo
 from identification.model.plant import Plant
 
 
@@ -21,15 +21,16 @@ def simulate_effect_loop(
     noise: LoopNoise | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     signals: Signals | None = None,
+    friction: Countermeasure | None = None,
 ) -> ServoRun:
-    """`design.loop.simulate_loop` for a plant with effects; see `design.servo.simulate_servo`.
+    """`design.loop.simulate_loop` for a plant with effects, or with a friction countermeasure in
+    the loop; see `design.servo.simulate_servo`.
 
     cascade.position.h may be a multiple of h. Raises BadModel where the parts do not fit together,
     or a needed signal is missing.
     """
     # In `simulate_loop` a motor's controller is told of a clipped command, another's is not.
     told = 0.0 if cascade.force is None else None
-    servo = Servo(
-        cascade.position, cascade.force, control_limit=cascade.control_limit, anti_windup=told
-    )
+    limit = cascade.control_limit
+    servo = Servo(cascade.position, cascade.force, friction, control_limit=limit, anti_windup=told)
     return simulate_servo(plant, servo, reference, h, noise=noise, start=start, signals=signals)

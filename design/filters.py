@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from identification.compiled import compiled_inline
+from identification.compiled import compiled_exact
 from identification.errors import BadSpecification
 from identification.signals.clean import RIG_A, RIG_C, Filter, fir_lowpass
 
@@ -64,7 +64,7 @@ def _first_order(pole: float) -> Filter:
 
 
 class Sampled(NamedTuple):
-    """A filter as the kernels take it: b, a of one length, a[0] = 1."""
+    """A filter as the kernels take it, a[0] = 1: b, a of one length, or a = (1) of a FIR filter."""
 
     b: Array
     a: Array
@@ -80,14 +80,27 @@ def sampled(one: Filter, slope: Filter | None = None) -> Sampled:
         b, a = np.convolve(b, slope.b), np.convolve(a, slope.a)
     if a[0] != 1.0 or not (np.all(np.isfinite(b)) and np.all(np.isfinite(a))) or a.sum() == 0.0:
         raise BadSpecification(f"filter b = {one.b}, a = {one.a}: need a[0] = 1, a(1) not 0")
+    if not np.any(a[1:]):
+        return Sampled(b, np.ones(1))
     size = max(b.size, a.size)
     return Sampled(np.pad(b, (0, size - b.size)), np.pad(a, (0, size - a.size)))
 
 
-@compiled_inline
+def settled(one: Sampled, x: float) -> Array:
+    """The state of the filter, of the length of b, last entry 0, that a past of `x` leaves."""
+    b, a = one.b, np.pad(one.a, (0, one.b.size - one.a.size))
+    left = b - a * float(b.sum() / a.sum())
+    return np.asarray(x * np.append(np.cumsum(left[:0:-1])[::-1], 0.0), dtype=np.float64)
+
+
+@compiled_exact
 def filtered(b: Array, a: Array, z: Array, x: float) -> float:
     """Next value of the filter at input x; z (n,), last entry 0, is its state."""
     out = b[0] * x + z[0]
-    for j in range(len(z) - 1):
-        z[j] = z[j + 1] + b[j + 1] * x - a[j + 1] * out
+    if len(a) == 1:
+        for j in range(len(z) - 1):
+            z[j] = z[j + 1] + b[j + 1] * x
+    else:
+        for j in range(len(z) - 1):
+            z[j] = z[j + 1] + b[j + 1] * x - a[j + 1] * out
     return float(out)

@@ -292,7 +292,7 @@ def prepared_loop(
         raise BadModel(f"reference of shape {r.shape}: need finite values, one per sample")
     if limit is not None and not limit > 0:
         raise BadModel(f"control limit {limit:g} V, must be > 0")
-    R, S, x = _observer_form(controller, start[0])
+    R, S, x = observer_form(controller, start[0])
     k_i, T_i = (force.k_i, force.T_i) if force else (0.0, 1.0)
     loop = PreparedLoop(
         motor=motor,
@@ -325,12 +325,12 @@ def checked_noise(noise: LoopNoise | None, n: int, plants: int, motor: bool) -> 
     return LoopNoise(columns[0], np.zeros((n, 1)) if motor else columns[1])
 
 
-def _observer_form(controller: RST, y_0: float) -> tuple[Array, Array, Array]:
+def observer_form(controller: RST, y_0: float) -> tuple[Array, Array, Array]:
     """R, S of one length (deg+1,), deg >= 2, S[0] = 1; the state that a past of y = y_0 leaves."""
     size = max(controller.R.size, controller.S.size, 3)
     R = np.pad(controller.R, (0, size - controller.R.size)) / controller.S[0]
     S = np.pad(controller.S, (0, size - controller.S.size)) / controller.S[0]
-    x = np.append(-y_0 * np.cumsum(R[:0:-1])[::-1], 0.0)
+    x = y_0 * np.append(-np.cumsum(R[:0:-1])[::-1], 0.0)
     return R, S, x
 
 

@@ -8,7 +8,7 @@ figure 1, upper.
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from identification.compiled import compiled, compiled_inline
+from identification.compiled import compiled, compiled_exact, compiled_inline
 from identification.simulation.karnopp_lanes import (
     GAIN,
     V_OLD,
@@ -50,11 +50,11 @@ RECORD_Y, RECORD_F, RECORD_V, RECORD_U, RECORD_MODE = range(5)
 RECORDS = 5
 
 
-@compiled_inline
+@compiled_exact
 def force_command(
     wanted: float, force: float, integral: float, k_p: float, k_int: float, limit: float
-) -> tuple[float, float]:
-    """Command [V] of the PI force controller, clipped, and its next integral.
+) -> tuple[float, float, float]:
+    """Command [V] of the PI force controller, clipped and not, and its next integral.
 
     The integral rests while the command is clipped and the error would drive it further out.
     """
@@ -62,10 +62,10 @@ def force_command(
     free = k_p * error + integral
     u = min(max(free, -limit), limit)
     driving = 0.0 if (free - u) * error > 0.0 else error
-    return u, integral + k_int * driving
+    return u, free, integral + k_int * driving
 
 
-@compiled_inline
+@compiled_exact
 def shift(x: Array, R: Array, S: Array, y: float, u: float) -> None:
     """Next state x (deg+1,), last entry 0, of S u = T r - R y in observer form."""
     for j in range(len(x) - 1):
@@ -112,7 +112,7 @@ def loop_kernel(
             wanted = feed[turn] - r_0 * measured + x[0]
             shift(x, R, S, measured, wanted)
             due, turn = due + ratio, turn + 1
-        u, integral = force_command(wanted, force + noise_f[k], integral, k_p, k_int, limit)
+        u, _, integral = force_command(wanted, force + noise_f[k], integral, k_p, k_int, limit)
         out[0, k], out[1, k], out[2, k], out[3, k] = y, v, force, u
         modes[k] = mode
         g = k1 * u
@@ -254,7 +254,7 @@ def march_loop(
             measured = y + (n_y + s[Y_NOISE * WIDTH + i])
             wanted = fed - leading[0] * measured + s[RST_STATE * WIDTH + i]
             felt = force + (n_f + s[F_NOISE * WIDTH + i])
-            u, s[INTEGRAL * WIDTH + i] = force_command(
+            u, _, s[INTEGRAL * WIDTH + i] = force_command(
                 wanted, felt, s[INTEGRAL * WIDTH + i], k_p, k_int, limit
             )
             shift_lane(s, i, leading, measured, wanted)

@@ -158,6 +158,12 @@ def margins(A: ArrayLike, B: ArrayLike, controller: RST) -> Margins:
     h = controller.h
     loop = _Loop(A, B, controller.R, controller.S)
     grid = _grid(poles, *(roots(c) for c in (A, B, controller.R, controller.S)))
+    if not np.all(loop.back(grid) + loop.forward(grid)):
+        # A S and B R both vanish there: that the computed pole lies inside is rounding alone.
+        raise BadSpecification(
+            "a closed-loop pole lies on the unit circle but for rounding: no margins can be told;"
+            " ask for faster poles"
+        )
     peak, peak_theta = _maximum(loop.output_sensitivity, grid)
     effort, effort_theta = _maximum(loop.input_sensitivity, grid)
     up, up_w, down, down_w = _gain_margins(loop, grid)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
 from design.drive_law import forgetting
-from design.filters import PASS, CompensatorFilters, sampled
-from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, prepared_loop
+from design.filters import PASS, CompensatorFilters, Sampled, sampled, settled
+from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, observer_form, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
 from design.rivals import RULES, DisturbanceObserver, Dither, FrictionObserver, IntegralPID
 from design.rst import RST
@@ -31,7 +31,7 @@ from design.servo_loop import SERVO_ROWS, servo_kernel
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.plant import Motor, Plant
-from identification.signals.clean import slope_filter
+from identification.signals.clean import Filter, slope_filter
 from identification.simulation.effect_table import ON_ACTUATOR, effect_table, pieces
 
 
@@ -59,6 +59,7 @@ class Servo:
     its sum while it would drive the command further out. W: in place of anti_windup, that of a
     `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own.
     direct: an actuator takes the position controller's output as its command, without a force loop.
+    rate: the reference is moved at most at this speed [m/s], None: at any.
 
     Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
@@ -72,6 +73,7 @@ class Servo:
     anti_windup: float | None = None
     W: tuple[float, ...] | None = None
     k_a: float | None = None
+    rate: float | None = None
     direct: bool = False
 
     def __post_init__(self) -> None:
@@ -148,19 +150,17 @@ def simulate_servo(
     base, gain = effect_signals(plant.effects, signals or {}, n)
     late = command_delay(plant.effects) / h
     t = h * np.arange(n, dtype=np.float64)
-    law = _law(servo, loop.R, loop.S, ratio * h)
-    shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
     k_a = 0.0
     if isinstance(plant.actuator, Motor):
         k_a = plant.actuator.k_a if servo.k_a is None else servo.k_a
-    limits = (loop.limit, math.inf if servo.force_limit is None else servo.force_limit)
+    law = servo_law(servo, h, k_a)
+    memory = servo_memory(servo, law, loop.start[0], loop.start[2])
+    shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
     out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
     y_noise, f_noise = (np.ascontiguousarray(one[:, 0]) for one in (loop.noise.y, loop.noise.F))
     servo_kernel(
-        p, h, ratio, pieces(table, h), codes, table.addresses, table.p, base, gain,
-        np.zeros(n + math.ceil(late) + 1), late, law,
-        _memory(law, loop.x.copy(), loop.start),
-        loop.reference, loop.feed, loop.pi, shake, limits, k_a,
+        p, h, pieces(table, h), codes, table.addresses, table.p, base, gain,
+        np.zeros(n + math.ceil(late) + 1), late, law, memory, loop.reference, shake,
         y_noise, f_noise, loop.start, out, modes,
     )  # fmt: skip
     y, v, F, u, measured, *inside = out
@@ -188,8 +188,10 @@ def friction_law(what: Countermeasure | None, h: float) -> Law:
         case FrictionObserver(m, F_vp, F_vn, q_v, q_F, r_y):
             kind, kalman = KALMAN, np.array([m, F_vp, F_vn, q_v, q_F, r_y])
     return Law(
-        RST_LAW, none, none, none, none, kind, law,
-        first.b, first.a, second.b, second.a, third.b, third.a, kalman, h,
+        position=RST_LAW, R=none, S=none, W=none, b_r=pass_.b, a_r=pass_.a, pid=none,
+        friction=kind, law=law, b_v=first.b, a_v=first.a, b_e=second.b, a_e=second.a,
+        b_c=third.b, a_c=third.a, kalman=kalman, h=h, k_i=0.0, k_int=0.0, k_a=0.0,
+        limit=math.inf, force_limit=math.inf, rate=math.inf, ratio=1,
     )  # fmt: skip
 
 
@@ -202,34 +204,50 @@ def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
         kalman[3:] = np.diag([variance, 1e-6, 1e2]).reshape(9)
     first = F_0 if law.friction == DISTURBANCE else y_0
     return Memory(
-        np.zeros(1), np.zeros(3),
-        settled(law.b_v, law.a_v, first), settled(law.b_e, law.a_e, y_0),
-        settled(law.b_c, law.a_c, 0.0), kalman, np.zeros(4),
+        x=np.zeros(1), pid=np.zeros(3), z_r=settled(Sampled(law.b_r, law.a_r), y_0),
+        z_v=settled(Sampled(law.b_v, law.a_v), first), z_e=settled(Sampled(law.b_e, law.a_e), y_0),
+        z_c=np.zeros(law.b_c.size), kalman=kalman, last=np.zeros(4),
+        held=np.array([y_0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
 
 
-def settled(b: Array, a: Array, x: float) -> Array:
-    """The state of the filter b/a, same length, last entry 0, that a past of `x` leaves."""
-    out = x * float(b.sum() / a.sum())
-    return np.append(np.cumsum((b * x - a * out)[:0:-1])[::-1], 0.0)
-
-
-def _law(servo: Servo, R: Array, S: Array, h: float) -> Law:
-    law = friction_law(servo.friction, h)
+def servo_law(servo: Servo, h: float, k_a: float = 0.0) -> Law:
+    """The servo as the kernels take it; its force loop runs every h [s], k_a [N/V] of a motor."""
+    ratio = max(1, round(servo.linear.h / h))
+    k_i, T_i = (servo.force.k_i, servo.force.T_i) if servo.force else (0.0, 1.0)
+    limit, force_limit, rate = (
+        math.inf if one is None else one
+        for one in (servo.control_limit, servo.force_limit, servo.rate)
+    )
+    law = friction_law(servo.friction, ratio * h)._replace(
+        k_i=k_i, k_int=k_i * h / T_i, k_a=k_a, limit=limit, force_limit=force_limit,
+        rate=rate * h, ratio=ratio,
+    )  # fmt: skip
     if isinstance(servo.position, RST):
-        return law._replace(R=R, S=S, W=_observer(S, servo, h))
+        R, S, _ = observer_form(servo.position, 0.0)
+        b_r, a_r = _reference_filter(servo.position)
+        return law._replace(R=R, S=S, W=_observer(S, servo, ratio * h), b_r=b_r, a_r=a_r)
     pid = servo.position
-    per_difference, pole = pid.T_d / pid.eps, math.exp(-h / pid.eps)
+    per_difference, pole = pid.T_d / pid.eps, math.exp(-ratio * h / pid.eps)
     rule = float(RULES.index(pid.rule))
-    constants = np.array([pid.k_R, h / pid.T_i, per_difference, pole, pid.zone, rule])
+    constants = np.array([pid.k_R, ratio * h / pid.T_i, per_difference, pole, pid.zone, rule])
     return law._replace(position=PID_LAW, pid=constants)
+
+
+def servo_memory(servo: Servo, law: Law, y_0: float, F_0: float) -> Memory:
+    """The state of the servo that has stood at y_0 [m] under F_0 [N]."""
+    _, _, x = observer_form(servo.linear, y_0)
+    return friction_memory(law, y_0, F_0)._replace(x=x)
+
+
+def _reference_filter(controller: RST) -> Sampled:
+    """T B_m/A_m, divided by S[0], for the kernels."""
+    lead = controller.A_m[0]
+    b = np.convolve(controller.T, controller.B_m) / (controller.S[0] * lead)
+    return sampled(Filter(tuple(b.tolist()), tuple((controller.A_m / lead).tolist())))
 
 
 def _observer(S: Array, servo: Servo, h: float) -> Array:
     if servo.W is None:
         return forgetting(S, servo.anti_windup, h)
     return np.pad(np.array(servo.W), (0, len(S) - len(servo.W)))
-
-
-def _memory(law: Law, x: Array, start: tuple[float, float, float]) -> Memory:
-    return friction_memory(law, start[0], start[2])._replace(x=x)

@@ -1,9 +1,11 @@
 """What a servo computes in one sample, compiled: position law, friction force, force loop.
 
-The same functions run inside the simulation (`design.servo`) and behind `step` of the sampled
-objects. Values that do not change are in `Law`, the rest in `Memory`.
+The same functions run inside the simulation (`design.servo`), behind `step` of the sampled objects,
+and are read by `design.program` for the code of a machine's controller: each operation is rounded
+by itself, in the written order. Values that do not change are in `Law`, the rest in `Memory`.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -11,8 +13,8 @@ import numpy as np
 from design.compensator import compensation_force
 from design.filters import filtered
 from design.loop_kernels import force_command, shift
-from identification.arrays import Array
-from identification.compiled import compiled
+from identification.arrays import Array, IntArray
+from identification.compiled import compiled, compiled_exact
 
 RST_LAW, PID_LAW = range(2)
 NO_COUNTERMEASURE, COMPENSATOR, DISTURBANCE, KALMAN = range(4)
@@ -22,24 +24,32 @@ K_R, PER_SUM, PER_DIFFERENCE, POLE, ZONE, RULE = range(6)
 SUM, SLOPE, ERROR = range(3)
 # Constants of the Kalman filter, and its memory: y, v, F_f, then the covariance by rows.
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
-# What one sample leaves besides the command.
+# What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
+R_MOVED, INTEGRAL_SUM, U_BEFORE = range(3)
 
 
 class Law(NamedTuple):
     """A servo's constants.
 
     position: RST_LAW with R, S and W, or PID_LAW with pid (6,). W, of the length of S: how what a
-    clipped command did not carry out is forgotten, W u = T r - R y + (W - S) taken. friction:
-    NO_COUNTERMEASURE, COMPENSATOR with law (14,), DISTURBANCE or KALMAN with kalman (6,), period
-    h [s]; b_v ... a_c: the filters of velocity (of the force, DISTURBANCE), error (of the position,
-    DISTURBANCE) and C.
+    clipped command did not carry out is forgotten, W u = T r - R y + (W - S) taken. b_r, a_r: the
+    filter T B_m/A_m of the reference. friction: NO_COUNTERMEASURE, COMPENSATOR with law (14,),
+    DISTURBANCE or KALMAN with kalman (6,), period h [s]; b_v ... a_c: the filters of velocity (of
+    the force, DISTURBANCE), error (of the position, DISTURBANCE) and C.
+
+    k_i, k_int: gains of the force error [V/N] and of its sum; k_a: of a motor, whose position
+    controller wants volts, or 0; limit: of the command [V]; force_limit: of the force reference
+    [N]; rate: what the reference may move in a sample [m]; each may be infinite. ratio: samples of
+    the force loop in one of the position controller.
     """
 
     position: int
     R: Array
     S: Array
     W: Array
+    b_r: Array
+    a_r: Array
     pid: Array
     friction: int
     law: Array
@@ -51,18 +61,30 @@ class Law(NamedTuple):
     a_c: Array
     kalman: Array
     h: float
+    k_i: float
+    k_int: float
+    k_a: float
+    limit: float
+    force_limit: float
+    rate: float
+    ratio: int
 
 
 class Memory(NamedTuple):
-    """A servo's state: controller, PID (3,), filters, Kalman filter (12,), last friction (4,)."""
+    """A servo's state: controller, PID (3,), filters of reference, velocity, error and C, Kalman
+    filter (12,), what the last sample left (4,), reference moved, sum of the force error and a
+    motor's command (3,), the force loop's samples since the position controller's turn (1,)."""
 
     x: Array
     pid: Array
+    z_r: Array
     z_v: Array
     z_e: Array
     z_c: Array
     kalman: Array
     last: Array
+    held: Array
+    turn: IntArray
 
 
 @compiled
@@ -87,7 +109,7 @@ def kalman_step(c: Array, s: Array, h: float, y: float, F: float) -> None:
     s[3:] = 0.5 * (P + P.T).reshape(9)
 
 
-@compiled
+@compiled_exact
 def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
     """F_compf [N]: what is added to the force reference at reference r, position y [m], force F."""
     last = s.last
@@ -106,10 +128,11 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
     return float(last[ADDED])
 
 
-@compiled
-def position_force(c: Law, s: Memory, r: float, fed: float, y: float) -> float:
-    """What the position controller asks for at reference r, T r = fed and position y [m]."""
+@compiled_exact
+def position_force(c: Law, s: Memory, r: float, y: float) -> float:
+    """What the position controller asks for at reference r and position y [m]."""
     if c.position == RST_LAW:
+        fed = filtered(c.b_r, c.a_r, s.z_r, r)
         return float(fed - c.R[0] * y + s.x[0])
     e = r - y
     s.pid[SLOPE] = c.pid[POLE] * s.pid[SLOPE] + c.pid[PER_DIFFERENCE] * (e - s.pid[ERROR])
@@ -119,7 +142,7 @@ def position_force(c: Law, s: Memory, r: float, fed: float, y: float) -> float:
     return float(c.pid[K_R] * (e + s.pid[SUM] + s.pid[SLOPE]))
 
 
-@compiled
+@compiled_exact
 def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> None:
     """The position controller's next state, after `taken` of the `asked` was carried out."""
     if c.position == RST_LAW:
@@ -134,47 +157,44 @@ def position_moved(c: Law, s: Memory, y: float, asked: float, taken: float) -> N
         s.pid[SUM] += c.pid[PER_SUM] * e
 
 
-@compiled
-def servo_sample(
-    c: Law,
-    s: Memory,
-    acts: bool,
-    r: float,
-    fed: float,
-    y: float,
-    F: float,
-    wanted: float,
-    integral: float,
-    pi: tuple[float, float],
-    shake: float,
-    limits: tuple[float, float],
-    k_a: float,
-) -> tuple[float, float, float]:
-    """Command [V], what the position controller wants, and the force loop's integral.
+@compiled_exact
+def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) -> float:
+    """Command [V] of one sample at reference r, position y [m] and force F [N]; shake: the dither.
 
-    acts: whether the position controller has its turn; k_a: of a motor, whose controller wants
-    volts, or 0; pi: gains of the force loop, 0 where the controller wants volts too; shake: the
-    dither [V]; limits: of the command [V] and of the force reference [N]. Where the command is
-    clipped, what was carried out is the force reference that gives it.
+    Without a force loop, k_i = 0, the position controller gives the command. A motor's force is not
+    measured: it is that of the command before. Where the command is clipped, what was carried out
+    is the force reference that gives it.
     """
-    limit, most = limits
-    asked = position_force(c, s, r, fed, y) if acts else wanted
-    added = friction_force(c, s, r, y, F) if acts else float(s.last[ADDED])
-    if k_a != 0.0 or pi[0] == 0.0:
-        free = asked + (added / k_a if k_a != 0.0 else 0.0)
-        held = min(max(free, -limit), limit)
-        u = min(max(held + shake, -limit), limit)
-        wanted, taken = asked, asked + held - free
+    aim = r
+    if c.rate < math.inf:
+        aim = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
+        s.held[R_MOVED] = aim
+    acts = c.ratio == 1 or s.turn[0] == 0
+    asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
+    added = 0.0
+    if c.friction != NO_COUNTERMEASURE:
+        force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
+        added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
+    if c.k_a != 0.0 or c.k_i == 0.0:
+        free = asked + added / c.k_a if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE else asked
+        u = min(max(free, -c.limit), c.limit)
+        taken = asked + (u - free)
+        s.last[WANTED] = asked
     else:
-        wanted = min(max(asked + added, -most), most) - added
-        before = integral
-        u, integral = force_command(wanted + added, F, integral, pi[0], pi[1], limit)
-        taken = wanted
-        free = pi[0] * (wanted + added - F) + before
-        if free != u and pi[0] > 0.0:
-            taken = F + (u - before) / pi[0] - added
-        u = min(max(u + shake, -limit), limit)
+        wanted = asked + added if c.friction != NO_COUNTERMEASURE else asked
+        total = min(max(wanted, -c.force_limit), c.force_limit)
+        before = s.held[INTEGRAL_SUM]
+        u, free, s.held[INTEGRAL_SUM] = force_command(total, F, before, c.k_i, c.k_int, c.limit)
+        s.last[WANTED] = total - added if c.friction != NO_COUNTERMEASURE else total
+        taken = s.last[WANTED]
+        if u != free and c.k_i > 0.0:
+            taken = F + (u - before) / c.k_i - added
+    if shake != 0.0:
+        u = min(max(u + shake, -c.limit), c.limit)
     if acts:
         position_moved(c, s, y, asked, taken)
-    s.last[WANTED] = wanted
-    return u, wanted, integral
+    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE:
+        s.held[U_BEFORE] = u
+    if c.ratio > 1:
+        s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0
+    return float(u)

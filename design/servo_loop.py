@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from design.servo_kernels import ADDED, RAW, SPEED, WANTED, Law, Memory, servo_sample
+from design.servo_kernels import ADDED, RAW, SPEED, WANTED, Law, Memory, servo_step
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
 from identification.simulation.effect_run import place_of
@@ -23,7 +23,6 @@ SERVO_ROWS = 9
 def servo_kernel(
     p: Array,
     h: float,
-    ratio: int,
     count: int,
     codes: IntArray,
     addresses: IntArray,
@@ -35,11 +34,7 @@ def servo_kernel(
     law: Law,
     memory: Memory,
     reference: Array,
-    feed: Array,
-    pi: tuple[float, float],
     shake: Array,
-    limits: tuple[float, float],
-    k_a: float,
     noise_y: Array,
     noise_f: Array,
     start: tuple[float, float, float],
@@ -51,28 +46,23 @@ def servo_kernel(
     Rows of out: y, v, F, u, position measured, then the position controller's force reference,
     F_comp, F_compf and its velocity. codes (k,), addresses (k, 3), q (k, P): the effects; signals
     base (k, n, S) + gain (k, S) F; history: the command after the dead zone, preceded by what it
-    was before the start; late: delay in samples; ratio: samples of the force loop in one of the
-    position controller, feed (ceil(n/ratio),); the rest as in `servo_sample`.
+    was before the start; late: delay in samples; the rest as in `servo_step`.
     """
     plant = parameters(p, 0)
     y, v, F = start
     z, spare = np.zeros(len(codes)), np.zeros(len(codes))
     past = len(history) - len(modes)
     bristle = place_of(codes, ON_BRISTLE)
-    motor = k_a != 0.0
+    motor = law.k_a != 0.0
     mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
-    a, u, integral, wanted = 0.0, 0.0, 0.0, 0.0
+    a, u = 0.0, 0.0
     for k in range(len(modes)):
         now, s = k * h, base[:, k] + gain * F
         if k == 0:
             start_states(codes, addresses, q, s, z, plant, now, y, v, F, u, False)
         shown = shown_position(h, codes, addresses, q, s, z, plant, now, y, v, F, u)
         measured, felt = shown + noise_y[k], F + noise_f[k]
-        acts = k % ratio == 0
-        u, wanted, integral = servo_sample(
-            law, memory, acts, reference[k], feed[k // ratio], measured, felt, wanted, integral, pi,
-            shake[k], limits, k_a,
-        )  # fmt: skip
+        u = servo_step(law, memory, reference[k], measured, felt, shake[k])
         history[past + k] = acting_command(codes, addresses, q, s, z, now, u, h)
         g = plant[K1] * delayed(history, past + k, late)
         if motor:

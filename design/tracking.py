@@ -19,7 +19,6 @@ from design.pid import PIDGains, pid_to_rst
 from design.polynomial import ComplexArray
 from design.rst import RST, closed_loop, closed_loop_poles
 from identification.arrays import Array
-from identification.compiled import compiled
 
 LEAST_POLES = 2  # closed-loop poles that y/r keeps: fewer ask for a jump of the velocity
 LEADS = 11  # parts of the lag tried that T takes off by a lead, 0 to 1
@@ -122,21 +121,6 @@ def integrates(A: Array, controller: RST) -> bool:
     """Whether the loop gain is infinite at frequency 0."""
     size = float(np.abs(A).sum() * np.abs(controller.S).sum())
     return abs(float(A.sum() * controller.S.sum())) < 1e-9 * size
-
-
-def rate_limited(r: Array, rate: float | None, h: float) -> Array:
-    """The reference [m] moved by at most `rate` h in a sample, from its first value on; (n,)."""
-    if rate is None:
-        return r
-    out = np.array(r)
-    _limit(out, rate * h)
-    return out
-
-
-@compiled
-def _limit(r: Array, most: float) -> None:
-    for k in range(1, len(r)):
-        r[k] = r[k - 1] + min(max(r[k] - r[k - 1], -most), most)
 
 
 def _travel(step: float, rate: float | None) -> float:

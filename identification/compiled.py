@@ -33,6 +33,12 @@ def compiled_fast(function: Callable[Arguments, Result]) -> Callable[Arguments, 
     return _jit(function, fastmath=True)
 
 
+def compiled_exact(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
+    """As `compiled_inline`, each operation rounded by itself and in the written order: what a
+    controller's code has to do in any language, bit for bit."""
+    return _jit(function, fastmath=False, forceinline=True)
+
+
 def compiled_inline(function: Callable[Arguments, Result]) -> Callable[Arguments, Result]:
     """As `compiled`, always inlined into its caller (for the innermost vector loops)."""
     return _jit(function, fastmath=CONTRACT, forceinline=True)

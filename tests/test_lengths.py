@@ -9,7 +9,12 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 MOST_LINES, MOST_ARGUMENTS = 60, 8
-COMPILED = {"compiled", "compiled_inline", "compiled_fast"}  # kernels take what they need
+COMPILED = {
+    "compiled",
+    "compiled_exact",
+    "compiled_inline",
+    "compiled_fast",
+}  # kernels take what they need
 EQUATIONS = {"value", "evolve", "initial"}  # of an effect; compiled under one signature
 
 

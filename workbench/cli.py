@@ -25,6 +25,7 @@ COMMANDS = {
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "validate": "Check a design on a plant in simulation.",
+    "export": "Write a design as code for its machine: C, PLC, FMU.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "effects": "List the effects that 'trace' knows; check your own.",
     "paper": "Run the paper in simulation, its figures beside ours.",

@@ -103,8 +103,12 @@ class OutputFolder:
 
     def write_text(self, name: str, text: str) -> Path:
         """Path of the file that now holds `text`."""
+        return self.write(name, text)
+
+    def write(self, name: str, content: str | bytes) -> Path:
+        """Path of the file that now holds the content, a text in UTF-8."""
         target = self.path / name
-        target.write_text(text, encoding="utf-8")
+        target.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
         return target
 
     def _publish(self) -> None:

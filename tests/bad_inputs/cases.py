@@ -10,7 +10,7 @@ import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import partial
-from itertools import count, islice
+from itertools import chain, count, islice
 from pathlib import Path
 from typing import Any
 
@@ -424,7 +424,8 @@ def _using(name: str, path: str, shop: Shop, number: int) -> list[str]:
     if name == "state":
         return ["drift", model, *log, "--state", path]
     if name == "design":
-        return ["validate", model, path]
+        targets = [["--to", one] for one in ("c", "st", "plcopen", "fmu", "json", "mat")]
+        return [["validate", model, path], ["export", path, *chain(*targets)]][number // 4 % 2]
     return [
         ["design", path],
         ["predict", path, *log],
@@ -573,7 +574,8 @@ def _lines(shop: Shop, path: str, number: int) -> list[str]:
         ["reidentify", path, "--registry", "r.db"],
         ["trace", log, "--test", path, "--card", card],
         ["validate", model, design, "--plant", path],
-    ][number % 13]
+        ["export", path, "--to", "c"],
+    ][number % 14]
 
 
 def names(rng: np.random.Generator) -> Family:

@@ -191,12 +191,12 @@ def test_at_rest_on_its_target_it_stays(controller: RST, y_0: float) -> None:
 
 
 def test_integral_rests_while_the_limit_holds_the_error_up() -> None:
-    command: Callable[..., tuple[float, float]] = force_command
-    assert command(10.0, 0.0, 0.0, 0.02, 0.001, 5.0) == pytest.approx((0.2, 0.01))
-    assert command(400.0, 0.0, 1.0, 0.02, 0.001, 5.0) == pytest.approx((5.0, 1.0))
-    assert command(-400.0, 0.0, -1.0, 0.02, 0.001, 5.0) == pytest.approx((-5.0, -1.0))
+    command: Callable[..., tuple[float, float, float]] = force_command
+    assert command(10.0, 0.0, 0.0, 0.02, 0.001, 5.0) == pytest.approx((0.2, 0.2, 0.01))
+    assert command(400.0, 0.0, 1.0, 0.02, 0.001, 5.0) == pytest.approx((5.0, 9.0, 1.0))
+    assert command(-400.0, 0.0, -1.0, 0.02, 0.001, 5.0) == pytest.approx((-5.0, -9.0, -1.0))
     # On its way back it integrates although it is still clipped.
-    assert command(-10.0, 0.0, 9.0, 0.02, 0.001, 5.0) == pytest.approx((5.0, 8.99))
+    assert command(-10.0, 0.0, 9.0, 0.02, 0.001, 5.0) == pytest.approx((5.0, 8.8, 8.99))
 
 
 def test_without_compensation_pd_rests_off_target_and_pid_pushes_on() -> None:

@@ -156,6 +156,18 @@ def test_sensitivities_add_to_one(paper: tuple[Array, Array, RST]) -> None:
     np.testing.assert_allclose(S.S_yr[0], 2.8 / 2.8306, rtol=1e-3)
 
 
+def test_a_pole_that_only_rounding_moves_inside_is_refused() -> None:
+    # R and S both vanish at z = 1, and so does P; its computed root there lies at 1 -+ 1e-8.
+    said = set()
+    for a in np.linspace(0.2, 0.95, 40):
+        A, B = np.convolve([1.0, -1.0], [1.0, -a]), np.array([0.0, 1e-4, 1e-4 * a])
+        one = np.array([1.0, -1.0])
+        with pytest.raises(BadSpecification) as caught:
+            margins(A, B, RST(100.0 * one, one, 100.0 * one, 0.01))
+        said.add("but for rounding" in str(caught.value))
+    assert True in said
+
+
 def test_unstable_loop_is_refused_with_its_pole() -> None:
     with pytest.raises(BadSpecification, match=r"unstable: pole z = 1\.5"):
         margins([1.0, -0.5], [0.0, -1.0], RST(np.ones(1), np.ones(1), np.ones(1), H))

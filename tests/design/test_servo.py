@@ -144,6 +144,17 @@ def test_the_observers_find_the_friction(what: Countermeasure) -> None:
     assert rest(found) < 0.1 * rest(run(Servo(PD, PI)))
 
 
+@pytest.mark.parametrize("ratio", [1, 5])
+def test_a_limited_reference_is_the_moved_one_given(ratio: int) -> None:
+    position = pd_to_rst(200.0, 0.1, 0.2, ratio * H)
+    moved = np.minimum(0.05, 0.1 * H * np.maximum(np.arange(N) - 199, 0))
+    limited = simulate_servo(PLANT, Servo(position, PI, FOUR, rate=0.1), step(), H)
+    given = simulate_servo(PLANT, Servo(position, PI, FOUR), moved, H)
+    assert np.array_equal(limited.r, step())
+    assert np.max(np.abs(limited.y - given.y)) < 1e-9
+    assert np.max(np.abs(limited.y - run(Servo(PD, PI, FOUR)).y)) > 1e-3
+
+
 def test_dither_shakes_the_command() -> None:
     shaken = run(Servo(PD, PI, dither=Dither(0.2, 50.0)))
     plain = run(Servo(PD, PI))

@@ -14,7 +14,6 @@ from design.tracking import (
     followed,
     integrates,
     pid_candidates,
-    rate_limited,
     rst_candidates,
     static_gain,
 )
@@ -80,7 +79,7 @@ def test_a_limited_step_asks_for_no_more_force() -> None:
     demand = Demand(step=0.1, force=150.0)
     one = followed([(A, B)], controller(), rst_candidates(A, B, controller(), POLES, 5), demand)
     assert one.rate is not None and one.overshoot <= demand.overshoot
-    r = rate_limited(np.full(600, 0.1) * (np.arange(600) > 0), one.rate, H)
+    r = np.minimum(0.1, one.rate * H * np.arange(600))
     force = response(one.T, r, A)
     assert np.max(force) == pytest.approx(150.0, rel=0.02)
     free = response(one.T, np.where(np.arange(600) > 0, 0.1, 0.0), A)
@@ -153,14 +152,3 @@ def test_set_point_weights_are_read_back(b: float, c: float) -> None:
     assert (gains.b, gains.c) == pytest.approx((b, c), abs=1e-9)
     for T in pid_candidates(gains, H):
         assert T.sum() == pytest.approx(plain.R.sum(), rel=1e-9)
-
-
-def test_the_rate_limit_moves_towards_the_reference_and_stays_on_a_slow_one() -> None:
-    r = np.array([1.0, 1.0, 2.0, 2.0, 2.0, 0.0, 0.0, 0.0, 0.05])
-    before = r.copy()
-    moved = rate_limited(r, 50.0, H)
-    assert moved == pytest.approx([1.0, 1.0, 1.5, 2.0, 2.0, 1.5, 1.0, 0.5, 0.05])
-    assert np.array_equal(r, before)
-    slow = np.sin(0.01 * np.arange(500))
-    assert rate_limited(slow, 1.1, H) == pytest.approx(slow, abs=1e-15)
-    assert rate_limited(r, None, H) is r

@@ -217,6 +217,32 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
 
 
+def test_export_writes_code(shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    design, out = str(shop / "design/design.json"), tmp_path / "e"
+    every = ["c", "st", "plcopen", "fmu", "json", "mat"]
+    command = ["export", design, "--name", "Achse 1", "--out", str(out)]
+    found = as_json(capsys, [*command, *(word for one in every for word in ("--to", one))])
+    wanted = {f"Achse_1.{kind}" for kind in ("h", "c", "st", "xml", "fmu", "json", "mat")}
+    assert files(out) == set(found["files"]) == wanted
+    assert found["name"] == "Achse_1"
+    told = json.loads(Path(design).read_text())["recommendation"]
+    assert (found["controller"], found["compensator"]) == (told["controller"], told["compensator"])
+    assert [one["name"] for one in found["inputs"]] == ["r", "y", "F_e"]
+    assert found["h"] == json.loads(Path(design).read_text())["force"]["h"]["value"]
+    assert main([*command, "--to", "c", "--controller", "pid", "--no-compensator"]) == 0
+    shown = capsys.readouterr().out
+    assert shown.startswith("short: PID controller\n")
+    assert "Achse_1.c" in shown and "Achse_1_self_test" in shown
+    for arguments, said in (
+        (["--to", "c", "--controller", "present"], "no present controller"),
+        (["--to", "mat", "--precision", "single"], "--precision single is for c, st, plcopen"),
+        (["--to", "c", "--name", "--"], "no letter or digit"),
+        (["--to", "pascal"], "'pascal' is not one of"),
+        ([], "Missing option '--to'"),
+    ):
+        assert said in refusal(capsys, ["export", design, *arguments], 2)
+
+
 def test_validate_passes_and_fails_with_its_status(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -20,6 +20,7 @@ of an effect is a number in SI or a text with its unit; one that has a default m
     position = { kind = "PID", k_R = 1754.0, T_d = 0.018, T_i = 0.072, eps = 0.2 }
     force = { k_i = 0.02, T_i = 0.05 }                  # none with a motor: the force is exact
     control_limit_v = 5.0
+    compensator = { N_c = 2.0, e_T = 0.003 }            # (4); friction = { m = ..., ... }: others
 """
 
 import math
@@ -90,12 +91,23 @@ class RecipeForcePI:
 
 
 @dataclass(frozen=True)
+class RecipeCompensator:
+    """The compensator (4): N_c [-], e_T [m]; friction: that it knows, None: the plant's."""
+
+    N_c: float
+    e_T: float
+    friction: Karnopp | None = None
+
+
+@dataclass(frozen=True)
 class LoopSpec:
-    """Position controller, force controller (`None` for a motor) and limit of the command [V]."""
+    """Position controller, force controller (`None` for a motor), limit of the command [V] and
+    friction compensator (`None` for none)."""
 
     position: RecipePD | RecipePID | RecipeRST
     force: RecipeForcePI | None = None
     control_limit: float | None = None
+    compensator: RecipeCompensator | None = None
 
 
 @dataclass(frozen=True)
@@ -296,19 +308,6 @@ class ForceSection(CardTable):
     T_i: Positive
 
 
-class LoopSection(CardTable):
-    """`LoopSpec` as a card writes it."""
-
-    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")]
-    force: ForceSection | None = None
-    control_limit_v: Positive | None = None
-
-    def value(self) -> LoopSpec:
-        """The loop."""
-        force = RecipeForcePI(self.force.k_i, self.force.T_i) if self.force else None
-        return LoopSpec(self.position.value(), force, self.control_limit_v)
-
-
 class FrictionSection(CardTable):
     """The nine parameters; signs are checked by `Karnopp`."""
 
@@ -321,6 +320,34 @@ class FrictionSection(CardTable):
     dv_n: float
     F_sp: float
     F_sn: float
+
+
+class CompensatorSection(CardTable):
+    """`RecipeCompensator` as a card writes it."""
+
+    N_c: Annotated[float, Field(gt=1)] = 2.0
+    e_T: Positive
+    friction: FrictionSection | None = None
+
+    def value(self) -> RecipeCompensator:
+        """The compensator."""
+        known = Karnopp(**self.friction.model_dump()) if self.friction else None
+        return RecipeCompensator(self.N_c, self.e_T, known)
+
+
+class LoopSection(CardTable):
+    """`LoopSpec` as a card writes it."""
+
+    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")]
+    force: ForceSection | None = None
+    control_limit_v: Positive | None = None
+    compensator: CompensatorSection | None = None
+
+    def value(self) -> LoopSpec:
+        """The loop."""
+        force = RecipeForcePI(self.force.k_i, self.force.T_i) if self.force else None
+        beside = self.compensator.value() if self.compensator else None
+        return LoopSpec(self.position.value(), force, self.control_limit_v, beside)
 
 
 class ActuatorSection(CardTable):

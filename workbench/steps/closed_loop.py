@@ -10,8 +10,7 @@ from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
 from design.servo import Compensation, Servo, ServoRun, simulate_servo
-from design.tracking import rate_limited
-from identification.arrays import Array, frozen
+from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
@@ -43,6 +42,20 @@ class DrivenLoop:
     def h(self) -> float:
         """The period of the loop's samples [s]."""
         return self.force.h if self.force else self.law.h
+
+    @property
+    def servo(self) -> Servo:
+        """The loop as `simulate_servo` and `design.controller_program` take it."""
+        return Servo(
+            self.law.rst,
+            None if self.force is None else ForcePI(self.force.k_i, self.force.T_i),
+            friction=self.compensation,
+            control_limit=self.limit,
+            W=self.law.W,
+            k_a=self.k_a,
+            direct=self.direct,
+            rate=self.rate,
+        )
 
 
 def driven_loop(
@@ -106,26 +119,15 @@ def run_driven(
             raise BadModel("the machine has an actuator, the design no force loop for it")
     elif loop.force is not None:
         raise BadModel("the design has a force loop, the machine no actuator for it")
-    force = None if loop.force is None else ForcePI(loop.force.k_i, loop.force.T_i)
-    servo = Servo(
-        loop.law.rst,
-        force,
-        friction=loop.compensation,
-        control_limit=limit_on(machine, loop),
-        W=loop.law.W,
-        k_a=loop.k_a,
-        direct=direct,
-    )
-    run = simulate_servo(
+    return simulate_servo(
         plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
-        servo,
-        rate_limited(r, loop.rate, loop.h),
+        replace(loop.servo, control_limit=limit_on(machine, loop), direct=direct),
+        r,
         loop.h,
         noise=_noise(machine, len(r), rng),
         start=(float(r[0]), 0.0, 0.0),
         signals=_chambers(machine.rig),
     )
-    return replace(run, r=frozen(r))
 
 
 def limit_on(machine: Model, loop: DrivenLoop) -> float | None:

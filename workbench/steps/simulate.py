@@ -5,11 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from design.compensator import Compensator
 from design.effect_loop import simulate_effect_loop
+from design.filters import filters_at
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
+from design.servo import Compensation
 from identification.arrays import Array
 from identification.errors import BadCard, BadModel
 from identification.log import Log, Rig
@@ -77,12 +80,22 @@ def _in_loop(
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
     cascade = Cascade(_position(recipe), force, loop.control_limit)
     parts = (recipe.plant, cascade, reference, recipe.h)
+    beside = _compensation(recipe)
     run: LoopRun
-    if recipe.plant.effects:
-        run = simulate_effect_loop(*parts, noise=noise, signals=chambers)
+    if recipe.plant.effects or beside:
+        run = simulate_effect_loop(*parts, noise=noise, signals=chambers, friction=beside)
     else:
         run = simulate_loop(*parts, noise=noise)
     return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
+
+
+def _compensation(recipe: Recipe) -> Compensation | None:
+    """The recipe's compensator behind the filters that a design has at the recipe's period."""
+    asked = recipe.loop.compensator if recipe.loop else None
+    if asked is None:
+        return None
+    compensator = Compensator(asked.friction or recipe.plant.friction, asked.N_c, asked.e_T)
+    return Compensation(compensator, filters_at(recipe.h))
 
 
 def _open_loop(recipe: Recipe, u: Array, rng: np.random.Generator, chambers: Chambers) -> _Run:

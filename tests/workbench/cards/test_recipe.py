@@ -9,7 +9,14 @@ from identification.errors import BadCard
 from identification.model.plant import Actuator, Motor
 from identification.signals.excitation import Multisine, Ramps, RandomSteps, Steps, Sum
 from workbench.cards.card import load_card
-from workbench.cards.recipe import Recipe, RecipeForcePI, RecipePD, RecipePID, RecipeRST
+from workbench.cards.recipe import (
+    Recipe,
+    RecipeCompensator,
+    RecipeForcePI,
+    RecipePD,
+    RecipePID,
+    RecipeRST,
+)
 
 HEAD = '[card]\nname = "a"\n[rig]\nkind = "force"\n'
 RECIPE = """
@@ -161,6 +168,22 @@ def test_open_loop_by_command_and_motor(tmp_path: Path) -> None:
     assert found.plant.actuator == Motor(35.15)
 
 
+def test_a_compensator_knows_the_plant_s_friction_or_another(tmp_path: Path) -> None:
+    nine = "m = 2, F_cp = 10, F_cn = 11, F_vp = 1, F_vn = 1, dv_p = 0.1, dv_n = -0.1, F_sp = 20"
+    end, other = "T_i = 0.05 } }", f"friction = {{ {nine}, F_sn = -21 }}"
+    for given, wanted in (
+        ("e_T = 0.003", None),
+        (f"N_c = 3, e_T = 0.003, {other}", -21.0),
+    ):
+        asked = f"T_i = 0.05 }}, compensator = {{ {given} }} }}"
+        found = recipe(tmp_path, RECIPE.replace(end, asked))
+        assert found.loop is not None
+        beside = found.loop.compensator
+        assert isinstance(beside, RecipeCompensator) and beside.e_T == 0.003
+        assert beside.N_c == (2.0 if wanted is None else 3.0)
+        assert (beside.friction and beside.friction.F_sn) == wanted
+
+
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
@@ -173,6 +196,8 @@ def test_open_loop_by_command_and_motor(tmp_path: Path) -> None:
         ("actuator = { k1 = 19530.0, k2 = 10405.0 }", "", "one of 'actuator' and 'motor'"),
         ("seed = 7", 'drive = "command"', "needs a 'loop'"),
         (", force = { k_i = 0.02, T_i = 0.05 }", "", "needs loop.force with an actuator"),
+        ("T_i = 0.05 } }", "T_i = 0.05 }, compensator = { e_T = 0 } }", "compensator.e_T] 0"),
+        ("T_i = 0.05 } }", "T_i = 0.05 }, compensator = { e_T = 1, N_c = 1 } }", "N_c] 1"),
         ("h_s = 1e-3", "h_s = 0", "[recipe.h_s] 0: "),
         ("duration_s = 2.0", "duration_s = 1e-4", "makes 0.1 samples, 100 to 1e+08 needed"),
         ("duration_s = 2.0", "duration_s = 1e15", "makes 1e+18 samples"),

@@ -12,10 +12,17 @@ from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog
 from identification.log import Log, Rig
 from identification.model.plant import Motor
+from identification.signals.excitation import Steps
 from tests.chain import EMPS, model_of, short_recipe
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import exact
-from workbench.cards.recipe import LoopSpec, Recipe
+from workbench.cards.recipe import (
+    LoopSpec,
+    Recipe,
+    RecipeCompensator,
+    RecipeForcePI,
+    RecipePD,
+)
 from workbench.documents.model import Model
 from workbench.logs.fetch import card_path
 from workbench.logs.runs import read_log
@@ -209,7 +216,7 @@ def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     whole = replace(plain, effects={"spring": exact(spring, "linear")})
     assert [one.key for one in in_the_loop(whole)] == ["spring"]
     assert effects_left_out(whole) is None
-    r = np.repeat([0.0, 0.05], 200)
+    r = np.repeat([0.0, 0.05], round(2.0 / found.rst.h))
     one, other = (
         run_loop(machine, found, found.rst, r, np.random.default_rng(0))
         for machine in (plain, whole)
@@ -245,3 +252,19 @@ def test_effects_whose_signals_no_simulation_makes_are_left_out_with_a_word() ->
         effects_left_out(whole)
         == "simulated without the model's effects pressure_dependent_friction"
     )
+
+
+def test_a_recipe_s_compensator_takes_the_error_at_rest_away() -> None:
+    loop = LoopSpec(RecipePD(200.0, 0.1, 0.2), RecipeForcePI(0.02, 0.05))
+    recipe = replace(RECIPE, loop=loop, reference=Steps((0.0, 0.05), 2.0), duration=8.0)
+
+    def left(one: Recipe) -> float:
+        log = record("pd", one)
+        still = slice(round(3.5 / one.h), round(4.0 / one.h))
+        return float(np.max(np.abs(log["r"] - log["y"])[still]))
+
+    own = replace(recipe, loop=replace(loop, compensator=RecipeCompensator(2.0, 0.003)))
+    assert left(own) < 0.1 * left(recipe)
+    wrong = replace(recipe.plant.friction, F_sp=0.3, F_sn=-0.3, F_cp=0.2, F_cn=0.2)
+    blind = replace(loop, compensator=RecipeCompensator(2.0, 0.003, wrong))
+    assert left(replace(recipe, loop=blind)) > 0.5 * left(recipe)

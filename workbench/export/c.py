@@ -1,0 +1,105 @@
+"""A controller as C99: one header, one source, no allocation, no dependency."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from design.program import State, Variable
+from workbench.export.c_syntax import C, c_syntax
+from workbench.export.exported import Exported
+from workbench.export.filled import filled, lead_of, rows, title_of
+from workbench.export.syntax import INDENT
+
+TYPES = {"real": "real", "integer": "int", "boolean": "int"}
+
+
+def c_files(what: Exported) -> dict[str, str]:
+    """The header and the source, by file name."""
+    program = what.program
+    c = c_syntax(program, what.precision)
+    test = what.test
+    common: dict[str, Any] = {
+        "title": title_of(what),
+        "lead": lead_of(what),
+        "name": program.name,
+        "h": program.h,
+        "period": c.number(program.h),
+        "real": "float" if what.precision == "single" else "double",
+        "inputs": program.inputs,
+        "output": program.output,
+        "position_unit": program.inputs[0].unit,
+        "samples": len(test.outputs),
+        "states": [_declared_state(one, program.name) for one in program.states],
+    }
+    source = filled(
+        "controller.c",
+        **common,
+        zero=c.number(0.0),
+        constants=[{**vars(one), "value": c.number(one.value)} for one in program.constants],
+        tables=[
+            {"name": one.name, "meaning": one.meaning, **_numbers(one.values, c)}
+            for one in program.tables
+        ],
+        starts=[
+            {"name": one.name, **_numbers(one.at_rest, c)}
+            for one in program.states
+            if one.array and any(one.at_rest)
+        ],
+        helpers=list(_helpers(what, c)),
+        reset=[line for one in program.states for line in _reset(one, c)],
+        locals=_declared_locals((*program.locals, Variable(program.output.name)), c),
+        step=c.lines(program.statements),
+        test_inputs=rows(
+            "{" + ", ".join(c.number(v) for v in row) + "}" for row in test.inputs.tolist()
+        ),
+        test_outputs=rows(c.number(v) for v in test.outputs.tolist()),
+    )
+    return {f"{program.name}.h": filled("controller.h", **common), f"{program.name}.c": source}
+
+
+def _numbers(values: tuple[float, ...], c: C) -> dict[str, object]:
+    return {"size": len(values), "lines": rows(c.number(v) for v in values)}
+
+
+def _declared_state(one: State, name: str) -> dict[str, str]:
+    kind = "int" if one.kind == "integer" else f"{name}_real"
+    size = f"[{len(one.at_rest)}]" if one.array else ""
+    return {"type": kind, "declared": one.name + size, "meaning": one.meaning}
+
+
+def _declared_locals(variables: tuple[Variable, ...], c: C) -> list[str]:
+    """Declarations, one a kind."""
+    kinds: dict[str, list[str]] = {}
+    for one in variables:
+        kinds.setdefault(TYPES[one.kind], []).append(c.name(one.name))
+    lines = []
+    for kind, names in kinds.items():
+        first, *others = rows(names)
+        lines += [f"{kind} {first}", *(INDENT + line for line in others)]
+        lines[-1] += ";"
+    return lines
+
+
+def _helpers(what: Exported, c: C) -> Iterator[str]:
+    """Functions that the step uses. They are Python's min and max, which the simulation has."""
+    used = "\n".join(c.lines(what.program.statements))
+    bodies = {
+        "min": ("real a, real b", "b < a ? b : a"),
+        "max": ("real a, real b", "b > a ? b : a"),
+        "abs": ("real a", f"a > {c.number(0.0)} ? a : {c.number(0.0)} - a"),
+    }
+    for key, (given, body) in bodies.items():
+        function = c.functions[key]
+        if f"{function}(" in used:
+            yield f"static real {function}({given})\n{{\n    return {body};\n}}"
+
+
+def _reset(one: State, c: C) -> Iterator[str]:
+    """Lines that put a state at rest at y."""
+    place = c.name(one.name)
+    if not one.array:
+        still = "0" if one.kind == "integer" else c.number(0.0)
+        value = {0.0: still, 1.0: "y"}.get(one.at_rest[0], f"{c.number(one.at_rest[0])} * y")
+        yield c.assigned(place, value)
+        return
+    value = f"{one.name}_at_1[j] * y" if any(one.at_rest) else c.number(0.0)
+    yield from c.repeated("j", len(one.at_rest), [c.assigned(f"{place}[j]", value)])

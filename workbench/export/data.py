@@ -1,0 +1,150 @@
+"""A controller as values: JSON with the program itself, MAT with what a MATLAB model needs."""
+
+import io
+from typing import Any
+
+import numpy as np
+
+from design.program import (
+    Assign,
+    Choice,
+    Constant,
+    Element,
+    Expression,
+    Number,
+    Operation,
+    Remark,
+    Repeat,
+    Statement,
+    Variable,
+)
+from identification.model.karnopp import NAMES
+from identification.signals.clean import slope_filter
+from workbench.export.exported import Exported
+from workbench.export.filled import lead_of, title_of
+from workbench.output import dumps
+
+PROGRAM_SCHEMA = "program/1"
+
+
+def json_file(what: Exported) -> dict[str, str]:
+    """The program as a tree, the values behind it and the test vector."""
+    program = what.program
+    document = {
+        "schema": PROGRAM_SCHEMA,
+        "title": title_of(what),
+        "lead": lead_of(what),
+        "name": program.name,
+        "controller": what.controller,
+        "h": program.h,
+        "ratio": program.ratio,
+        "inputs": program.inputs,
+        "output": program.output,
+        "constants": program.constants,
+        "tables": program.tables,
+        "states": program.states,
+        "locals": program.locals,
+        "program": [_statement(one) for one in program.statements],
+        "values": values_of(what),
+        "test": {"inputs": what.test.inputs, "outputs": what.test.outputs},
+    }
+    return {f"{program.name}.json": dumps(document) + "\n"}
+
+
+def mat_file(what: Exported) -> dict[str, bytes]:
+    """The values behind the program and the test vector, as a structure for MATLAB (v5)."""
+    from scipy.io import savemat
+
+    test = what.test
+    names = {
+        one.name: column for one, column in zip(what.program.inputs, test.inputs.T, strict=True)
+    }
+    content = {
+        "title": title_of(what),
+        **_filled_in(values_of(what)),
+        "test": {**names, what.program.output.name: test.outputs},
+    }
+    packed = io.BytesIO()
+    savemat(  # its stubs know paths only
+        packed,  # type: ignore[arg-type]
+        {what.program.name: content},
+        oned_as="row",
+        long_field_names=True,
+    )
+    return {f"{what.program.name}.mat": packed.getvalue()}
+
+
+def values_of(what: Exported) -> dict[str, Any]:
+    """The difference equation, the force loop below it and the compensator beside it.
+
+    As `docs/contract.md` has them for design.json, "In the drive's own terms".
+    """
+    loop, units = what.loop, what.program
+    law, force, compensation = loop.law, loop.force, loop.compensation
+    return {
+        "law": {"R": law.R, "S": law.S, "T": law.T, "W": law.W, "h": law.h},
+        "force": None if force is None else {"k_i": force.k_i, "T_i": force.T_i, "h": force.h},
+        "h": loop.h,
+        "limit": loop.limit,
+        "rate": loop.rate,
+        "k_a": loop.k_a,
+        "units": {one.name: one.unit for one in (*units.inputs, units.output)},
+        "compensator": None if compensation is None else _compensator(what),
+    }
+
+
+def _compensator(what: Exported) -> dict[str, Any]:
+    """The compensator (4) and its filters, each as b, a in z^-1."""
+    assert what.loop.compensation is not None
+    own, filters = what.loop.compensation.compensator, what.loop.compensation.filters
+    parts = {
+        "A": filters.velocity,
+        "B": filters.error,
+        "C": filters.force,
+        "slope": slope_filter(what.loop.law.h, filters.N_d),
+    }
+    return {
+        **{name: getattr(own.friction, name) for name in NAMES},
+        "N_c": own.N_c,
+        "e_T": own.e_T,
+        "filters": {name: {"b": one.b, "a": one.a} for name, one in parts.items()},
+    }
+
+
+def _filled_in(value: Any) -> Any:
+    """The value with an empty matrix where there is none, and rows of numbers as arrays."""
+    match value:
+        case None:
+            return np.zeros((0, 0))
+        case dict():
+            return {key: _filled_in(entry) for key, entry in value.items()}
+        case tuple():
+            return np.array(value, dtype=np.float64)
+    return value
+
+
+def _statement(one: Statement) -> list[Any]:
+    """A statement as a list, what it is first."""
+    match one:
+        case Assign(target, value):
+            return ["=", _expression(target), _expression(value)]
+        case Choice(condition, then, otherwise):
+            branches = [[_statement(each) for each in branch] for branch in (then, otherwise)]
+            return ["if", _expression(condition), *branches]
+        case Repeat(index, count, body):
+            return ["for", index.name, count, [_statement(each) for each in body]]
+        case Remark(text):
+            return ["#", text]
+
+
+def _expression(value: Expression) -> Any:
+    """A number, a name, or a list with the operator first."""
+    match value:
+        case Number(number):
+            return number
+        case Constant(name) | Variable(name):
+            return name
+        case Element(array, index):
+            return ["[]", array, _expression(index)]
+        case Operation(operator, arguments):
+            return [operator, *(_expression(one) for one in arguments)]

@@ -1,0 +1,142 @@
+"""What is exported: a design's controller as a program, with the vector that tests it."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from design.controller_program import ProgramUnits, controller_program
+from design.filters import filters_at
+from design.program import Program
+from design.program_run import SelfTest, self_test
+from design.servo import Compensation
+from identification.errors import BadModel
+from workbench.cards.parameter_units import shown
+from workbench.documents.design import Design
+from workbench.steps.closed_loop import DrivenLoop
+
+Precision = Literal["double", "single"]
+REAL: Mapping[Precision, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}
+BEFORE_DIGIT = "servo_"  # before a name that begins with no letter
+LONGEST_NAME = 31  # characters that every linker and PLC tells apart
+DESIGN_AGAIN = "run 'workbench design' again"
+
+
+@dataclass(frozen=True)
+class Exported:
+    """A controller as its machine runs it.
+
+    remarks: what to know of it, a line each; design: the values behind the program.
+    """
+
+    program: Program
+    loop: DrivenLoop
+    design: Design
+    controller: str
+    remarks: tuple[str, ...]
+    precision: Precision = "double"
+
+    @cached_property
+    def test(self) -> SelfTest:
+        """Inputs and outputs of a machine that rounds to the precision."""
+        values = self.design.compensator.value
+        return self_test(self.program, values.friction, values.e_T, REAL[self.precision])
+
+
+def exported(
+    found: Design,
+    controller: str | None = None,
+    *,
+    compensated: bool | None = None,
+    precision: Precision = "double",
+    name: str | None = None,
+) -> Exported:
+    """The controller of the design, by default the recommended one, as a program.
+
+    controller: "rst", "pid" or "present". compensated: with the friction compensator, by default
+    as recommended, and beside all others but the present one. Raises BadModel where the design has
+    no such controller, recommends none, or is of a version that does not say what the drive runs.
+    """
+    chosen = controller or found.recommended
+    if chosen == "none":
+        have = ", ".join(found.controllers)
+        raise BadModel(f"the design recommends no controller; choose one by --controller ({have})")
+    loop = _loop_of(found, chosen)
+    if compensated is None:
+        compensated = _compensated(found, chosen)
+    if compensated:
+        if loop.direct:
+            raise BadModel("a command without a force loop takes no compensator beside it")
+        filters = found.compensator.filters or filters_at(loop.law.h)
+        loop = replace(loop, compensation=Compensation(found.compensator.value, filters))
+    assert found.command is not None
+    units = shown(found.motion == "rotary")
+    program = controller_program(
+        identifier(name or found.card),
+        loop.servo,
+        loop.h,
+        ProgramUnits(units.position, units.force, found.command.unit),
+        loop.k_a or 0.0,
+    )
+    return Exported(program, loop, found, chosen, _remarks(found, chosen, loop), precision)
+
+
+def _compensated(found: Design, chosen: str) -> bool:
+    """Whether the controller goes with the compensator where nobody says."""
+    told = found.recommendation
+    if told is not None and told.controller == chosen:
+        return told.compensator
+    return chosen != "present"
+
+
+def _loop_of(found: Design, chosen: str) -> DrivenLoop:
+    """The chosen controller without the compensator."""
+    if found.command is None:
+        raise BadModel(f"the design does not say what the drive takes; {DESIGN_AGAIN}")
+    limit, k_a = found.command.limit, found.command.force_per_command
+    if chosen == "present":
+        if found.present is None:
+            raise BadModel(
+                "the design has no present controller; name it in the card's [controller]"
+            )
+        now, direct = found.present, found.present.output == "command" and k_a is None
+        return DrivenLoop(now.law, now.force, now.rate, limit, None, k_a, direct)
+    one = found.controllers.get(chosen)
+    if one is None:
+        reason = found.refused.get(chosen, "it is not there")
+        raise BadModel(f"the design has no controller {chosen!r}: {reason}")
+    return DrivenLoop(one.law(found.command), found.force, one.rate, limit, None, k_a)
+
+
+def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
+    """What to know before it runs on a machine."""
+    out = []
+    assert found.command is not None
+    if chosen not in (found.recommended, "present"):
+        out.append(f"the design recommends {found.recommended!r}, not this controller")
+    told = found.recommendation
+    beside = loop.compensation is not None
+    if told is not None and told.controller == chosen and told.compensator != beside:
+        out.append(
+            f"the design recommends it {'with' if told.compensator else 'without'} the compensator"
+        )
+    if found.command.limit is None:
+        out.append("no limit of the command is known: it is not clipped")
+    if beside and found.compensator.assumed:
+        names = ", ".join(found.compensator.assumed)
+        out.append(f"compensator: assumed, not identified: {names}")
+    return tuple(out)
+
+
+def identifier(name: str) -> str:
+    """A name as an identifier of C and of IEC 61131-3: no doubled or outer "_", no leading digit.
+
+    Raises BadModel where nothing is left of it.
+    """
+    found = re.sub(r"[^A-Za-z0-9]+", "_", name).strip("_")[:LONGEST_NAME].rstrip("_")
+    if not found:
+        raise BadModel(f"the name {name!r} has no letter or digit; give one by --name")
+    return found if found[0].isalpha() else BEFORE_DIGIT + found

@@ -1,0 +1,68 @@
+"""Templates of code filled in, and numbers in lines."""
+
+from collections.abc import Iterable, Sequence
+from functools import cache
+from importlib.metadata import version
+from typing import TYPE_CHECKING, Any
+
+from workbench.export.exported import Exported
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+WIDEST = 96  # characters of a line of numbers
+
+
+def filled(template: str, *, markup: bool = False, **values: Any) -> str:
+    """The template `<template>.j2` filled in; with `markup`, values are escaped for XML."""
+    return _environment(markup).get_template(f"{template}.j2").render(**values)
+
+
+@cache
+def _environment(markup: bool) -> "Environment":
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("workbench.export"),
+        autoescape=markup,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )
+
+
+def rows(values: Iterable[str]) -> list[str]:
+    """Values with commas between them, in lines."""
+    lines, line = [], ""
+    whole = list(values)
+    for at, value in enumerate(whole):
+        entry = value + ("," if at + 1 < len(whole) else "")
+        if line and len(line) + 1 + len(entry) > WIDEST:
+            lines.append(line)
+            line = entry
+        else:
+            line = f"{line} {entry}".strip()
+    return [*lines, line] if line else lines
+
+
+def title_of(what: Exported) -> str:
+    """One line that says what a file is."""
+    kind = {"rst": "RST", "pid": "PID", "present": "present"}[what.controller]
+    beside = " with friction compensator" if what.loop.compensation else ""
+    return f"{what.design.card}: {kind} controller{beside}"
+
+
+def lead_of(what: Exported) -> Sequence[str]:
+    """What to know of a file, in lines."""
+    program = what.program
+    turns = (
+        f", its position controller at every {program.ratio}th call" if program.ratio > 1 else ""
+    )
+    return (
+        f"Made by servo-workbench {version('servo-workbench')} from a design of this machine.",
+        f"Runs every {program.h:.12g} s{turns}.",
+        "Letters are the paper's: r reference, y position, F_e force on the body, u command;",
+        "R, S, T polynomials in z^-1; v velocity, e_y error; F_c, F_s, dv of Karnopp's friction.",
+        *what.remarks,
+    )

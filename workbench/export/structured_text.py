@@ -1,0 +1,170 @@
+"""A controller as a function block of IEC 61131-3, in Structured Text."""
+
+from dataclasses import dataclass
+
+from design.program import Kind, State
+from workbench.export.exported import Exported
+from workbench.export.filled import filled, lead_of, rows, title_of
+from workbench.export.st_syntax import StructuredText, st_syntax
+from workbench.export.syntax import INDENT
+
+AT_POSITION_1 = (
+    "_at_1"  # behind a state's name: its entries where the machine has stood at position 1
+)
+NEVER = "begun"  # whether the block has run before
+EXACT = {"double": 1e-9, "single": 1e-4}  # what a test passes, of the largest command
+
+
+@dataclass(frozen=True)
+class Declared:
+    """A variable of a function block; size: of an array, 0 for none; values: its first ones."""
+
+    name: str
+    type: str
+    meaning: str
+    size: int = 0
+    values: tuple[str, ...] = ()
+
+    @property
+    def line(self) -> str:
+        """The declaration."""
+        kind = f"ARRAY[0..{self.size - 1}] OF {self.type}" if self.size else self.type
+        start = ""
+        if self.values:
+            start = f" := [{', '.join(self.values)}]" if self.size else f" := {self.values[0]}"
+        said = f" (* {self.meaning} *)" if self.meaning else ""
+        whole = f"{self.name} : {kind}{start};{said}"
+        if len(whole) <= 100 or not self.size:
+            return whole
+        values = "\n".join(f"{INDENT * 3}{line}" for line in rows(self.values))
+        return f"{self.name} : {kind} := [{said}\n{values}\n{INDENT * 2}];"
+
+
+@dataclass(frozen=True)
+class Block:
+    """A function block: its variables by role, and its statements."""
+
+    name: str
+    inputs: tuple[Declared, ...]
+    outputs: tuple[Declared, ...]
+    constants: tuple[Declared, ...]
+    variables: tuple[Declared, ...]
+    body: tuple[str, ...]
+
+
+def st_file(what: Exported) -> dict[str, str]:
+    """The controller's block and the one that tests it, in one file."""
+    text = filled(
+        "blocks.st",
+        title=title_of(what),
+        lead=lead_of(what),
+        name=what.program.name,
+        h=what.program.h,
+        blocks=blocks(what),
+    )
+    return {f"{what.program.name}.st": text}
+
+
+def blocks(what: Exported) -> tuple[Block, Block]:
+    """The controller's block and its test's."""
+    st = st_syntax(what.precision)
+    return _controller(what, st), _test(what, st)
+
+
+def _types(what: Exported) -> dict[Kind, str]:
+    real = "REAL" if what.precision == "single" else "LREAL"
+    return {"real": real, "integer": "DINT", "boolean": "BOOL"}
+
+
+def _controller(what: Exported, st: StructuredText) -> Block:
+    program, types = what.program, _types(what)
+    real = types["real"]
+    inputs = [
+        Declared(st.name(one.name), real, f"[{one.unit}] {one.meaning}") for one in program.inputs
+    ]
+    begin = Declared("reset", "BOOL", "TRUE: begin anew, the machine stands at y")
+    constants = [
+        Declared(st.name(one.name), real, f"[{one.unit}] {one.meaning}", 0, (st.number(one.value),))
+        for one in program.constants
+    ]
+    tables = [(one.name, one.values, one.meaning) for one in program.tables]
+    tables += [
+        (
+            one.name + AT_POSITION_1,
+            one.at_rest,
+            f"{one.name} where the machine has stood at position 1",
+        )
+        for one in program.states
+        if one.array and any(one.at_rest)
+    ]
+    constants += [
+        Declared(st.name(name), real, meaning, len(values), tuple(map(st.number, values)))
+        for name, values, meaning in tables
+    ]
+    kept = [
+        Declared(
+            st.name(one.name), types[one.kind], one.meaning, len(one.at_rest) if one.array else 0
+        )
+        for one in program.states
+    ]
+    own = [Declared(st.name(one.name), types[one.kind], "") for one in program.locals]
+    started = Declared(NEVER, "BOOL", "whether it has run before")
+    if not any(one.name == "j" for one in own):
+        own.append(Declared("j", types["integer"], ""))
+    output = program.output
+    first = [f"IF reset OR NOT {NEVER} THEN", f"{INDENT}{NEVER} := TRUE;"]
+    first += [INDENT + line for one in program.states for line in _reset(one, st)]
+    return Block(
+        f"FB_{program.name}",
+        (*inputs, begin),
+        (Declared(st.name(output.name), real, f"[{output.unit}] {output.meaning}"),),
+        tuple(constants),
+        (*kept, started, *own),
+        (*first, "END_IF;", *st.lines(program.statements)),
+    )
+
+
+def _reset(one: State, st: StructuredText) -> list[str]:
+    """Lines that put a state at rest at y."""
+    place, y = st.name(one.name), st.name("y")
+    if one.array:
+        value = (
+            f"{st.name(one.name + AT_POSITION_1)}[j] * {y}" if any(one.at_rest) else st.number(0.0)
+        )
+        return st.repeated("j", len(one.at_rest), [st.assigned(f"{place}[j]", value)])
+    if one.kind == "integer":
+        return [st.assigned(place, "0")]
+    at = one.at_rest[0]
+    return [st.assigned(place, y if at == 1.0 else st.number(0.0))]
+
+
+def _test(what: Exported, st: StructuredText) -> Block:
+    """The block that runs the vector once and says whether the controller's block gives it."""
+    program, types, test = what.program, _types(what), what.test
+    real, n = types["real"], len(test.outputs)
+    tables = [
+        Declared(f"in_{one.name}", real, f"[{one.unit}]", n, tuple(map(st.number, column)))
+        for one, column in zip(program.inputs, test.inputs.T.tolist(), strict=True)
+    ]
+    wanted = Declared("wanted", real, "", n, tuple(map(st.number, test.outputs.tolist())))
+    most = max(abs(test.outputs).max(), 1.0) * EXACT[what.precision]
+    given = ", ".join(f"{st.name(one.name)} := in_{one.name}[k]" for one in program.inputs)
+    body = (
+        "worst := 0.0;",
+        f"FOR k := 0 TO {n - 1} DO",
+        f"    block({given}, reset := (k = 0));",
+        f"    worst := MAX(worst, ABS(block.{st.name(program.output.name)} - wanted[k]));",
+        "END_FOR;",
+        f"passed := worst <= {st.number(most)};",
+    )
+    return Block(
+        f"FB_{program.name}_test",
+        (),
+        (
+            Declared("passed", "BOOL", "whether the block gives what the simulation gave"),
+            Declared("worst", real, f"[{program.output.unit}] largest difference"),
+        ),
+        (*tables, wanted),
+        (Declared("block", f"FB_{program.name}", ""), Declared("k", types["integer"], "")),
+        body,
+    )

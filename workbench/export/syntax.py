@@ -1,0 +1,146 @@
+"""A program's statements in the syntax of C and of Structured Text."""
+
+import math
+from abc import abstractmethod
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.program import (
+    Assign,
+    Choice,
+    Constant,
+    Element,
+    Expression,
+    Number,
+    Operation,
+    Operator,
+    Program,
+    Remark,
+    Repeat,
+    Statement,
+    Variable,
+)
+from identification.errors import BadModel
+from workbench.export.exported import Precision
+
+INDENT = "    "
+# How tightly an operator binds; one of the same rank on the right is put in parentheses.
+RANK: Mapping[Operator, int] = {
+    "or": 1, "and": 2, "==": 3, "!=": 3, "<": 4, "<=": 4, ">": 4, ">=": 4,
+    "+": 5, "-": 5, "*": 6, "/": 6, "not": 7, "negative": 7,
+}  # fmt: skip
+ATOM = 8
+
+
+@dataclass(frozen=True)
+class Syntax:
+    """How a language writes a program.
+
+    symbols: of its operators; functions: for min, max and abs; names: for what it would take for
+    something else; kept: what stands before a state.
+    """
+
+    precision: Precision
+    symbols: Mapping[Operator, str]
+    functions: Mapping[str, str]
+    names: Mapping[str, str]
+    states: frozenset[str] = frozenset()
+    kept: str = ""
+
+    @abstractmethod
+    def number(self, value: float) -> str:
+        """A number of the program's precision as a literal."""
+
+    @abstractmethod
+    def assigned(self, target: str, value: str) -> str:
+        """A statement that gives a value."""
+
+    @abstractmethod
+    def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
+        """The lines of a choice."""
+
+    @abstractmethod
+    def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
+        """The lines of a loop."""
+
+    @abstractmethod
+    def remark(self, text: str) -> str:
+        """A comment in one line."""
+
+    def rounded(self, value: float) -> float:
+        """The value in the program's precision; raises BadModel where it is none."""
+        found = float(np.float32(value)) if self.precision == "single" else float(value)
+        if not math.isfinite(found):
+            raise BadModel(f"{value:g} has no form in {self.precision} precision")
+        return found
+
+    def name(self, name: str) -> str:
+        """A name as the language takes it."""
+        own = self.names.get(name, name)
+        return self.kept + own if name in self.states else own
+
+    def lines(self, statements: Sequence[Statement], depth: int = 0) -> list[str]:
+        """The statements, indented by `depth`."""
+        return [INDENT * depth + line for one in statements for line in self._written(one)]
+
+    def _written(self, one: Statement) -> Iterator[str]:
+        match one:
+            case Assign(target, value):
+                yield self.assigned(self.expression(target), self.expression(value))
+            case Choice(condition, then, otherwise):
+                said = self.expression(condition)
+                yield from self.chosen(said, self.lines(then), self.lines(otherwise))
+            case Repeat(index, count, body):
+                yield from self.repeated(self.name(index.name), count, self.lines(body))
+            case Remark(text):
+                yield self.remark(" ".join(text.split()))
+
+    def expression(self, value: Expression) -> str:
+        """The expression, in parentheses only where its order needs them."""
+        return self._ranked(value)[0]
+
+    def _ranked(self, value: Expression) -> tuple[str, int]:
+        match value:
+            case Number(number):
+                if isinstance(number, int):
+                    return str(number), ATOM
+                return self.number(number), ATOM if number >= 0.0 else RANK["negative"]
+            case Constant(name) | Variable(name):
+                return self.name(name), ATOM
+            case Element(array, index):
+                return f"{self.name(array)}[{self.expression(index)}]", ATOM
+            case Operation("min" | "max" | "abs" as operator, arguments):
+                given = ", ".join(self.expression(one) for one in arguments)
+                return f"{self.functions[operator]}({given})", ATOM
+            case Operation(operator, (inner,)):
+                return self.symbols[operator] + self._inside(inner, ATOM), RANK[operator]
+            case Operation(operator, (first, *others)):
+                rank = RANK[operator]
+                parts = [self._inside(first, rank), *(self._inside(o, rank + 1) for o in others)]
+                return f" {self.symbols[operator]} ".join(parts), rank
+        raise BadModel(f"{value} has no form in a program")
+
+    def _inside(self, value: Expression, least: int) -> str:
+        """The expression, in parentheses where it binds less than `least`."""
+        said, rank = self._ranked(value)
+        mixed = isinstance(value, Operation) and value.operator in (
+            "and",
+            "or",
+            "<",
+            "<=",
+            ">",
+            ">=",
+        )
+        return f"({said})" if rank < least or mixed else said
+
+
+def braced(lines: list[str]) -> list[str]:
+    """The lines, indented once."""
+    return [INDENT + line for line in lines]
+
+
+def state_names(program: Program) -> frozenset[str]:
+    """Names of the program's states."""
+    return frozenset(one.name for one in program.states)
