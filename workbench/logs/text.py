@@ -56,7 +56,7 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
     if spec.header is None:
         _check_first_line(path, lines, layout, spec)
     first = _split(lines[0], layout)
-    headed = spec.header if spec.header is not None else not all(map(_is_number, first))
+    headed = spec.header if spec.header is not None else not all(map(is_number, first))
     names = tuple(first) if headed else tuple(str(k) for k in range(len(first)))
     body = _body(text, start + int(headed), spec, layout)
     if not body.strip():
@@ -69,6 +69,24 @@ def read_text_table(path: Path, spec: FileSpec) -> TextTable:
     del text, body  # of a long log a gigabyte
     columns = _parse(path, content, layout, len(names), first_row)
     return TextTable(names, columns, first_row, headed)
+
+
+def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
+    """The first lines of a text file as fields, by the layout of the last of them.
+
+    For who does not know yet which line is the header. Raises BadLog where the file is not text.
+    """
+    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+    text = _decode(path, spec.encoding)
+    lines = text[:_LOOK].splitlines()
+    lines = lines if len(text) <= _LOOK else lines[:-1]
+    layout = _layout([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
+    return [_split(line, layout) for line in lines]
+
+
+def is_number(field: str) -> bool:
+    """Whether a field is a number, with a decimal point or comma; an empty one is."""
+    return not field or _NUMBER.fullmatch(field) is not None
 
 
 def _decode(path: Path, encoding: str) -> str:
@@ -122,7 +140,7 @@ def _layout(lines: list[str], spec: FileSpec) -> _Layout:
             continue
         width = max(set(widths), key=widths.count)
         fields = [field for row in rows for field in row]
-        share = sum(map(_is_number, fields)) / len(fields) + widths.count(width) / len(widths)
+        share = sum(map(is_number, fields)) / len(fields) + widths.count(width) / len(widths)
         if share > most:
             best, most = delimiter, share
     best = spec.delimiter or best
@@ -139,10 +157,6 @@ def _split(line: str, layout: _Layout) -> list[str]:
         return line.split()
     fields = next(csv.reader([line.rstrip("\r\n")], delimiter=layout.delimiter), [])
     return [field.strip() for field in fields]
-
-
-def _is_number(field: str) -> bool:
-    return not field or _NUMBER.fullmatch(field) is not None
 
 
 def _body(text: str, start: int, spec: FileSpec, layout: _Layout) -> str:
