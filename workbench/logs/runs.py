@@ -44,22 +44,22 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw, first_row = _read_signals(path, card)
-    log = _with_force(_repaired(raw, first_row, path, card).log, path, card)
+    raw, first_row = read_signals(path, card)
+    log = with_force(_repaired(raw, first_row, path, card).log, path, card)
     check(log, card.rig(path.name), first_row)
     return log
 
 
 def read_runs(path: Path, card: Card) -> Prepared:
     """The file's runs on an even clock, and remarks on what was repaired, resampled or cut."""
-    raw, first_row = _read_signals(path, card)
+    raw, first_row = read_signals(path, card)
     repaired = _repaired(raw, first_row, path, card)
     del raw  # of a long log a gigabyte
     rig = card.rig(path.name)
     if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
-    prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
+    prepared = prepare(with_force(thin.log, path, card), rig, first_row)
     remarks = (*repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     return Prepared(
@@ -83,7 +83,8 @@ def shown_name(path: Path) -> str:
     return os.fsencode(path.name).decode("utf-8", "backslashreplace")
 
 
-def _with_force(log: Log, path: Path, card: Card) -> Log:
+def with_force(log: Log, path: Path, card: Card) -> Log:
+    """The log with the applied force F_e in `F`, by the card's rig, where it can be told."""
     rig = card.rig(path.name)
     F = applied_force(log, rig)
     if F is None:
@@ -93,7 +94,7 @@ def _with_force(log: Log, path: Path, card: Card) -> Log:
     return log.with_signals(F=F)
 
 
-def _read_signals(path: Path, card: Card) -> tuple[Log, int]:
+def read_signals(path: Path, card: Card) -> tuple[Log, int]:
     """The card's signals in SI as they stand in the file, and the number of the first row."""
     if not card.signals:
         raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
