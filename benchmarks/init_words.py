@@ -1,7 +1,8 @@
 """Headers of the files of `init_files`: words to choose by, and words to judge by.
 
-Those to judge by are the signals' names in manuals and published logs of drives (Beckhoff, Siemens,
-SigmaWin, ODrive, ArduPilot, test benches), and were written down before the first run on them.
+Those to judge by are names as drives, PLCs and test benches use them, and were written down before
+the first run on them, though by whoever wrote the words of `workbench/cards/headers.py`. One
+was changed since: "time_sec", which the bench had put above milliseconds.
 """
 
 from collections.abc import Mapping
