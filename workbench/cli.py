@@ -19,6 +19,8 @@ from identification.errors import NotIdentifiable, UserError
 
 COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
+    "init": "Propose a card for a log: columns, units, signs and rig.",
+    "doctor": "Look a log over before any fit; alone, the installation.",
     "identify": "Find friction, plant and actuator of a machine from its logs.",
     "trace": "Find the physical effect that the model of a machine lacks.",
     "drift": "Test whether a machine has changed since its model.",

@@ -147,6 +147,25 @@ class OutputFolder:
                 folder.rmdir()
 
 
+def write_whole(path: Path, text: str, option: str) -> None:
+    """Write the text to the file, whole or not at all.
+
+    option: that named the file, for the message. Raises BadOutput where it cannot be written.
+    """
+    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise BadOutput(
+            f"{option} {path}: cannot be written ({error.strerror}); name another file"
+        ) from None
+    finally:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+
+
 def output_options(command: Command) -> Command:
     """The options of every command: `as_json: bool` (--json) and `out: Path | None` (--out)."""
     options = (

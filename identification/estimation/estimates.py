@@ -131,7 +131,7 @@ def estimates(
         # The spread of finite samples is itself uncertain: never narrower than 1.96 sd.
         low = min(float(np.quantile(drawn, 0.025)), value - NORMAL_95 * sd)
         high = max(float(np.quantile(drawn, 0.975)), value + NORMAL_95 * sd)
-        reason = _missing(name, events, log)
+        reason = silent_reason(name, events, log)
         if reason:
             found[name] = Estimate(None, units[name], reason=reason, assumed=value)
         else:
@@ -149,8 +149,8 @@ def normal_samples(values: Array, sd: Array) -> Array:
     return np.asarray(values + sd * quantiles[:, np.newaxis])
 
 
-def _missing(name: str, events: Events, log: str) -> str | None:
-    """Reason why the events of the log cannot carry a parameter, if so."""
+def silent_reason(name: str, events: Events, log: str) -> str | None:
+    """Reason why the events of the log cannot carry a parameter, if so, and what to add to it."""
     if name not in NAMES or name == "m":
         return None
     side = 1 if name.endswith("n") else 0

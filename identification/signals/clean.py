@@ -193,19 +193,25 @@ def _found(
 
 def _limits(log: Log) -> list[BadSamples]:
     """Where the command stands at its largest or smallest value: told, and kept."""
-    if "u" not in log:
-        return []
-    u = log["u"]
-    low, high = float(u.min()), float(u.max())
-    if low == high or len(np.unique(u)) < _LEVELS:
+    return limits(log, "u") if "u" in log else []
+
+
+def limits(log: Log, name: str) -> list[BadSamples]:
+    """Where a signal stands at its largest or smallest value for several samples, a finding each.
+
+    Of a sensor of a force or pressure that is its range's end; a position may rest there.
+    """
+    x = log[name]
+    low, high = float(x.min()), float(x.max())
+    if low == high or len(np.unique(x)) < _LEVELS:
         return []
     out = []
     for limit in (low, high):
-        at = u == limit
+        at = x == limit
         if np.count_nonzero(at[1:] & at[:-1]) >= LONGEST_REPAIR:
             t, count = log["t"][at], int(at.sum())
             first, last = float(t[0]), float(t[-1])
-            out.append(BadSamples(log.name, "u", "saturated", first, last, count, None, "kept"))
+            out.append(BadSamples(log.name, name, "saturated", first, last, count, None, "kept"))
     return out
 
 

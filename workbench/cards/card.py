@@ -50,7 +50,7 @@ from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
 Format = Literal["csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel"]
 
-_NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
+NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
     "electro-pneumatic": ("t", "y", "p_p", "p_n"),
     "force": ("t", "y", "F"),
     "motor": ("t", "y", "u"),
@@ -392,9 +392,9 @@ def _recipe_signals(rig: RigSection) -> dict[str, SignalSpec]:
 def _need_signals(
     path: Path, rig: RigSection, signals: Mapping[str, SignalSpec], where: str
 ) -> None:
-    for name in _NEEDED_SIGNALS[rig.kind]:
+    for name in NEEDED_SIGNALS[rig.kind]:
         if name not in signals:
-            others = [key for key in signals if key not in _NEEDED_SIGNALS[rig.kind]]
+            others = [key for key in signals if key not in NEEDED_SIGNALS[rig.kind]]
             unit = si_unit(name, rig.motion)
             raise BadCard(
                 f"{path}: {where} kind = {rig.kind!r} needs signals.{name}{nearest(name, others)};"

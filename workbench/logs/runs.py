@@ -56,8 +56,8 @@ def read_log(path: Path, card: Card) -> Log:
     "force"` rig with pressures keeps the force as logged in `F_logged`. Raises BadLog or BadCard in
     one line where the file or its content is not what the card says.
     """
-    raw = _read_signals(_table(path, card), path, card)
-    log = _with_force(_repaired(raw, path, card).log, path, card)
+    raw = _signals_of(_table(path, card), path, card)
+    log = with_force(_repaired(raw, path, card).log, path, card)
     check(log, card.rig(path.name), raw.first_row)
     return log
 
@@ -69,7 +69,7 @@ def read_runs(path: Path, card: Card) -> Prepared:
 
 def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     """As `read_runs`, of a table; path: what the run and the messages are called by."""
-    raw = _read_signals(table, path, card)
+    raw = _signals_of(table, path, card)
     first_row, read = raw.first_row, raw.remarks
     repaired = _repaired(raw, path, card)
     del raw  # of a long log a gigabyte
@@ -77,7 +77,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     if len(repaired.log) > LONGEST_UNTHINNED:  # here, where rows still count as in the file
         check(repaired.log, rig, first_row)
     thin = thinned(repaired.log)
-    prepared = prepare(_with_force(thin.log, path, card), rig, first_row)
+    prepared = prepare(with_force(thin.log, path, card), rig, first_row)
     remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
@@ -100,7 +100,8 @@ def shown_name(path: Path) -> str:
     return os.fsencode(path.name).decode("utf-8", "backslashreplace")
 
 
-def _with_force(log: Log, path: Path, card: Card) -> Log:
+def with_force(log: Log, path: Path, card: Card) -> Log:
+    """The log with the applied force F_e in `F`, by the card's rig, where it can be told."""
     rig = card.rig(path.name)
     F = applied_force(log, rig)
     if F is None:
@@ -110,13 +111,19 @@ def _with_force(log: Log, path: Path, card: Card) -> Log:
     return log.with_signals(F=F)
 
 
+def read_signals(path: Path, card: Card) -> tuple[Log, int]:
+    """The card's signals in SI as they stand in the file, and the number of the first row."""
+    raw = _signals_of(_table(path, card), path, card)
+    return raw.log, raw.first_row
+
+
 def _table(path: Path, card: Card) -> Table:
     if not card.signals:
         raise BadCard(f"{card.path}: has no [signals]; name the column of each signal")
     return read_table(path, card.file)
 
 
-def _read_signals(table: Table, path: Path, card: Card) -> _Raw:
+def _signals_of(table: Table, path: Path, card: Card) -> _Raw:
     """The card's signals in SI as they stand in the table, on the clock of `t`."""
     signals, groups = dict[str, Array](), dict[str, str]()
     for name, spec in card.signals.items():

@@ -75,6 +75,19 @@ def _first_line_layout(
     return Layout(tuple(fields[0]) if headed else (), int(headed))
 
 
+def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
+    """The first lines of a text file as fields, by the layout of the last of them.
+
+    For who does not know yet which line is the header. Raises BadLog where the file is not text.
+    """
+    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+    text = _decode(path, spec.encoding)
+    lines = text[:_LOOK].splitlines()
+    lines = lines if len(text) <= _LOOK else lines[:-1]
+    marks = _marks([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
+    return [_split(line, marks) for line in lines]
+
+
 def _decode(path: Path, encoding: str) -> str:
     content = path.read_bytes()
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):

@@ -1,7 +1,6 @@
 """A model in force and new runs -> drift tests, the state that is stored, and drift.json."""
 
 import hashlib
-import secrets
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -29,7 +28,7 @@ from identification.thresholds import ADEQUATE
 from workbench.documents.model import Model, as_number, model_document, used, versions
 from workbench.documents.reading import read_result
 from workbench.logs.sources import Source, Sources
-from workbench.output import BadOutput, dumps
+from workbench.output import dumps, write_whole
 
 DRIFT_SCHEMA, DRIFT_STREAM_SCHEMA = "drift/1", "drift_stream/1"
 
@@ -216,17 +215,7 @@ def read_stream(path: Path) -> Stream | None:
 
 def write_stream(path: Path, stream: Stream) -> None:
     """Store the stream, whole or not at all. Raises BadOutput where it cannot be written."""
-    part = path.with_name(f".{path.name}.{secrets.token_hex(4)}.part")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        part.write_text(dumps(stream) + "\n", encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise BadOutput(
-            f"--state {path}: cannot be written ({error.strerror}); name another file"
-        ) from None
-    finally:
-        part.unlink(missing_ok=True)
+    write_whole(path, dumps(stream) + "\n", "--state")
 
 
 def drift_document(found: Drifted, model_file: str) -> dict[str, Any]:

@@ -321,6 +321,8 @@ def actuator(one: MotionLog, theta: Array, y: Array | None = None, u: Array | No
     white = one.noise_F**2 + (theta[1] * one.position_sd[w.middle]) ** 2
     walked = one.walk**2 * noise_gain(np.cumsum(first))
     sd = np.sqrt(white * noise_gain(first) + walked)
+    # A force that stands at its sensor's end shows no noise, and no row is without.
+    sd = np.where(sd > 0.0, sd, OF_FORCE * float(np.std(one.log["F"])))
     r = len(w.start)
     return Rows(
         w.first @ one.log["F"], X, sd, _blocks(w, len(one.log)), np.full(r, np.inf),

@@ -1,0 +1,193 @@
+"""How two signals of one machine hang together: what tells a position from a force without words.
+
+All times are in samples, so that the unit of the clock need not be known. A force accelerates the
+body and is eaten up by friction; a velocity is the position's derivative; a command changes a force
+or is one; a reference is ahead of the position.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.errors import BadLog
+from identification.signals.check import work_share
+from identification.signals.differentiate import Motion, differentiate, low_pass
+
+SURE_OF_MOTION = 4.0  # times the velocity's noise, from which a sample counts as moving
+LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
+FEWEST_MOVING, FEWEST_OF_A_WAY = 60, 6  # samples in all, and in each direction
+ALIKE_CHANGES = 0.7  # correlation of two signals' changes, from which these tell the lead
+LONGEST_LEAD = 0.1  # of the log, that one signal may be ahead of another
+TELLS_SIGN = 0.1  # share of the exchanged work, from which its sign is that of the force
+
+
+class Derivative(NamedTuple):
+    """How much of a signal (share of its square) is the velocity times `factor` a sample."""
+
+    share: float
+    factor: float
+
+
+class ForceLaw(NamedTuple):
+    """What of a signal is m a + F_v v + F_c sgn(v) + F_0 along the motion of a body.
+
+    share: of its variance; friction: of it, what the step at the reversal alone explains, None of a
+    motion that goes one way only; way: 1
+    where friction takes energy up, -1 where the signal has the other sign; work: share of the
+    exchanged work, 0 where the motion does not come back; balance: F_0, in the signal's unit;
+    coulomb: F_c, the same; m: in the signal's unit over the position's a sample squared.
+    """
+
+    share: float
+    friction: float | None
+    way: float
+    work: float
+    balance: float
+    coulomb: float
+    m: float
+
+
+class Lead(NamedTuple):
+    """By how many samples one signal is ahead of another, and how alike they then are (-1 to 1)."""
+
+    samples: float
+    likeness: float
+
+
+def motion_of(x: Array) -> Motion | None:
+    """The motion of a signal in samples; None where it is too short or does not change."""
+    if np.ptp(x) == 0.0:
+        return None
+    try:
+        return differentiate(x, 1.0)
+    except BadLog:
+        return None
+
+
+def moving(motion: Motion) -> BoolArray:
+    """Samples (n,) in which the body surely moves."""
+    speed = np.abs(motion.v)
+    least = max(SURE_OF_MOTION * motion.v_noise, LEAST_SPEED * float(np.quantile(speed, 0.95)))
+    sure = speed > least
+    sure[: motion.edge] = False
+    sure[len(sure) - motion.edge :] = False
+    return np.asarray(sure)
+
+
+def derivative(motion: Motion, x: Array) -> Derivative:
+    """How far x (n,) is the derivative of a position; both smoothed alike."""
+    smooth = low_pass(x, 1.0, motion.cutoff)
+    inside = slice(motion.edge, len(x) - motion.edge)
+    v, f = motion.v[inside], smooth[inside]
+    spread, together = float(np.var(f)), float(np.mean((v - v.mean()) * (f - f.mean())))
+    square = float(np.var(v))
+    if spread == 0.0 or square == 0.0:
+        return Derivative(0.0, 0.0)
+    return Derivative(together**2 / (square * spread), together / square)
+
+
+def force_law(motion: Motion, y: Array, f: Array) -> ForceLaw | None:
+    """How far f (n,) is the force that moves a body at y (n,); None where too little moves."""
+    sure = moving(motion)
+    if np.sum(sure) < FEWEST_MOVING:
+        return None
+    up = motion.v[sure] > 0
+    both = min(np.sum(up), np.sum(~up)) >= FEWEST_OF_A_WAY
+    smooth = low_pass(f, 1.0, motion.cutoff)
+    step = np.sign(motion.v) if both else np.zeros(len(y))
+    X = np.column_stack([motion.a, motion.v, step, np.ones(len(y))])[sure]
+    b = smooth[sure]
+    share, theta = _explained(X, b)
+    without, _ = _explained(X[:, [0, 1, 3]], b)
+    work = work_share(y, f) or 0.0
+    if abs(work) > TELLS_SIGN:
+        way = float(np.sign(work))
+    else:
+        way = float(np.sign(theta[2])) or float(np.sign(theta[1])) or 1.0
+    friction = share - without if both else None
+    balance, coulomb, m = float(theta[3]), float(theta[2]), float(theta[0])
+    return ForceLaw(share, friction, way, work, balance, coulomb, m)
+
+
+def lead(first: Array, second: Array) -> Lead:
+    """By how many samples `first` is ahead of `second` (negative: behind).
+
+    By the changes of both where these are alike, else, where noise hides the changes, by the
+    signals themselves: the largest correlation over shifts, by a parabola between samples.
+    """
+    by_change = _ahead(np.diff(first), np.diff(second))
+    if by_change.likeness > ALIKE_CHANGES:
+        return by_change
+    return _ahead(first, second)
+
+
+def _ahead(first: Array, second: Array) -> Lead:
+    """The shift of the largest correlation, each over the samples that then overlap."""
+    a, b = first - first.mean(), second - second.mean()
+    n = len(a)
+    if not np.any(a) or not np.any(b):
+        return Lead(0.0, 0.0)
+    length = 1 << int(np.ceil(np.log2(2 * n)))
+    both = np.fft.irfft(np.conj(np.fft.rfft(a, length)) * np.fft.rfft(b, length), length)
+    reach = max(1, int(LONGEST_LEAD * n))
+    shift = np.arange(-reach, reach + 1)
+    square_a, square_b = (np.concatenate([[0.0], np.cumsum(x**2)]) for x in (a, b))
+    ahead, behind = np.maximum(shift, 0), np.maximum(-shift, 0)
+    own = square_a[n - ahead] - square_a[behind]
+    other = square_b[n - behind] - square_b[ahead]
+    size = np.sqrt(np.maximum(own * other, 1e-300))
+    likeness = np.concatenate([both[-reach:], both[: reach + 1]]) / size
+    best = int(np.argmax(np.abs(likeness)))
+    part = _vertex(np.abs(likeness), best)
+    return Lead(best - reach + part, float(np.clip(likeness[best], -1.0, 1.0)))
+
+
+def _vertex(x: Array, at: int) -> float:
+    """How far the parabola through three samples around the largest has its vertex beside it."""
+    if not 0 < at < len(x) - 1:
+        return 0.0
+    left, here, right = x[at - 1 : at + 2]
+    bend = left - 2.0 * here + right
+    return 0.0 if bend == 0.0 else float(np.clip(0.5 * (left - right) / bend, -0.5, 0.5))
+
+
+def actuator_share(F: Array, v: Array, u: Array, cutoff: float) -> tuple[float, float]:
+    """How much of the change of a force (n,) is k1 u - k2 v + const, and the sign of k1.
+
+    cutoff: of the smoothing that `v` has had, in samples.
+    """
+    rate = np.gradient(low_pass(F, 1.0, cutoff))
+    X = np.column_stack([low_pass(u, 1.0, cutoff), v, np.ones(len(v))])
+    share, theta = _explained(X, rate)
+    without, _ = _explained(X[:, 1:], rate)
+    return share - without, float(np.sign(theta[0])) or 1.0
+
+
+def _explained(X: Array, b: Array) -> tuple[float, Array]:
+    """Share of the variance of b (r,) that the columns (r, k) explain, and the coefficients."""
+    size = np.sqrt(np.mean(X**2, axis=0))
+    size[size == 0.0] = 1.0
+    theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
+    spread = float(np.var(b))
+    if spread == 0.0:
+        return 0.0, theta
+    return max(0.0, 1.0 - float(np.var(b - X @ theta)) / spread), theta
+
+
+def command_lag(target: Array, others: Array, u: Array, longest: int) -> tuple[float, float]:
+    """By how many samples a command acts late, and how much more of `target` it then explains.
+
+    target (r,): the rest of the equation that the command drives, others (r, k): its other columns,
+    u (r,): the command. The shift from 0 to `longest` samples that explains most, by a parabola
+    between samples; rows at the start, which no shifted command reaches, are left out.
+    """
+    longest = min(longest, len(u) // 4)
+    inside = slice(longest, len(u))
+    shares = np.array([
+        _explained(np.column_stack([u[longest - k : len(u) - k], others[inside]]),
+                   target[inside])[0]
+        for k in range(longest + 1)
+    ])  # fmt: skip
+    best = int(np.argmax(shares))
+    return best + _vertex(shares, best), float(shares[best] - shares[0])

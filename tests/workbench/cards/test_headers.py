@@ -1,0 +1,85 @@
+"""Headers read: units in all their spellings, and what words mean."""
+
+import pytest
+
+from workbench.cards.headers import Quantity, read_header, written_unit
+from workbench.cards.units import conversion
+
+READ = [
+    ("pos [mm]", "mm", "position", ""),
+    ("Position (µm)", "um", "position", ""),
+    ("Position (μm)", "um", "position", ""),
+    ("p1/bar", "bar", "pressure", ""),
+    ("Kraft_N", "N", "force", ""),
+    ("Force, N", "N", "force", ""),
+    ("変位(mm)", "mm", "position", ""),
+    ("圧力A[MPa]", "MPa", "pressure", ""),
+    ("圧力A\uff3bMPa\uff3d", "MPa", "pressure", ""),
+    ("Zeit / s", "s", "time", ""),
+    ("経過時間 in s", "s", "time", ""),
+    ("t_ms", "ms", "time", ""),
+    ("speed_mm_s", "mm/s", "velocity", ""),
+    ("f_meas_kN", "kN", "force", "measured"),
+    ("Winkel [°]", "deg", "position", ""),
+    ("Drehmoment in Nm", "N m", "force", ""),
+    ("i_q [A]", "A", "command", ""),
+    ("Sollposition [mm]", "mm", "position", "reference"),
+    ("目標位置[mm]", "mm", "position", "reference"),
+    ("Istposition", None, "position", "measured"),
+    ("cmd_pos", None, "position", "reference"),
+    ("SetPos", None, "position", "reference"),
+    ("ActPos", None, "position", "measured"),
+    ("goal_position", None, "position", "reference"),
+    ("Soll-Spannung [V]", "V", "command", ""),
+    ("指令電圧\uff08V\uff09", "V", "command", ""),
+    ("Ventilspannung", None, "command", ""),
+    ("PosErr", None, "position", "error"),
+    ("input_volts", "V", "other", ""),
+    ("temp", None, "temperature", ""),
+]
+
+
+@pytest.mark.parametrize(("text", "unit", "quantity", "purpose"), READ)
+def test_a_header_tells_unit_and_meaning(
+    text: str, unit: str | None, quantity: Quantity, purpose: str
+) -> None:
+    found = read_header(text)
+    assert (found.unit.card if found.unit else None) == unit
+    assert quantity in found.means
+    assert found.purpose == purpose
+
+
+@pytest.mark.parametrize("text", ["p_A", "p_n", "F_e", "ch1", "x"])
+def test_a_name_with_an_index_has_no_unit(text: str) -> None:
+    assert read_header(text).unit is None
+
+
+def test_a_letter_behind_a_name_is_a_doubtful_unit() -> None:
+    found = read_header("y_m")
+    assert found.unit is not None and found.unit.card == "m"
+    assert found.doubtful
+
+
+def test_a_row_of_units_goes_before_the_header() -> None:
+    found = read_header("weg", "[mm]")
+    assert found.unit is not None and found.unit.card == "mm"
+    assert found.name == "weg"
+
+
+def test_case_tells_newton_metres_from_nanometres() -> None:
+    newton, nano = written_unit("Nm"), written_unit("nm")
+    assert newton is not None and newton.card == "N m" and newton.rotary
+    assert nano is not None and nano.quantity == "position"
+
+
+@pytest.mark.parametrize("text", ["mm", "µm", "bar(g)", "kgf/cm²", "°/s", "U/min", "%", "℃",
+                                  "パルス", "lb-in", "in", "KN", "mpa"])  # fmt: skip
+def test_every_spelling_gives_a_unit_that_cards_know(text: str) -> None:
+    found = written_unit(text)
+    assert found is not None
+    assert conversion(found.card, None) is not None
+
+
+def test_what_is_no_unit_is_none() -> None:
+    assert written_unit("valve") is None
+    assert written_unit("") is None

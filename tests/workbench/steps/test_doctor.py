@@ -1,0 +1,182 @@
+"""A log looked over: what is wrong with it is found, and what it can tell is what a fit tells."""
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from identification.arrays import Array
+from identification.model.karnopp import NAMES
+from identification.signals.bad_samples import Kind
+from tests.bad_inputs.shop import CARDS
+from tests.identification.motor_logs import K_A, H, made
+from workbench.cards.card import Card, load_card
+from workbench.logs.sources import read_sources
+from workbench.report.doctor import doctor_picture, doctor_view
+from workbench.steps.doctor import Examined, doctor_document, examine
+from workbench.steps.identify_sources import identify_sources
+from workbench.steps.simulate import record
+
+Table = dict[str, Array]
+MOTOR = f"""
+[card]
+name = "motor"
+[rig]
+kind = "motor"
+force_per_command = {K_A}
+[signals]
+t = {{ column = "t", unit = "s" }}
+y = {{ column = "y", unit = "m" }}
+u = {{ column = "u", unit = "V" }}
+"""
+
+
+@pytest.fixture
+def force(tmp_path: Path) -> tuple[Card, Table]:
+    """A force-driven machine's card and log."""
+    (tmp_path / "card.toml").write_text(CARDS["force"], "utf-8")
+    card = load_card(tmp_path / "card.toml")
+    assert card.recipe is not None
+    log = record("force", card.recipe, 3, card.rig())
+    return card, {name: np.array(log[name]) for name in card.signals}
+
+
+@pytest.fixture
+def motor(tmp_path: Path) -> tuple[Card, Table]:
+    """A motor's card and log."""
+    (tmp_path / "card.toml").write_text(MOTOR, "utf-8")
+    log = made(3)
+    return load_card(tmp_path / "card.toml"), {name: np.array(log[name]) for name in "tyu"}
+
+
+def look(card: Card, table: Table) -> Examined:
+    path = card.path.parent / "run.csv"
+    pd.DataFrame(table).to_csv(path, index=False)
+    return examine(path, card)
+
+
+def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    found = look(card, table)
+    path = card.path.parent / "run.csv"
+    model = identify_sources(read_sources([str(path)], str(card.path))).model
+    can = {one.name: one.can for one in found.told}
+    assert {n for n in NAMES if can[n]} == {n for n in NAMES if model.friction[n].value is not None}
+    assert found.verdict == "ready"
+
+
+def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    up = table["u"] > 0
+    y = np.cumsum(np.where(np.diff(table["y"], prepend=table["y"][0]) > 0,
+                           np.diff(table["y"], prepend=table["y"][0]), 0.0))  # fmt: skip
+    found = look(card, {"t": table["t"], "y": y, "u": np.where(up, table["u"], 0.0)})
+    can = {one.name: one for one in found.told}
+    assert not can["F_cn"].can and not can["F_sn"].can
+    assert "negative direction" in can["F_cn"].why
+    assert any("motion that way" in one for one in found.add)
+
+
+@pytest.mark.parametrize(
+    ("kind", "signal"),
+    [("spike", "y"), ("jump", "y"), ("missing", "F"), ("saturated", "u"), ("saturated", "F")],
+)
+def test_bad_samples_are_told(force: tuple[Card, Table], kind: Kind, signal: str) -> None:
+    card, table = force
+    x = table[signal]
+    if kind == "spike":
+        x[1200] += 0.01
+    elif kind == "jump":
+        x[1500:] += 0.004
+    elif kind == "missing":
+        x[1000] = np.nan
+    else:
+        limit = np.quantile(np.abs(x), 0.8)
+        table[signal] = np.clip(x, -limit, limit)
+    found = look(card, table)
+    assert (kind, signal) in {(one.kind, one.signal) for one in found.bad}
+
+
+def test_gaps_and_jitter_of_the_clock_are_told(force: tuple[Card, Table]) -> None:
+    card, table = force
+    keep = np.ones(len(table["t"]), dtype=bool)
+    keep[1000:1100] = False
+    rng = np.random.default_rng(1)
+    table["t"] = table["t"] + 2e-4 * rng.uniform(-1, 1, len(keep))
+    found = look(card, {name: x[keep] for name, x in table.items()})
+    assert found.clock.gaps == 1
+    assert found.clock.longest_gap == pytest.approx(0.202, abs=1e-3)
+    assert found.clock.jitter == pytest.approx(2e-4 / np.sqrt(3) * np.sqrt(2) / 2e-3, rel=0.2)
+    assert found.clock.h == pytest.approx(2e-3, rel=0.02)
+
+
+@pytest.mark.parametrize("late", [0, 8])
+def test_a_late_command_is_told(force: tuple[Card, Table], late: int) -> None:
+    card, table = force
+    u = table["u"]
+    table["u"] = np.concatenate([u[late:], np.full(late, u[-1])])  # logged before it acts
+    found = look(card, table)
+    delay = next(one for one in found.delays if one.of == "u")
+    if late:
+        assert delay.seconds is not None
+        assert delay.seconds == pytest.approx(late * 2e-3, abs=2e-3)
+    else:
+        assert delay.seconds is None
+
+
+def test_counts_are_told_as_a_step(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    table["y"] = 2e-5 * np.round(table["y"] / 2e-5)
+    state = next(one for one in look(card, table).sensors if one.name == "y")
+    assert state.step == pytest.approx(2e-5, rel=1e-6)
+
+
+def test_a_motor_without_its_constant_is_looked_at_all_the_same(tmp_path: Path) -> None:
+    (tmp_path / "card.toml").write_text(MOTOR.replace(f"force_per_command = {K_A}\n", ""), "utf-8")
+    log = made(3)
+    found = look(load_card(tmp_path / "card.toml"), {name: np.array(log[name]) for name in "tyu"})
+    assert found.ways is not None and found.ways.positive.breakaways >= 3
+
+
+@pytest.mark.parametrize("name", ["y", "F"])
+def test_a_log_that_a_fit_refuses_is_refused_with_its_reason(
+    force: tuple[Card, Table], name: str
+) -> None:
+    card, table = force
+    table[name] = np.full(len(table["t"]), 1.0) if name == "y" else -table["F"]
+    found = look(card, table)
+    assert found.verdict == "refused"
+    assert found.refused
+    assert doctor_document(found, card.name)["refused"] == found.refused
+
+
+@pytest.mark.parametrize("rig", ["force", "motor"])
+def test_one_screen_and_a_picture(rig: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
+    card, table = request.getfixturevalue(rig)
+    table["y"][::50] += 0.02  # as much to tell as can be
+    for refused in (False, True):
+        table["y"] = np.zeros(len(table["t"])) if refused else table["y"]
+        found = look(card, table)
+        lines = doctor_view(found, tmp_path).splitlines()
+        assert len(lines) <= 40
+        assert max(map(len, lines)) <= 100 or "written" in lines[-1]
+        doctor_picture(found, tmp_path / "doctor.png")
+        assert (tmp_path / "doctor.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_speeds_and_rests_are_those_of_the_log(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    found = look(card, table)
+    assert found.ways is not None
+    v = np.abs(np.gradient(table["y"], H))
+    assert found.ways.positive.fast == pytest.approx(float(np.quantile(v, 0.99)), rel=0.5)
+    moved = found.ways.positive.seconds + found.ways.negative.seconds
+    assert 0.2 * found.clock.duration < moved < found.clock.duration
+    assert found.ways.rests > 5
+
+
+def test_a_time_that_is_no_number_is_refused_and_no_fault(motor: tuple[Card, Table]) -> None:
+    card, table = motor
+    table["t"][500] = np.inf
+    assert look(card, table).verdict == "refused"

@@ -1,0 +1,249 @@
+"""What a column's header says: its name, its unit as cards write it, and what its words mean.
+
+Headers are written as "pos [mm]", "Position (µm)", "p1/bar", "Kraft_N" or "変位(mm)". The words
+are those of English, German, Japanese, French, Italian and Spanish loggers; what they say is
+evidence only, which the column's own numbers may outweigh.
+"""
+
+import re
+import unicodedata
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+Quantity = Literal[
+    "time", "position", "velocity", "acceleration", "force", "pressure", "command", "temperature",
+    "count", "other",
+]  # fmt: skip
+Purpose = Literal["reference", "measured", "error", ""]
+
+
+@dataclass(frozen=True)
+class WrittenUnit:
+    """A unit as cards write it, what it measures, and whether of a turning machine."""
+
+    card: str
+    quantity: Quantity
+    rotary: bool = False
+
+
+@dataclass(frozen=True)
+class Header:
+    """A header read: its text, the name without the unit, the unit (None: none), the quantities
+    that its words mean with their weight, what the signal is for, and whether it speaks of an
+    angle.
+
+    doubtful: the unit may as well belong to the name, as the m of "y_m".
+    """
+
+    text: str
+    name: str
+    unit: WrittenUnit | None
+    means: Mapping[Quantity, float]
+    purpose: Purpose
+    angle: bool
+    doubtful: bool = False
+
+
+_SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
+    "time": "s: s sec secs second seconds sekunde sekunden 秒; ms: ms msec msecs millis"
+    " milliseconds millisekunden ミリ秒; us: us µs usec microseconds mikrosekunden; ns: ns nsec"
+    " nanoseconds; min: min minutes minuten 分",
+    "position": "m: m meter metre meters; mm: mm millimeter millimetre ミリ; cm: cm; um: um µm"
+    " micron microns mikrometer micrometer; nm: nm; inch: in inch inches zoll; foot: ft",
+    "velocity": "m/s: m/s mps m/sec; mm/s: mm/s mmps mm/sec; um/s: um/s µm/s; cm/s: cm/s;"
+    " inch/s: in/s ips; m/min: m/min; mm/min: mm/min",
+    "acceleration": "m/s^2: m/s^2 m/s² m/s2 m/s**2; mm/s^2: mm/s^2 mm/s² mm/s2",
+    "force": "N: n newton newtons; kN: kn; mN: mn; lbf: lbf lb lbs; kip: kip; kgf: kgf kp",
+    "pressure": "bar: bar barg bara bar(g); mbar: mbar; Pa: pa pascal; kPa: kpa; hPa: hpa;"
+    " MPa: mpa; psi: psi psig psia; atm: atm; kgf/cm^2: kgf/cm2 kgf/cm² kgf/cm^2",
+    "command": "V: v volt volts; mV: mv; A: a amp amps ampere; mA: ma; %: % pct percent prozent"
+    " %pwm %duty; 1: 1 - dimensionless",
+    "count": "count: count counts cnt cnts inc incs ink inkremente increments pulse pulses pls"
+    " パルス ticks tick digits digit dig lsb steps",
+    "temperature": "degC: °c ℃ degc deg_c celsius c; degF: °f degf; K: k kelvin",
+}
+_SPELT_ROTARY: Mapping[Quantity, str] = {
+    "position": "rad: rad radians; mrad: mrad; deg: deg degree degrees ° grad 度; turn: turn turns"
+    " rev revs rot u umdr umdrehungen 回転",
+    "velocity": "rad/s: rad/s rads radps; deg/s: deg/s °/s dps degps; rpm: rpm u/min 1/min min-1"
+    " r/min rev/min upm; turn/s: rev/s turn/s rps",
+    "acceleration": "rad/s^2: rad/s^2 rad/s² rad/s2; deg/s^2: deg/s^2 deg/s² deg/s2 °/s² °/s^2",
+    "force": "N m: nm n·m n.m n*m n-m newtonmeter; mN m: mnm mn·m; N cm: ncm; lbf inch: lb-in"
+    " lbf-in in-lb; lbf foot: lb-ft ft-lb lbf-ft",
+}
+
+
+def _table() -> Iterator[tuple[str, WrittenUnit]]:
+    for spelt, rotary in ((_SPELT, False), (_SPELT_ROTARY, True)):
+        for quantity, line in spelt.items():
+            for entry in line.split(";"):
+                card, _, spellings = entry.strip().partition(": ")
+                for one in spellings.split():
+                    yield one, WrittenUnit(card, quantity, rotary)
+
+
+# "nm" stands for both nanometres and newton metres; its case tells which.
+_UNITS = dict(_table())
+_NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
+# One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
+_SURE_SUFFIX = 2
+_BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]\s*(.*)$")
+_SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
+_IN = re.compile(r"^(.+)\s+in\s+(\S+)$")
+_SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
+
+_WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they contain others
+    "time": "timestamp time zeit clock elapsed uhr 時間 時刻 temps tempo tiempo",
+    "position": "position posizione posicion posn pos displacement displ disp deplacement weg lage"
+    " auslenkung hub stroke travel laser encoder lvdt schlitten spostamento abstand distance 位置"
+    " 変位 ストローク angle winkel theta phi 角度 回転角 joint gelenk",
+    "velocity": "velocity velocita velocidad vel speed geschw drehzahl vitesse 速度 回転数 omega",
+    "acceleration": "acceler accel acc beschl 加速度",
+    "force": "loadcell force kraft thrust fuerza forza effort torque moment couple coppia トルク 力"
+    " 荷重 推力",
+    "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧",
+    "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
+    " ansteuerung aussteuerung 電圧 操作量 指令 current strom courant corrente 電流 motor",
+    "temperature": "temperatur temper temp thermo 温度",
+    "count": "index idx sample counter scan zaehler lfd row 番号 連番",
+    "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
+    " schleppfehler 偏差 supply versorgung input_volts 電源",
+}
+_SHORT: Mapping[str, Mapping[Quantity, float]] = {  # whole words of up to three letters
+    "t": {"time": 3.0, "temperature": 0.5},
+    "y": {"position": 3.0},
+    "x": {"position": 3.0},
+    "z": {"position": 2.0},
+    "q": {"position": 2.0},
+    "s": {"position": 1.5},
+    "v": {"velocity": 2.0, "command": 0.5},
+    "w": {"velocity": 0.5},
+    "a": {"acceleration": 1.0},
+    "f": {"force": 3.0},
+    "m": {"force": 0.5},
+    "p": {"pressure": 2.5},
+    "u": {"command": 3.0},
+    "i": {"command": 1.5, "count": 0.5},
+    "n": {"count": 1.0, "velocity": 0.5},
+    "k": {"count": 1.0},
+    "nr": {"count": 2.0},
+    "no": {"count": 2.0},
+    "pa": {"pressure": 2.0},
+    "pb": {"pressure": 2.0},
+    "pp": {"pressure": 2.0},
+    "pn": {"pressure": 2.0},
+    "tau": {"force": 2.0},
+    "mot": {"command": 1.0},
+    "dt": {"time": 1.0},
+}
+_ANGLES = ("angle", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque", "トルク",
+           "drehmoment", "drehzahl", "omega")  # fmt: skip
+_REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
+              "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
+              "planned")  # fmt: skip
+_REFERENCE_SHORT = ("r", "w", "ref", "sp", "set", "des", "cmd", "tgt")
+_MEASURED = ("actual", "measured", "feedback", "gemessen", "実", "現在", "測定", "messwert",
+             "encoder")  # fmt: skip
+_MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
+_ERRORS = ("error", "abweichung", "differenz", "schleppfehler", "偏差", "deviation", "following")
+_TWO_WEIGHTS = 3.0  # of a word that says what a column is
+
+
+def read_header(text: str, unit_below: str = "") -> Header:
+    """The header's parts; unit_below: the field of a row of units under it."""
+    plain = unicodedata.normalize("NFKC", text).strip().strip("\"'")
+    name, unit, doubtful = _without_unit(plain)
+    if unit_below.strip():
+        below = written_unit(unit_below.strip().strip("[](){}<> "))
+        name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
+    words = _words(name)
+    means = _meanings(words, " ".join(_words(plain)))
+    if doubtful and unit and means and unit.quantity not in means:
+        name, unit, doubtful = plain, None, False
+    whole = " ".join(words)
+    purpose = _purpose(words, whole, means)
+    if purpose == "reference" and "command" in means and "position" not in means:
+        purpose = ""  # a voltage or current that is asked for is the command
+    elif purpose == "reference" and not means:
+        means = {"position": 1.5}
+    angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
+    return Header(text, name, unit, means, purpose, angle, doubtful)
+
+
+def written_unit(text: str) -> WrittenUnit | None:
+    """The unit of that spelling; None where it is none that logs of machines have."""
+    found = unicodedata.normalize("NFKC", text).strip()
+    if found in ("nm", "Nm", "NM"):
+        return _NANOMETRE if found == "nm" else _NEWTON_METRE
+    if found in ("mpa", "MPa", "MPA"):  # no log is in millipascal
+        return _UNITS["mpa"]
+    if found == "mN":
+        return _UNITS["mn"]
+    found = found.replace("μ", "µ").casefold().replace("μ", "µ")
+    return _UNITS.get(found) or _UNITS.get(found.replace(" ", ""))
+
+
+def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
+    """Name, unit, and whether the unit is doubtful."""
+    if inside := _BRACKETS.match(text):
+        if found := written_unit(inside[2]):
+            return (f"{inside[1]} {inside[3]}".strip() or text), found, False
+        return f"{inside[1]} {inside[2]} {inside[3]}".strip(), None, False
+    if (slash := _SLASH.match(text)) and (found := written_unit(slash[2])):
+        return slash[1], found, False
+    if (after := _IN.match(text)) and (found := written_unit(after[2])):
+        return after[1], found, False
+    parts = re.split(r"_|\s", text)  # "speed_mm_s"
+    if len(parts) > 2 and (found := written_unit(f"{parts[-2]}/{parts[-1]}")):
+        return " ".join(parts[:-2]), found, False
+    if (suffix := _SUFFIX.match(text)) and (found := written_unit(suffix[2])):
+        parted = any(sign in text for sign in ",;:")
+        return suffix[1], found, not parted and len(suffix[2]) < _SURE_SUFFIX
+    return text, None, False
+
+
+def _words(name: str) -> list[str]:
+    """The words of a name in small letters: at case, digits and signs it is parted."""
+    parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
+    parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
+    small = parted.casefold()
+    for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
+        small = small.replace(umlaut, two)
+    return [one for one in re.split(r"[\W_]+", small) if one]
+
+
+def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
+    """Weight of each quantity that the words mean, by the longest part that each contains."""
+    found: dict[Quantity, float] = {}
+    for word in words:
+        if word in _SHORT:
+            for quantity, weight in _SHORT[word].items():
+                found[quantity] = max(found.get(quantity, 0.0), weight)
+            continue
+        best: tuple[int, Quantity] | None = None
+        for quantity, line in _WORDS.items():
+            for part in line.split():
+                if part in word and (best is None or len(part) > best[0]):
+                    best = (len(part), quantity)
+        if best is not None:
+            found[best[1]] = max(found.get(best[1], 0.0), _TWO_WEIGHTS)
+    if "input volts" in whole or "supply" in whole or "bus" in words:
+        return {"other": _TWO_WEIGHTS}
+    if "load" in words:
+        found["force"] = max(found.get("force", 0.0), 1.0)
+    return found
+
+
+def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> Purpose:
+    if any(one in whole for one in _ERRORS) or {"err", "e"} & set(words):
+        return "error"
+    if any(one in whole for one in _REFERENCE) or any(one in _REFERENCE_SHORT for one in words):
+        return "reference"
+    if "command" in words and "position" in means:
+        return "reference"
+    if any(one in whole for one in _MEASURED) or any(one in _MEASURED_SHORT for one in words):
+        return "measured"
+    if any(one.startswith("ist") for one in words):  # Istposition, Istwert
+        return "measured"
+    return ""

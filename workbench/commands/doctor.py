@@ -1,0 +1,94 @@
+"""`workbench doctor`: a log looked over before any fit; alone, the installation."""
+
+import os
+from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from workbench.output import OutputFolder, emit, output_options, progress
+
+if TYPE_CHECKING:
+    from workbench.steps.doctor import Examined
+
+
+@click.command(epilog="Example: workbench doctor run1.csv --card card.toml --out look")
+@click.argument("log", required=False)
+@click.option("--card", help="Path of the card, or the name of a shipped one.")
+@click.option(
+    "--registry",
+    "where",
+    metavar="FILE|URL",
+    help="Registry to be asked, without LOG.  [default: WORKBENCH_REGISTRY, if set]",
+)
+@output_options
+def command(
+    log: str | None, card: str | None, where: str | None, as_json: bool, out: Path | None
+) -> int:
+    """Look a log over before any fit: clock, sensors, bad samples, motion, and what it can tell.
+
+    With LOG and --card: which of the nine parameters it can tell and which not, and what run to
+    add; with --out also doctor.json and a picture, doctor.png. Alone: versions, compiled kernels,
+    folder of data, registry. Exit status 1: the log cannot be identified as it is or tells
+    nothing, or something of the installation does not work.
+    """
+    if log is None:
+        if card is not None or out is not None:
+            raise click.UsageError("LOG is missing: give a log beside --card and --out.")
+        return _installation(where, as_json)
+    if card is None:
+        raise click.UsageError(
+            f"--card is missing: give the card of {log}; 'workbench init {log}' proposes one."
+        )
+    return _log(log, card, as_json, out)
+
+
+def _log(name: str, card_name: str, as_json: bool, out: Path | None) -> int:
+    from workbench.cards.card import load_card
+    from workbench.logs.fetch import card_path, find_data
+    from workbench.report.doctor import doctor_picture, doctor_view
+    from workbench.steps.doctor import doctor_document, examine
+
+    card = load_card(card_path(card_name), with_recipe=False)
+    path = find_data(name, card)
+    with progress("looking", as_json=as_json):
+        found: Examined = examine(path, card)
+    document = doctor_document(found, card.name)
+    if out is not None:
+        with OutputFolder("doctor", out, now=datetime.now()) as folder:
+            folder.write_json("doctor.json", document)
+            doctor_picture(found, folder.path / "doctor.png")
+    emit({**document, "out": out}, as_json, lambda: doctor_view(found, out))
+    return 1 if found.verdict in ("refused", "nothing") else 0
+
+
+def _installation(where: str | None, as_json: bool) -> int:
+    from workbench.registry.database import REGISTRY_VARIABLE
+    from workbench.report.installation import installation_view
+    from workbench.steps.installation import look_over
+
+    found = look_over()
+    named = where or os.environ.get(REGISTRY_VARIABLE)
+    registry = _registry(named) if named else None
+    wrong = [*found.wrong]
+    if registry and not registry["answers"]:
+        wrong.append(str(registry["reason"]))
+    result = {"schema": "installation/1", **vars(found), "registry": registry, "wrong": wrong}
+    emit(result, as_json, lambda: installation_view(found, registry, wrong))
+    return 1 if wrong else 0
+
+
+def _registry(where: str) -> Mapping[str, Any]:
+    """Whether the registry answers, and how many machines it has."""
+    from identification.errors import UserError
+    from workbench.addresses import shown
+    from workbench.registry.store import Registry
+
+    try:
+        with Registry(where, create=False) as store:
+            machines = store.machines()
+    except UserError as error:
+        return {"where": shown(where), "answers": False, "machines": None, "reason": str(error)}
+    return {"where": shown(where), "answers": True, "machines": len(machines), "reason": None}

@@ -1,0 +1,105 @@
+"""`workbench init`: a log -> a first card for it."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from workbench.output import emit, progress, write_whole
+
+if TYPE_CHECKING:
+    from workbench.steps.first_card.proposal import Proposal
+
+CARD = "card.toml"
+
+
+@click.command(epilog="Example: workbench init run1.csv --out bench-a/card.toml")
+@click.argument("log", type=click.Path(path_type=Path))
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="The card, or a folder for it.  [default: card.toml]",
+)
+@click.option("--name", help="Name of the machine.  [default: that of the log]")
+@click.option("--force", is_flag=True, help="Replace a card that is there.")
+@click.option("--yes", is_flag=True, help="Ask nothing; take the guesses.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON; ask nothing.")
+@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+def command(
+    log: Path, out: Path | None, name: str | None, force: bool, yes: bool, as_json: bool
+) -> None:
+    """Propose a card for a log that has none: which column is what, in which unit, and the rig.
+
+    It looks at the headers, and at how the columns hang together: a force accelerates the body and
+    is eaten up by friction, a reference is ahead of the position, a speed is its derivative. On a
+    terminal it asks about each guess; else the card is written with a remark on each line, "sure"
+    or "guess", and why. A card that is there is replaced only with --force or your yes.
+    """
+    from workbench.report.first_card import proposal_view
+    from workbench.steps.first_card.proposal import proposed
+    from workbench.steps.first_card.written import refusal, written
+
+    card = _place(out)
+    asking = not (yes or as_json) and sys.stdin.isatty() and sys.stdout.isatty()
+    _refuse_existing(card, force, asking)
+    with progress("looking", as_json=as_json):
+        found = proposed(log, name)
+    if asking:
+        found = _asked(found)
+    text = written(found, asked=asking)
+    write_whole(card, text, "--out")
+    refused = refusal(log, card)
+    result = {**found.as_json(), "refused": refused or None, "out": card}
+    emit(result, as_json, lambda: proposal_view(found, card, refused))
+
+
+def _place(out: Path | None) -> Path:
+    path = Path(CARD) if out is None else out
+    return path / CARD if path.is_dir() else path
+
+
+def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
+    """Raises a usage error where a card is there and nobody allows that it is replaced."""
+    if force or not card.exists():
+        return
+    if asking and click.confirm(f"{card} is there; replace it?", default=False):
+        return
+    raise click.UsageError(
+        f"{card} is there and would be replaced; name another file with --out, or give --force."
+    )
+
+
+def _asked(of: "Proposal") -> "Proposal":
+    """The proposal after questions on its guesses; Enter takes one as it is."""
+    from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
+
+    click.echo(
+        f"rig: {of.kind}, {of.motion}; columns: {', '.join(one.shown for one in of.columns)}"
+    )
+    click.echo("For each guess: Enter if it is right, else a column, a unit, or both ('x3 mm');"
+               " '-' leaves it out.")  # fmt: skip
+    for name in [one.name for one in of.signals if not one.sure]:
+        while True:
+            one = of.signal(name)
+            assert one is not None
+            gain = "" if one.gain is None else f", gain {one.gain}"
+            said = f"{name}: column {one.shown} in {one.unit}{gain} ({one.why})"
+            try:
+                of = with_signal(of, name, click.prompt(said, default="", show_default=False))
+                break
+            except BadAnswer as error:
+                click.echo(f"  {error}", err=True)
+    for key in [guess.key for guess in of.rig if not guess.sure]:
+        while True:
+            guess = next(guess for guess in of.rig if guess.key == key)
+            value = "nothing" if guess.value is None else guess.value
+            unit = f" {guess.unit}" if guess.value is not None and guess.unit else ""
+            said = f"{key}: {value}{unit} ({guess.why})"
+            try:
+                of = with_rig(of, key, click.prompt(said, default="", show_default=False))
+                break
+            except BadAnswer as error:
+                click.echo(f"  {error}", err=True)
+    return of

@@ -1,0 +1,219 @@
+"""A log that no card describes yet: its layout found by looking, its columns as numbers."""
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog
+from identification.signals.check import SHORTEST_LOG
+from workbench.cards.card import FileSpec, Format
+from workbench.cards.headers import written_unit
+from workbench.files import refuse_larger
+from workbench.logs.formats import find_format, head_of
+from workbench.logs.layout import is_number
+from workbench.logs.table import Table
+from workbench.logs.tables import JSON_BYTES, read_table
+from workbench.logs.text import TEXT_BYTES, first_lines
+
+_BELOW = 5  # rows of numbers by which the first of them is known
+_MOSTLY = 0.5  # share of a row's fields, that are numbers where it is data, or units
+_DEEPEST = 3  # tables in each other, in which the rows are looked for
+_ENCODINGS = ("utf-8", "cp932", "cp1252", "latin-1")
+
+
+@dataclass(frozen=True, eq=False)
+class RawColumn:
+    """One column: its number from 0, what a card calls it, its header and the unit below it, its
+    values (n,) (NaN where there is no number), and why they cannot be used (else empty)."""
+
+    number: int
+    key: str | int
+    header: str
+    unit_below: str
+    values: Array
+    unusable: str = ""
+
+
+@dataclass(frozen=True, eq=False)
+class UnknownLog:
+    """The columns of a file, how it has to be read, and single values that stand beside them."""
+
+    path: Path
+    spec: FileSpec
+    columns: tuple[RawColumn, ...]
+    scalars: tuple[RawColumn, ...]
+
+
+def read_unknown(path: Path) -> UnknownLog:
+    """The log in the file, without a card.
+
+    Encoding, preamble, header and row of units of a text file, and the table in a JSON or MAT
+    file, are found by looking. Raises BadLog, one line, where there are no columns of numbers.
+    """
+    form = find_format(path, head_of(path))
+    spec, names, units = _text_layout(path) if form == "csv" else _other_layout(path, form)
+    table = read_table(path, spec)
+    headed = table.headed and not names
+    texts, full = names or table.names, table.full_names()
+    found, scalars = list[RawColumn](), list[RawColumn]()
+    for number in range(len(table.names)):
+        text = texts[number] if number < len(texts) and (table.headed or names) else ""
+        twice = full.count(full[number]) > 1
+        key = full[number] if headed and text and not twice else number
+        below = units[number] if number < len(units) else ""
+        values, why = _numbers(table, number)
+        one = RawColumn(number, key, text, below, values, why)
+        (scalars if len(values) == 1 else found).append(one)
+    longest = max((len(one.values) for one in found if not one.unusable), default=0)
+    if longest < SHORTEST_LOG:
+        many = f"{longest} rows of numbers" if longest else "no column of numbers"
+        raise BadLog(
+            f"{path}: {many}, at least {SHORTEST_LOG} rows needed; give a log of one run, a column"
+            " a signal"
+        )
+    same = [one for one in found if len(one.values) == longest]
+    return UnknownLog(path, spec, tuple(same), tuple(scalars))
+
+
+def _numbers(table: Table, number: int) -> tuple[Array, str]:
+    """A column as numbers; the reason where it is none."""
+    raw = np.asarray(table.fetch(number))
+    if raw.ndim != 1:
+        return np.zeros(0), "no column"
+    if raw.dtype.kind in "fiub":
+        return np.asarray(raw, dtype=np.float64), ""
+    if raw.dtype.kind in "Mm":
+        return np.full(len(raw), np.nan), "dates, not numbers"
+    out = np.full(len(raw), np.nan)
+    for k, value in enumerate(raw.tolist()):
+        text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+        try:
+            if text is not None and text != "":
+                out[k] = float(text)
+        except (TypeError, ValueError):
+            if str(text).strip().lower() not in ("true", "false"):
+                return np.full(len(raw), np.nan), f"text ({str(text)[:20]!r})"
+            out[k] = float(str(text).strip().lower() == "true")
+    return out, ""
+
+
+def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
+    """How the file is to be read; names and units where the reader does not take them itself."""
+    refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
+    encoding = _encoding(path)
+    spec = FileSpec() if encoding == "utf-8" else FileSpec(encoding=encoding)
+    rows = first_lines(path, spec)
+    at = _first_of_data(rows)
+    if at is None:
+        return spec, (), ()
+    width = len(rows[at])
+    above = [k for k in range(at) if any(rows[k])]
+    units = _units(rows[above[-1]], width) if len(above) > 1 else ()
+    head = above[-2] if units else (above[-1] if above else None)
+    if head is None:
+        return spec, (), ()
+    commented = rows[head][0].startswith(spec.comment)
+    names = [one.strip() for one in rows[head]]
+    if commented:
+        names[0] = names[0].lstrip("# ")
+        names = names if names[0] else names[1:]
+    if len(names) != width or all(map(is_number, names)):
+        skip = {"skip_rows": at, "header": False} if above else {}
+        return spec.model_copy(update=skip), (), ()
+    if units or commented:
+        by_number = spec.model_copy(update={"skip_rows": at, "header": False})
+        return by_number, tuple(names), units
+    before = [k for k in above[:-1] if not rows[k][0].startswith(spec.comment)]
+    return (spec.model_copy(update={"skip_rows": head}) if before else spec), (), ()
+
+
+def _first_of_data(rows: Sequence[Sequence[str]]) -> int | None:
+    """Number of the first line of the table; None where there is none."""
+
+    def is_data(row: Sequence[str]) -> bool:
+        full = [one for one in row if one]
+        return len(full) > 1 and sum(map(is_number, full)) >= _MOSTLY * len(row)
+
+    for at in range(len(rows)):
+        block = [row for row in rows[at : at + 2 * _BELOW] if any(row)][:_BELOW]
+        if rows[at] and all(is_data(row) and len(row) == len(rows[at]) for row in block):
+            return at
+    return None
+
+
+def _units(row: Sequence[str], width: int) -> tuple[str, ...]:
+    """The units that a row holds, a column each; nothing where it is no row of units."""
+    if len(row) != width:
+        return ()
+    plain = tuple(one.strip().strip("[](){}<>") for one in row)
+    known = sum(written_unit(one) is not None for one in plain if one)
+    full = sum(bool(one) for one in plain)
+    return plain if full and known >= max(2, _MOSTLY * full) else ()
+
+
+def _encoding(path: Path) -> str:
+    """The first encoding in which the file is text; of Japanese by its letters."""
+    content = path.read_bytes()
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return "utf-8"  # the reader sees the mark itself
+    for name in _ENCODINGS:
+        try:
+            text = content.decode(name)
+        except UnicodeDecodeError:
+            continue
+        if name != "cp932" or any("\u3040" <= letter <= "\u9fff" for letter in text):
+            return name
+    return "utf-8"
+
+
+def _other_layout(path: Path, form: Format) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
+    """Where the rows of a file that is no text table lie: of a JSON or MAT file within it."""
+    finders = {"mat": _struct_of, "json": _rows_of}
+    rows = finders[form](path) if form in finders else None
+    return (FileSpec(rows=rows) if rows else FileSpec()), (), ()
+
+
+def _rows_of(path: Path) -> str | None:
+    """Key of the longest list in a JSON file, "a.b" in nested ones; None where it is at the top."""
+    refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
+    try:
+        content = json.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, ValueError, RecursionError):
+        return None  # the reader of tables says what is wrong with it
+    if isinstance(content, list):
+        return None
+    found = [(len(one), key) for key, one in _lists(content, "", _DEEPEST)]
+    length, key = max(found, default=(0, ""))
+    columns = [one for one in found if one[0] == length]
+    if len(columns) > 1:  # a list a column: their table is what holds them
+        return columns[0][1].rpartition(".")[0] or None
+    return key or None
+
+
+def _lists(value: Any, place: str, depth: int) -> Iterator[tuple[str, list[Any]]]:
+    if isinstance(value, list):
+        yield place, value
+    elif isinstance(value, dict) and depth:
+        for key, inner in value.items():
+            yield from _lists(inner, f"{place}.{key}" if place else str(key), depth - 1)
+
+
+def _struct_of(path: Path) -> str | None:
+    """Name of the struct or matrix of a MAT file that holds the signals; None: its top does."""
+    import scipy.io
+
+    try:
+        content = scipy.io.whosmat(str(path))
+    except Exception:  # v7.3, or damaged: the reader of tables says so
+        return None
+    vectors = [one for one in content if one[2] != "struct" and max(one[1]) >= SHORTEST_LOG]
+    if any(min(shape) == 1 for _, shape, _ in vectors):
+        return None
+    matrices = [name for name, shape, _ in vectors if min(shape) > 1]
+    structs = [name for name, _, kind in content if kind == "struct"]
+    return next(iter([*matrices, *structs]), None)

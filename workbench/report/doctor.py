@@ -1,0 +1,223 @@
+"""A log before any fit on one screen, and as a picture."""
+
+import textwrap
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from identification.model.karnopp import NAMES
+from workbench.cards.units import si_unit
+from workbench.report.figures import (
+    BAND,
+    MEASURED,
+    MODEL,
+    OTHER,
+    REFERENCE,
+    evenly_spread,
+    figure,
+    label,
+    line,
+    style,
+)
+from workbench.steps.doctor import Clock, Delay, Examined, SensorState
+from workbench.steps.told_by_log import Told, Way
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+SCREEN_WIDTH, LABEL_WIDTH = 100, 9
+MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
+SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
+
+
+def doctor_view(found: Examined, out: Path | None) -> str:
+    """What the log shows, in at most 40 lines of 100 columns."""
+    lines = [f"{found.file}: {_verdict(found)}", *_labelled("clock", [_clock(found.clock)])]
+    lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
+    lines += _labelled("samples", [_plain(found, one.line) for one in found.bad])
+    lines += _labelled("delay", [_delay(one) for one in found.delays])
+    if found.ways is not None:
+        ways = found.ways
+        lines += _labelled("way +", [_way(found, ways.positive)])
+        lines += _labelled("way -", [_way(found, ways.negative)])
+        lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
+                                      f" {ways.rested:.3g} s"])  # fmt: skip
+    if found.told:
+        can = ", ".join(one.name for one in found.told if one.can)
+        lines += _labelled("told", [can or "nothing"])
+    lines += _labelled("not told", _not_told(found.told), 6)
+    lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
+    lines += _labelled("note", [_plain(found, one) for one in found.remarks])
+    if found.refused:
+        lines += _labelled("refused", [_plain(found, found.refused)])
+    if out is not None:
+        lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
+    return "\n".join(lines)
+
+
+def _verdict(found: Examined) -> str:
+    if found.refused:
+        return "cannot be identified as it is (see refused)"
+    if found.verdict == "nothing":
+        return "tells none of the nine parameters"
+    nine = [one for one in found.told if one.name in NAMES]
+    can = sum(one.can for one in nine)
+    many = "all of" if can == len(nine) else f"{can} of"
+    return f"can be identified; {many} the nine parameters can be told from it"
+
+
+def _labelled(name: str, texts: Sequence[str], most: int = MOST_OF_A_KIND) -> list[str]:
+    """The first texts behind a label, each on one or two lines, and how many more there are."""
+    out = []
+    for text in texts[:most]:
+        short = textwrap.shorten(text, 2 * (SCREEN_WIDTH - LABEL_WIDTH) - 12, placeholder=" ...")
+        first, *rest = textwrap.wrap(short, SCREEN_WIDTH - LABEL_WIDTH) or [""]
+        out += [f"{name:{LABEL_WIDTH}}{first}", *(f"{'':{LABEL_WIDTH}}{one}" for one in rest)]
+    if len(texts) > most:
+        out.append(f"{'':{LABEL_WIDTH}}and {len(texts) - most} more (--json)")
+    return out
+
+
+def _plain(found: Examined, text: str) -> str:
+    return text.replace(f"{found.file}: ", "")
+
+
+def _clock(clock: Clock) -> str:
+    even = "even" if clock.jitter < 1e-3 else f"jitters by {clock.jitter:.1%} of a period"
+    rate = f"{1.0 / clock.h:.4g} Hz" if clock.h > 0.0 else "no rate"
+    gaps = "no gaps"
+    if clock.gaps:
+        many = f"{clock.gaps} gap" + ("s" if clock.gaps > 1 else "")
+        gaps = f"{many}, the longest of {clock.longest_gap:.3g} s"
+    return (
+        f"{clock.rows} rows in {clock.duration:.4g} s, every {1e3 * clock.h:.4g} ms ({rate}),"
+        f" {even}, {gaps}"
+    )
+
+
+def unit_of(found: Examined, name: str) -> tuple[float, str]:
+    """Factor and unit in which a signal is shown."""
+    unit = found.command_unit if name == "u" else si_unit(name, found.rig.motion) or ""
+    return SCREEN_UNITS.get(unit, (1.0, unit))
+
+
+def _sensor(found: Examined, one: SensorState) -> str:
+    factor, unit = unit_of(found, one.name)
+    low, high = factor * one.low, factor * one.high
+    if low == high:
+        return f"{one.name}: always {low:.4g} {unit}".rstrip()
+    step = f"step {factor * one.step:.3g}" if one.step > 0.0 else "no step seen"
+    noise = f"noise {factor * one.noise:.2g}"
+    share = max(one.noise, one.step / np.sqrt(12.0)) / (one.high - one.low)
+    span = f"{low:.4g} to {high:.4g} {unit}".rstrip()
+    return f"{one.name}: {span}, {noise}, {step} ({share:.2g} of range)"
+
+
+def _delay(one: Delay) -> str:
+    what = {"u": "the command acts on the ", "r": "the position is behind its reference"}[one.of]
+    what += one.on if one.of == "u" else ""
+    if one.seconds is None:
+        return f"{what}: none seen"
+    return f"{what}{' after' if one.of == 'u' else ' by'} {1e3 * one.seconds:.3g} ms"
+
+
+def _way(found: Examined, one: Way) -> str:
+    factor, unit = _of_speed(found)
+    return (
+        f"{one.seconds:.3g} s in motion at {factor * one.slow:.3g} to {factor * one.fast:.3g}"
+        f" {unit}; starts from rest: {one.starts}, with a breakaway force: {one.breakaways}"
+    )
+
+
+def _of_speed(found: Examined) -> tuple[float, str]:
+    return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
+
+
+def _not_told(told: Iterable[Told]) -> list[str]:
+    """The reasons, each with the parameters that it holds for."""
+    why: dict[str, list[str]] = {}
+    for one in told:
+        if not one.can:
+            why.setdefault(one.why, []).append(one.name)
+    return [f"{', '.join(names)}: {reason}" for reason, names in why.items()]
+
+
+def doctor_picture(found: Examined, path: Path) -> None:
+    """The log as a PNG: position, drive, clock, and the force over the velocity."""
+    with style():
+        drawn = figure(11.0, 7.0)
+        ((place, over_speed), (drive, clock)) = drawn.subplots(
+            2, 2, gridspec_kw={"width_ratios": [2.2, 1.0]}
+        )
+        drawn.suptitle(f"{found.file}: {_verdict(found)}", x=0.01, ha="left", fontsize=11)
+        _draw_position(found, place)
+        _draw_drive(found, drive)
+        _draw_over_speed(found, over_speed)
+        _draw_clock(found, clock)
+        drawn.savefig(path, format="png", dpi=110)
+
+
+def _draw_position(found: Examined, axes: "Axes") -> None:
+    factor, unit = unit_of(found, "y")
+    log = found.log
+    if log is None:
+        axes.text(0.5, 0.5, "no run can be drawn", ha="center", transform=axes.transAxes)
+        return
+    if "r" in log:
+        line(axes, log["t"], factor * log["r"], color=REFERENCE, label="reference")
+    line(axes, log["t"], factor * log["y"], color=MEASURED, label="position")
+    shown = False
+    for one in found.bad[:60]:
+        first, last = max(one.first, log["t"][0]), min(one.last, log["t"][-1])
+        if one.samples > 1 and one.done in ("interpolated", "kept"):
+            continue  # isolated ones, of which only the first and the last are known
+        said, shown = None if shown else "bad samples", True
+        axes.axvspan(first, max(last, first + 2 * log.h), color=BAND, alpha=0.5, lw=0, label=said)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
+    label(axes, "time [s]", f"position [{unit}]")
+
+
+def _draw_drive(found: Examined, axes: "Axes") -> None:
+    log = found.log
+    if log is None:
+        return
+    name = "F" if "F" in log else "u"
+    factor, unit = unit_of(found, name)
+    line(axes, log["t"], factor * log[name], color=MODEL, label=_words(name))
+    if name == "F" and "u" in log and found.rig.kind != "motor":
+        second = axes.twinx()
+        second.grid(False)
+        line(second, log["t"], log["u"], color=OTHER, alpha=0.6)
+        second.set_ylabel("command", color=OTHER)
+    label(axes, "time [s]", f"{_words(name)} [{unit}]")
+
+
+def _words(name: str) -> str:
+    return {"F": "applied force", "u": "command"}[name]
+
+
+def _draw_over_speed(found: Examined, axes: "Axes") -> None:
+    log, motion = found.log, found.motion
+    if log is None or motion is None or not ("F" in log or "u" in log):
+        axes.text(0.5, 0.5, "no motion to show", ha="center", transform=axes.transAxes)
+        return
+    name = "F" if "F" in log else "u"
+    factor, unit = unit_of(found, name)
+    speed, per = _of_speed(found)
+    at = evenly_spread(len(log))
+    axes.scatter(speed * motion.v[at], factor * log[name][at], s=3, color=MEASURED, alpha=0.3,
+                 linewidths=0)  # fmt: skip
+    sure = 4.0 * speed * motion.v_noise
+    axes.axvspan(-sure, sure, color=BAND, alpha=0.35, lw=0)
+    label(axes, f"velocity [{per}]", f"{_words(name)} [{unit}]", "shaded: within its noise")
+
+
+def _draw_clock(found: Examined, axes: "Axes") -> None:
+    t, h = found.times, found.clock.h
+    step = np.diff(t) / h if h > 0.0 else np.diff(t)
+    line(axes, t[1:], step, color=MEASURED)
+    top = max(2.0, 1.1 * float(np.nanmax(step)))
+    axes.set_ylim(0.0, top)
+    label(axes, "time [s]", f"step of the clock [{1e3 * h:.4g} ms]")

@@ -1,0 +1,39 @@
+"""A proposed card on a terminal: a line a signal and a value, what is sure, and why."""
+
+from pathlib import Path
+
+from workbench.output import Row, table
+from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
+
+NEXT_COMMAND = "next: workbench doctor {log} --card {card}"
+
+
+def proposal_view(of: Proposal, card: Path, refused: str) -> object:
+    """What the card says, what is left out of it, and what to do next.
+
+    refused: why the log cannot be read by the card yet, empty where it can.
+    """
+    from rich.console import Group
+
+    parts: list[object] = [f"rig: {of.kind}, {of.motion}"]
+    rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
+    parts.append(table(("", "column or value", "unit", "", "why"), rows, right=()))
+    parts += [f"note: {line}" for line in of.remarks]
+    parts += [f"left out: {shown} ({why})" for shown, why in of.unused.items()]
+    guesses = [row[0] for row in rows if row[3] == "guess"]
+    if guesses:
+        parts.append(f"guesses, to be looked at in the card: {', '.join(guesses)}")
+    if refused:
+        parts.append(f"note: with this card: {refused}")
+    parts += [f"written: {card}", NEXT_COMMAND.format(log=of.path, card=card)]
+    return Group(*[one for one in parts])  # type: ignore[arg-type]
+
+
+def _signal_row(one: SignalGuess) -> Row:
+    unit = one.unit if one.gain is None else f"{one.unit}, gain {one.gain}"
+    return one.name, one.shown, unit, "sure" if one.sure else "guess", one.why
+
+
+def _rig_row(one: RigGuess) -> Row:
+    value = "to be filled in" if one.value is None else f"{one.value}"
+    return one.key, value, one.unit, "sure" if one.sure else "guess", one.why

@@ -1,0 +1,295 @@
+"""A log looked over before any fit: clock, sensors, bad samples, what moves, and what that tells.
+
+Nothing here has rules of its own: a log is repaired, refused and resampled as for `identify`, and
+whether a parameter can be told is asked of the same thresholds, with the events that the measured
+motion shows in place of those of a fitted run.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog, NotIdentifiable
+from identification.estimation.recorded_logs import (
+    RecordedLogs,
+    commanded,
+    led_by_rig,
+    left_by_actuator,
+    recorded_logs,
+)
+from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
+from identification.estimation.regression.three_step import first_estimate
+from identification.log import Log, Rig
+from identification.model.karnopp import NAMES
+from identification.model.plant import units_of
+from identification.signals.bad_samples import BadSamples
+from identification.signals.check import check_time
+from identification.signals.clean import (
+    LONGEST_GAP,
+    even_clock,
+    limits,
+    prepare,
+    repair,
+)
+from identification.signals.differentiate import Motion, differentiate, low_pass, resolution
+from identification.signals.noise import local_noise
+from identification.signals.relations import command_lag, lead
+from identification.signals.sampling import samples
+from identification.signals.thin import thinned
+from identification.thresholds import LINEAR_ACTUATOR
+from identification.tracing.constant_force import constant_force, constant_remark
+from workbench.cards.card import Card
+from workbench.cards.units import conversion
+from workbench.documents.plausible import log_remarks
+from workbench.logs.runs import read_signals, with_force
+from workbench.steps.told_by_log import Told, Ways, told_by, ways_of
+
+DOCTOR_SCHEMA = "doctor/1"
+LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
+LONGEST_LAG = 0.1  # s that a command may act late
+HALF_A_HOLD, LEAST_LAG = 0.5, 0.5  # samples: of a held command, and that are told
+SURE_LAG = 0.01  # share of the equation that a lag explains beyond none, to be told
+
+
+@dataclass(frozen=True)
+class Clock:
+    """Rows, duration and period [s], jitter (of a period, rms, gaps apart), gaps and the longest
+    [s]."""
+
+    rows: int
+    duration: float
+    h: float
+    jitter: float
+    gaps: int
+    longest_gap: float
+
+
+@dataclass(frozen=True)
+class SensorState:
+    """A signal in SI: range, white noise (one sigma) and step, 0 where it has none."""
+
+    name: str
+    low: float
+    high: float
+    noise: float
+    step: float
+
+
+@dataclass(frozen=True)
+class Delay:
+    """By how much one signal acts late on another [s]; None where none shows."""
+
+    of: str
+    on: str
+    seconds: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What a log shows before any fit.
+
+    told: what each parameter of the model can be known by, by name; add: runs that would tell the
+    rest; refused: why `identify` would not take the log, empty where it would. log and motion:
+    the first run, for the picture; None where the log is refused before.
+    """
+
+    file: str
+    rig: Rig
+    clock: Clock
+    sensors: tuple[SensorState, ...]
+    bad: tuple[BadSamples, ...]
+    delays: tuple[Delay, ...]
+    ways: Ways | None
+    told: tuple[Told, ...]
+    add: tuple[str, ...]
+    refused: str
+    remarks: tuple[str, ...]
+    command_unit: str
+    times: Array = field(repr=False)
+    log: Log | None = field(default=None, repr=False)
+    motion: Motion | None = field(default=None, repr=False)
+
+    @property
+    def verdict(self) -> str:
+        """ "refused", "ready" (all nine can be told), "in part", or "nothing" (none can)."""
+        if self.refused:
+            return "refused"
+        can = [one.can for one in self.told if one.name in NAMES]
+        return "ready" if all(can) else "in part" if any(can) else "nothing"
+
+
+def examine(path: Path, card: Card) -> Examined:
+    """What the log in the file shows, read by its card.
+
+    A log that `identify` would refuse is looked at as far as it goes. Raises BadLog or BadCard
+    where the file cannot be read at all.
+    """
+    raw, first_row = read_signals(path, card)
+    rig = card.rig(path.name)
+    clock, refused = _clock_of(raw["t"]), ""
+    bad, remarks = list[BadSamples](), list[str]()
+    runs: tuple[Log, ...]
+    try:
+        repaired = repair(raw, first_row, rotary=rig.motion == "rotary")
+        bad += repaired.bad
+        slower = thinned(repaired.log)
+        prepared = prepare(with_force(slower.log, path, card), rig, first_row)
+        runs = prepared.runs
+        remarks += [*slower.remarks, *prepared.remarks]
+    except BadLog as error:
+        refused = str(error)
+        runs = _as_far_as_it_goes(raw, path, card)
+    log = max(runs, key=len) if runs else None
+    bad += [one for name in LIMITED if name in raw for one in limits(raw, name)]
+    found = _moved(runs, rig) if runs and not refused else _Moved(reason=refused)
+    if log is not None and not refused:
+        remarks += log_remarks(runs, rig, card.signals)
+    return Examined(
+        file=path.name,
+        rig=rig,
+        clock=clock,
+        sensors=tuple(_sensor(name, x) for name, x in raw.signals.items() if name != "t"),
+        bad=tuple(dict.fromkeys(bad)),
+        delays=_delays(log, found.motion) if log is not None and found.motion else (),
+        ways=found.ways,
+        told=found.told,
+        add=tuple(dict.fromkeys(one.add for one in found.told if one.add)),
+        refused=refused or found.reason,
+        remarks=tuple(dict.fromkeys([*remarks, *found.remarks])),
+        command_unit=_command_unit(card),
+        times=raw["t"],
+        log=log,
+        motion=found.motion,
+    )
+
+
+def _command_unit(card: Card) -> str:
+    """V or A, and nothing for a share or where no command is logged."""
+    spec = card.signals.get("u")
+    if spec is None:
+        return ""
+    return next((unit for unit in ("V", "A") if conversion(spec.unit, unit)), "")
+
+
+@dataclass(frozen=True, eq=False)
+class _Moved:
+    """What the motion of the runs tells, or why nothing."""
+
+    motion: Motion | None = None
+    ways: Ways | None = None
+    told: tuple[Told, ...] = ()
+    reason: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+def _moved(runs: Sequence[Log], rig: Rig) -> _Moved:
+    """Motion, directions and what they tell of each parameter."""
+    log = max(runs, key=len)
+    motion = differentiate(log["y"], log.h)
+    try:
+        if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
+            runs = [run.with_signals(F=run["u"]) for run in runs]
+            rig = replace(rig, force_per_command=1.0)
+        recorded = recorded_logs(runs, rig)
+        m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
+    except (BadLog, NotIdentifiable) as error:
+        return _Moved(motion, reason=str(error))
+    events = [breakaways(one, m) for one in recorded.logs]
+    rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
+    ways = ways_of(recorded.logs, events, rests)
+    follows = _actuator_follows(recorded)
+    try:
+        told = told_by(recorded, ways, imposed=led_by_rig(recorded), actuator=follows)
+    except NotIdentifiable as error:
+        return _Moved(motion, ways, reason=str(error))
+    always = constant_force(recorded.plain, held=recorded.held)
+    unit = units_of(rig.motion)["F_cp"]
+    said = () if always is None else (constant_remark(always, unit),)
+    return _Moved(motion, ways, told, remarks=said)
+
+
+def _actuator_follows(recorded: RecordedLogs) -> bool | None:
+    """Whether the force follows the command as a linear actuator's; None without a command."""
+    if recorded.held or not commanded(recorded.plain):
+        return None
+    return left_by_actuator(recorded.plain) <= LINEAR_ACTUATOR
+
+
+def _as_far_as_it_goes(raw: Log, path: Path, card: Card) -> tuple[Log, ...]:
+    """A refused log on an even clock, where that can be had."""
+    try:
+        check_time(raw)
+        return even_clock(with_force(raw, path, card))
+    except (BadLog, ValueError):
+        return ()
+
+
+def _clock_of(t: Array) -> Clock:
+    step = np.diff(t)
+    step = step[np.isfinite(step)]
+    h = float(np.median(step)) if len(step) else 0.0
+    usual = step[(step > 0.0) & (step < LONGEST_GAP * h)]
+    jitter = float(np.std(usual)) / h if h > 0.0 and len(usual) else 0.0
+    gaps = step[step > LONGEST_GAP * h] if h > 0.0 else step[:0]
+    longest = float(np.max(gaps)) if len(gaps) else 0.0
+    return Clock(len(t), float(t[-1] - t[0]), h, jitter, len(gaps), longest)
+
+
+def _sensor(name: str, x: Array) -> SensorState:
+    good = x[np.isfinite(x)]
+    if len(good) < 4:
+        return SensorState(name, 0.0, 0.0, 0.0, 0.0)
+    return SensorState(name, float(good.min()), float(good.max()), local_noise(good),
+                       resolution(good))  # fmt: skip
+
+
+def _delays(log: Log, motion: Motion) -> tuple[Delay, ...]:
+    """How late the command acts, and how far the position is behind its reference."""
+    out = []
+    longest = max(2, round(LONGEST_LAG / log.h))
+    if "u" in log and "F" in log and np.ptp(log["u"]) > 0.0:
+        smooth = {key: low_pass(log[key], log.h, motion.cutoff) for key in ("u", "F")}
+        one = np.ones(len(log))
+        if np.allclose(log["F"], log["u"] * _ratio(log), rtol=1e-6):  # of a motor
+            target, on = motion.a, "motion"
+            others = np.column_stack([motion.v, np.sign(motion.v), one])
+        else:
+            target, on = np.gradient(smooth["F"], log.h), "force"
+            others = np.column_stack([motion.v, one])
+        late, gain = command_lag(target, others, smooth["u"], longest)
+        late -= HALF_A_HOLD  # what is held over a period acts half of it later on the average
+        out.append(Delay("u", on, late * log.h if gain > SURE_LAG and late > LEAST_LAG else None))
+    if "r" in log and np.ptp(log["r"]) > 0.0:
+        found = lead(log["r"], log["y"])
+        out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))
+    return tuple(out)
+
+
+def _ratio(log: Log) -> float:
+    at = int(np.argmax(np.abs(log["u"])))
+    return float(log["F"][at] / log["u"][at]) if log["u"][at] != 0.0 else 0.0
+
+
+def doctor_document(found: Examined, card: str) -> dict[str, Any]:
+    """What was seen, as doctor.json holds it; in SI."""
+    return {
+        "schema": DOCTOR_SCHEMA,
+        "card": card,
+        "file": found.file,
+        "verdict": found.verdict,
+        "refused": found.refused or None,
+        "clock": asdict(found.clock),
+        "signals": {one.name: {k: v for k, v in asdict(one).items() if k != "name"}
+                    for one in found.sensors},
+        "bad_samples": [one.as_json() for one in found.bad],
+        "delays": [asdict(one) for one in found.delays],
+        "motion": None if found.ways is None else asdict(found.ways),
+        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None}
+                 for one in found.told},
+        "add": found.add,
+        "remarks": found.remarks,
+    }  # fmt: skip

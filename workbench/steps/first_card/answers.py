@@ -1,0 +1,101 @@
+"""What somebody answers to a guess of the first card, and the card with it."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from identification.errors import BadCard, UserError
+from workbench.cards.card import NEEDED_SIGNALS
+from workbench.cards.headers import written_unit
+from workbench.cards.nearest import nearest
+from workbench.cards.sensors import column_scale
+from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, SignalGuess
+
+LEAVE_OUT = "-"
+CONFIRMED = "confirmed"
+
+
+class BadAnswer(UserError):
+    """An answer that is no column, unit or number."""
+
+
+def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
+    """The proposal after an answer on one of its signals.
+
+    answer: empty (the guess is right), "-" (no such signal), or a column and its unit, or either
+    alone. Raises BadAnswer, one line, where it is none of these.
+    """
+    one = of.signal(name)
+    assert one is not None
+    text = answer.strip()
+    if text == LEAVE_OUT:
+        if name in NEEDED_SIGNALS[of.kind]:
+            raise BadAnswer(f'a rig of kind "{of.kind}" needs {name}; name its column')
+        return replace(of, signals=tuple(other for other in of.signals if other is not one))
+    found = replace(one, sure=True, why=CONFIRMED) if not text else _answered(of, one, text)
+    try:
+        gain = found.gain
+        column_scale(found.unit, gain, name, of.motion)
+    except BadCard as error:
+        raise BadAnswer(str(error)) from None
+    return replace(of, signals=tuple(found if other is one else other for other in of.signals))
+
+
+def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
+    """The proposal after an answer on a value of its rig: empty, "-" or a number (or a word).
+
+    Raises BadAnswer where it is none of these.
+    """
+    one = next(guess for guess in of.rig if guess.key == key)
+    text = answer.strip()
+    found: RigGuess = replace(one, sure=one.value is not None, why=CONFIRMED)
+    if key == "motion" and text:
+        if text not in ("linear", "rotary"):
+            raise BadAnswer(f"{text!r}: linear or rotary needed")
+        return replace(
+            of, motion="rotary" if text == "rotary" else "linear",
+            rig=tuple(replace(found, value=text) if x is one else x for x in of.rig),
+        )  # fmt: skip
+    if text == LEAVE_OUT:
+        if key in ("area_p_m2", "area_n_m2", "supply_pressure_pa") and (
+            of.kind == "electro-pneumatic"
+        ):
+            raise BadAnswer(f"a rig of two pressures needs {key}; give a number in {one.unit}")
+        found = replace(one, value=None)
+    elif text:
+        try:
+            number = float(text.replace(",", "."))
+        except ValueError:
+            raise BadAnswer(f"{text!r} is no number; give it in {one.unit}") from None
+        if not 0.0 < abs(number) < float("inf"):
+            raise BadAnswer(f"{text}: a number other than 0 needed, in {one.unit}")
+        found = replace(one, value=number, sure=True, why="given on the terminal")
+    return replace(of, rig=tuple(found if x is one else x for x in of.rig))
+
+
+def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
+    """The signal from a column, a unit, or both."""
+    names = _names(of)
+    given = replace(one, sure=True, why="given on the terminal")
+    if text in names:
+        column = names[text]
+        return replace(given, column=column.key, shown=column.shown, gain=None, bits=None)
+    before, _, last = text.rpartition(" ")
+    if before.strip() in names:
+        column = names[before.strip()]
+        return replace(given, column=column.key, shown=column.shown, unit=_unit(last),
+                       gain=None, bits=None)  # fmt: skip
+    if written_unit(text) is None:
+        raise BadAnswer(f"{text!r} is neither a column nor a unit{nearest(text, names)}")
+    return replace(given, unit=_unit(text), gain=None if isinstance(one.gain, str) else one.gain)
+
+
+def _unit(text: str) -> str:
+    found = written_unit(text)
+    return found.card if found else text
+
+
+def _names(of: Proposal) -> Mapping[str, FileColumn]:
+    """What a column may be called in an answer: its number, or its header where that is one's."""
+    headers = [one.header for one in of.columns]
+    own = {one.header: one for one in of.columns if headers.count(one.header) == 1 and one.header}
+    return {str(one.number): one for one in of.columns} | own

@@ -1,0 +1,246 @@
+"""Columns of an unknown log made comparable: the clock found, the others on its even grid."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog
+from identification.signals.differentiate import Motion, resolution
+from identification.signals.noise import local_noise
+from identification.signals.relations import motion_of
+from workbench.cards.card import FileSpec
+from workbench.cards.headers import Header, read_header
+from workbench.logs.unknown import RawColumn, UnknownLog
+
+MOST_ROWS_LOOKED_AT = 12_000
+MOST_MISSING = 0.1  # of a column that is used
+MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
+BITS = (16, 32)  # of a register that counts below zero as two's complement
+BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
+SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
+MOST_ROUNDED = 0.02  # of a signal, that its rounding is
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
+    without two's complement (`bits` of it, else None)."""
+
+    raw: RawColumn
+    header: Header
+    values: Array
+    x: Array
+    bits: int | None = None
+
+    @property
+    def shown(self) -> str:
+        """The column as a reader finds it in the file."""
+        header, number = self.raw.header, self.raw.number
+        if not header:
+            return f"number {number}"
+        return repr(header) if header == self.raw.key else f"{header!r} (number {number})"
+
+    @cached_property
+    def numbers(self) -> Array:
+        """The first values that are numbers, as many as are looked at."""
+        part = self.values[:MOST_ROWS_LOOKED_AT]
+        return np.asarray(part[np.isfinite(part)])
+
+    @cached_property
+    def motion(self) -> Motion | None:
+        """The column as if it were a position."""
+        return motion_of(self.x)
+
+    @cached_property
+    def noise(self) -> float:
+        """White noise and rounding of the column, one sigma."""
+        step = resolution(self.x)
+        return float(np.hypot(local_noise(self.x), step / np.sqrt(12.0)))
+
+    @cached_property
+    def whole(self) -> bool:
+        """Whether it has whole numbers alone."""
+        finite = self.values[np.isfinite(self.values)]
+        return bool(np.all(finite == np.round(finite)))
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """The clock, the columns that may be signals, and why each of the others is not.
+
+    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`.
+    """
+
+    path: Path
+    spec: FileSpec
+    clock: Column
+    step: float
+    grid: int
+    signals: tuple[Column, ...]
+    left_out: Mapping[int, str]
+    read: tuple[Column, ...]
+    scalars: tuple[Column, ...] = field(default=())
+
+
+def columns_of(log: UnknownLog) -> Columns:
+    """The columns of a log on one grid; raises BadLog where none of them is a clock."""
+    read = [_signed(_column(one)) for one in log.columns]
+    usable = [one for one in read if not _unusable(one)]
+    left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
+    clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
+    step = float(np.median(np.diff(clock.values)))
+    clocks = {one.raw.number for one in usable if one is not clock and _ticks(one)}
+    left_out |= dict.fromkeys(sorted(clocks), "goes up evenly, as another clock does")
+    others = [one for one in usable if one is not clock and one.raw.number not in clocks]
+    grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_LOOKED_AT))
+    signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
+    kept, twice = _without_doubles(signals)
+    return Columns(
+        log.path, log.spec, clock, step, grid, tuple(kept), left_out | twice,
+        tuple(read), tuple(_column(one) for one in log.scalars),
+    )  # fmt: skip
+
+
+def _column(raw: RawColumn) -> Column:
+    return Column(raw, read_header(raw.header, raw.unit_below), raw.values, raw.values)
+
+
+def _unusable(one: Column) -> str:
+    """Why a column cannot be a signal, empty where it can."""
+    if one.raw.unusable:
+        return one.raw.unusable
+    finite = np.isfinite(one.values)
+    if np.mean(~finite) > MOST_MISSING:
+        return f"{np.mean(~finite):.0%} of its values are missing"
+    if np.ptp(one.values[finite]) == 0.0:
+        return f"is always {one.values[finite][0] + 0.0:g}"
+    return ""
+
+
+def _signed(one: Column) -> Column:
+    """The column read as two's complement where it leaps over its range around 0."""
+    finite = one.values[np.isfinite(one.values)]
+    if not len(finite) or not one.whole or finite.min() < 0:
+        return one
+    for bits in BITS:
+        top = 2.0**bits
+        middle = (finite > top / 8) & (finite < top * 7 / 8)
+        low, high = np.mean(finite <= top / 8), np.mean(finite >= top * 7 / 8)
+        if finite.max() < top and np.mean(middle) < BETWEEN_SIGNS and low > 0.0 and high > 0.0:
+            values = np.where(one.values >= top / 2, one.values - top, one.values)
+            return replace(one, values=values, x=values, bits=bits)
+    return one
+
+
+def _ticks(one: Column) -> bool:
+    """Whether a column only goes up, by steps that are mostly alike or called times."""
+    if not _rises(one):
+        return False
+    step = np.diff(one.values)
+    middle = float(np.median(step))
+    even = np.mean(np.abs(step - middle) > 0.5 * middle) < MOST_UNEVEN
+    return bool(even) or "time" in one.header.means
+
+
+def _rises(one: Column) -> bool:
+    """Whether a column goes up from each row to the next."""
+    return bool(np.all(np.isfinite(one.values)) and np.all(np.diff(one.values) > 0.0))
+
+
+def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Column:
+    """The column that tells the time; texts: columns that hold no numbers.
+
+    Raises BadLog where there is none.
+    """
+    ticking = [one for one in columns if _ticks(one)]
+    rising = [one for one in columns if _rises(one)]
+    if not ticking and len(rising) == 1:  # a clock that is uneven, and called something else
+        return rising[0]
+    if not ticking:
+        named = [one for one in columns if "time" in one.header.means]
+        found = "no column goes up evenly from row to row"
+        if named:
+            step = np.diff(named[0].values)
+            wrong = int(np.flatnonzero(~(step > 0.0))[0]) if np.any(~(step > 0.0)) else 0
+            found = f"column {named[0].shown} does not go up evenly (see data row {wrong + 2})"
+        elif texts:
+            found = f"column {texts[0].shown} holds {texts[0].raw.unusable}"
+        raise BadLog(
+            f"{path}: no clock: {found}; log a column of times, or of sample numbers, that"
+            " increases from row to row"
+        )
+
+    def likely(one: Column) -> float:
+        means, unit = one.header.means, one.header.unit
+        counted = one.whole and float(np.median(np.diff(one.values))) == 1.0
+        return (
+            means.get("time", 0.0)
+            - means.get("count", 0.0)
+            + (4.0 if unit and unit.quantity == "time" else 0.0)
+            - (1.0 if counted else 0.0)
+            - (4.0 if unit and unit.quantity not in ("time", "count") else 0.0)
+        )
+
+    return max(ticking, key=likely)
+
+
+def _on_grid(t: Array, x: Array, step: float, size: int) -> Array:
+    """The column at even times, its means over so many steps of the clock, (k,)."""
+    good = np.isfinite(x)
+    count = min(round((t[-1] - t[0]) / step) + 1, 50 * len(t))
+    even = np.interp(t[0] + step * np.arange(count), t[good], x[good])
+    whole = len(even) // size
+    return np.asarray(even[: whole * size].reshape(whole, size).mean(axis=1))
+
+
+def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int, str]]:
+    """The columns without those that are another one in another unit, and what these are.
+
+    Of two the one whose header says more is kept, else the finer, else the later: what is made
+    from a sensor's output stands behind it.
+    """
+    kept, twice = list[Column](), dict[int, str]()
+    order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
+    for one in order:
+        same = next((other for other in kept if _same(one, other)), None)
+        if same is None:
+            kept.append(one)
+        else:
+            twice[one.raw.number] = f"is {same.shown} in another unit"
+    return sorted(kept, key=lambda one: one.raw.number), twice
+
+
+def _coarseness(one: Column) -> int:
+    """How coarse a column is: the power of ten of its step over its range, 0 without a step."""
+    width = float(np.ptp(one.numbers)) if len(one.numbers) else 0.0
+    step = resolution(one.numbers) / width if width > 0.0 else 0.0
+    return 0 if step == 0.0 else max(0, 8 + round(np.log10(step)))
+
+
+def _said(one: Column) -> float:
+    """How much a header tells: a sensor's own volts and counts less than the signal's unit."""
+    unit = one.header.unit
+    raw = unit is not None and unit.quantity in ("command", "count")
+    known = 0.0 if unit is None or raw else 4.0
+    known -= 3.0 if one.header.purpose == "error" else 0.0
+    means = (weight for what, weight in one.header.means.items() if what != "other")
+    return known + max(means, default=0.0) - (1.0 if raw else 0.0)
+
+
+def _same(one: Column, other: Column) -> bool:
+    """Whether two columns are one signal but for scale and offset: what is left is rounding."""
+    first, second = one.values[:MOST_ROWS_LOOKED_AT], other.values[:MOST_ROWS_LOOKED_AT]
+    both = np.isfinite(first) & np.isfinite(second)
+    a, b = first[both] - first[both].mean(), second[both] - second[both].mean()
+    square, spread = float(a @ a), float(np.std(b))
+    if square == 0.0 or spread == 0.0:
+        return False
+    factor = float(a @ b) / square
+    left = float(np.sqrt(np.mean((b - factor * a) ** 2)))
+    rounding = np.hypot(resolution(second[both]), abs(factor) * resolution(first[both]))
+    allowed = max(float(rounding) / np.sqrt(12.0), 1e-9 * spread)
+    return left < SAME_SIGNAL * allowed and left < MOST_ROUNDED * spread

@@ -1,0 +1,315 @@
+"""A card proposed for a log that none describes, with the reason of each of its lines."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from identification.errors import BadLog
+from identification.log import RigKind
+from identification.signals.relations import force_law, lead
+from workbench.cards.card import FileSpec
+from workbench.cards.units import Motion
+from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card.columns import Column, Columns, columns_of
+from workbench.steps.first_card.roles import Roles, told_roles
+from workbench.steps.first_card.sizes import UnitGuess, factor
+from workbench.steps.first_card.unit_guess import guessed_units, told_motion
+from workbench.steps.first_card.weights import SURE, said
+
+CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
+MOTOR_CONSTANT = re.compile(
+    r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
+)
+AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
+LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
+BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
+
+
+@dataclass(frozen=True)
+class SignalGuess:
+    """One signal of the card: its column (as the card names it and as the file shows it), unit and
+    gain, whether column and unit are sure, and why."""
+
+    name: str
+    column: str | int
+    shown: str
+    unit: str
+    gain: float | str | None
+    bits: int | None
+    sure: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class RigGuess:
+    """A value of the rig; None where only who knows the machine can give it."""
+
+    key: str
+    value: float | str | None
+    unit: str
+    sure: bool
+    why: str
+
+
+@dataclass(frozen=True)
+class FileColumn:
+    """A column of the file: its number, its header, what a card calls it, and how it is shown."""
+
+    number: int
+    header: str
+    key: str | int
+    shown: str
+
+
+@dataclass(frozen=True)
+class Proposal:
+    """What a card should say of a log: signals and rig, columns that are left out (shown: why),
+    every column of the file, and what else was noticed."""
+
+    path: Path
+    name: str
+    kind: RigKind
+    motion: Motion
+    spec: FileSpec
+    signals: tuple[SignalGuess, ...]
+    rig: tuple[RigGuess, ...]
+    unused: Mapping[str, str]
+    columns: tuple[FileColumn, ...]
+    remarks: tuple[str, ...] = ()
+
+    def signal(self, name: str) -> SignalGuess | None:
+        """The signal of that name; None where the card has none."""
+        return next((one for one in self.signals if one.name == name), None)
+
+    def as_json(self) -> dict[str, Any]:
+        """The proposal as --json prints it."""
+        return {
+            "card": self.name,
+            "log": str(self.path),
+            "rig": {"kind": self.kind, "motion": self.motion,
+                    **{one.key: one.value for one in self.rig}},
+            "signals": {
+                one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
+                           "bits": one.bits, "sure": one.sure, "why": one.why}
+                for one in self.signals
+            },
+            "file": self.spec.model_dump(exclude_defaults=True),
+            "unused": dict(self.unused),
+            "remarks": self.remarks,
+        }  # fmt: skip
+
+
+def proposed(path: Path, name: str | None = None) -> Proposal:
+    """The card that fits the log in the file best; name: of the card, by default the file's.
+
+    Raises BadLog, one line, where no clock is found, or no column that moves as a driven body.
+    """
+    columns = columns_of(read_unknown(path))
+    roles = told_roles(columns)
+    if roles is None:
+        there = ", ".join(one.shown for one in columns.signals) or "none"
+        raise BadLog(
+            f"{path}: no column moves as a body that another one drives (looked at: {there}); a"
+            " position is needed that goes both ways, and beside it a force, two pressures or a"
+            " motor's command; or write the card by hand (docs/contract.md)"
+        )
+    _refuse_resting(columns, roles)
+    roles, area = _pressure_beside_force(columns, roles)
+    motion, by = told_motion(roles)
+    units = guessed_units(columns, roles, motion)
+    rig = [_motion_guess(motion, by), *_rig(columns, roles, motion)]
+    if area is not None:
+        rig.append(_area_of(area, roles, units))
+    return Proposal(
+        path=path,
+        name=_card_name(name or path.stem),
+        kind=roles.kind,
+        motion=motion,
+        spec=columns.spec,
+        signals=tuple(_signals(columns, roles, units)),
+        rig=tuple(one for one in rig if one is not None),
+        unused=_unused(columns, roles),
+        columns=tuple(
+            FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
+            for one in columns.read
+        ),
+        remarks=tuple(_remarks(columns, roles, units)),
+    )
+
+
+def _refuse_resting(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where a position by its header stands still, and another column is none."""
+    y = roles.columns["y"]
+    for one in columns.read:
+        why = columns.left_out.get(one.raw.number, "")
+        if why.startswith("is always") and said(one, "y") >= max(SURE, said(y, "y") + 1.0):
+            raise BadLog(
+                f"{columns.path}: column {one.shown}, the position by its header, {why}; motion"
+                " needed: check the sensor, or leave the column out"
+            )
+
+
+def _card_name(text: str) -> str:
+    return re.sub(r"[^\w.-]+", "-", text).strip("-.") or "machine"
+
+
+def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str | None]:
+    """The roles with the pressures that are logged beside a measured force, and the name of the
+    one that the force bears, where it is off zero by more than friction."""
+    if roles.kind != "force":
+        return roles, None
+    taken = {one.raw.number for one in roles.columns.values()}
+    found = [one for one in columns.signals if one.raw.number not in taken and said(one, "p") > 2.0]
+    y = roles.columns["y"]
+    assert y.motion is not None
+    if len(found) == 2:
+        law = force_law(y.motion, y.x, found[0].x - found[1].x)
+        ahead = law is None or law.way > 0.0
+        pair = dict(zip(("p_p", "p_n"), found if ahead else found[::-1], strict=True))
+    elif len(found) == 1:
+        balance = roles.law.way * roles.law.balance
+        pair = {"p_n" if balance > 0.0 else "p_p": found[0]}
+    else:
+        return roles, None
+    why = dict.fromkeys(pair, "the header says pressure; the force's sign tells the chamber")
+    added = replace(
+        roles,
+        columns={**roles.columns, **pair},
+        signs={**roles.signs, **dict.fromkeys(pair, 1.0)},
+        odds={**roles.odds, **dict.fromkeys(pair, SURE)},
+        why={**roles.why, **why},
+    )
+    bears = abs(roles.law.balance) > BALANCED * abs(roles.law.coulomb)
+    return added, next(iter(pair)) if len(pair) == 1 and bears else None
+
+
+def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGuess:
+    """The area on which a pressure beside the force acts: it makes friction alike both ways."""
+    mean = float(np.mean(roles.columns[name].x)) * factor(units[name].unit)
+    area = abs(roles.law.balance) * factor(units["F"].unit) / mean
+    key = "area_p_m2" if name == "p_p" else "area_n_m2"
+    why = "with it friction is alike in both directions; the bore tells it better"
+    return RigGuess(key, float(f"{area:.3g}"), "m^2", False, why)
+
+
+def _motion_guess(motion: Motion, by: str) -> RigGuess | None:
+    if motion == "linear" and not by:
+        return None
+    why = by or "the usual one: no unit and no word says that it turns"
+    return RigGuess("motion", motion, "", bool(by), why)
+
+
+def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
+    """The numbers of the rig that a log can tell, and those that it needs beside the log."""
+    out = []
+    if roles.kind == "electro-pneumatic":
+        even = abs(roles.area_ratio - 1.0) < 1e-9
+        why = "no log tells it, measure bore and rod; the motion goes best with "
+        why += "equal areas" if even else f"an area_n {roles.area_ratio:.2g} times area_p"
+        out.append(RigGuess("area_p_m2", 1e-3, "m^2", False, why))
+        out.append(RigGuess("area_n_m2", float(f"{1e-3 * roles.area_ratio:.3g}"), "m^2", False,
+                            "as area_p_m2: measure bore and rod"))  # fmt: skip
+        out.append(RigGuess("supply_pressure_pa", 6e5, "Pa", False,
+                            "no log tells it; it matters where the areas differ"))  # fmt: skip
+    if roles.kind == "motor":
+        force = "N m" if motion == "rotary" else "N"
+        out.append(_motor_constant(columns, force))
+    if "u" in roles.columns and (limit := _limit(roles.columns["u"])) is not None:
+        out.append(RigGuess("control_limit_v", limit, "unit of u", False,
+                            "the command stops there again and again"))  # fmt: skip
+    return out
+
+
+def _motor_constant(columns: Columns, force: str) -> RigGuess:
+    """Force per command from a single value in the file whose name says so."""
+    for one in columns.scalars:
+        if MOTOR_CONSTANT.search(one.raw.header.strip()) and np.isfinite(one.values[0]):
+            why = f"the file's {one.raw.header!r}; check that it is {force} for one unit of u"
+            return RigGuess("force_per_command", float(one.values[0]), f"{force}/u", False, why)
+    why = (
+        "no log tells it: the motor's constant times the amplifier's gain; identify needs it"
+        " (1: forces in units of the command)"
+    )
+    return RigGuess("force_per_command", None, f"{force}/u", False, why)
+
+
+def _limit(u: Column) -> float | None:
+    """Size of the command at which it stops in both directions, else None."""
+    finite = u.values[np.isfinite(u.values)]
+    low, high = float(finite.min()), float(finite.max())
+    if not low < 0.0 < high or abs(low + high) > 1e-3 * high:
+        return None
+    if len(np.unique(finite)) < LEVELS_OF_COMMAND:
+        return None
+    at = (finite == low) | (finite == high)
+    return high if np.count_nonzero(at[1:] & at[:-1]) >= AT_LIMIT else None
+
+
+def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> list[SignalGuess]:
+    """The card's signals in the usual order."""
+    out = []
+    found = {"t": columns.clock, **roles.columns}
+    for name in (name for name in CARD_ORDER if name in found):
+        one, unit = found[name], units[name]
+        sign = roles.signs.get(name, 1.0)
+        gain: float | str | None = unit.gain if unit.gain is not None else None
+        if sign < 0.0:
+            gain = -1.0 if gain is None else f"-{gain}"
+        odds = SURE if name == "t" else roles.odds[name]
+        why = "it goes up evenly" if name == "t" else roles.why.get(name, "the header says so")
+        if sign < 0.0:
+            why += "; with this sign friction takes energy" if name != "r" else ""
+        why += f"; unit {unit.why}"
+        known = unit.sure or name == "u"
+        out.append(
+            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits,
+                        odds >= SURE and known, why)
+        )  # fmt: skip
+    return out
+
+
+def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
+    """Columns that the card leaves out, and why."""
+    used = {one.raw.number: name for name, one in roles.columns.items() if name in CARD_ORDER}
+    out = {}
+    for one in columns.signals:
+        name = next((name for name, c in roles.columns.items() if c is one), None)
+        if one.raw.number not in used:
+            out[one.shown] = roles.why.get(name or "", "no signal that a card needs")
+    shown = {one.raw.number: one.shown for one in columns.read}
+    for number, why in columns.left_out.items():
+        out[shown[number]] = why
+    return out
+
+
+def _remarks(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> list[str]:
+    """Delays that no key of a card holds, and a clock that is not even."""
+    out = []
+    clock = units["t"]
+    second = factor(clock.unit) if clock.gain is None else 1.0 / float(clock.gain.split()[0])
+    h = columns.step * second
+    steps = np.diff(columns.clock.values) * second
+    uneven = float(np.std(steps[steps < 3.0 * h]) / h)
+    even = "an even clock" if uneven < 1e-3 else f"a clock that jitters by {uneven:.1%}"
+    out.append(f"{len(columns.clock.values)} rows every {h:.4g} s, {even}")
+    gaps = int(np.sum(steps > 5.0 * h))
+    if gaps:
+        many = f"{gaps} gap" + ("s" if gaps > 1 else "")
+        out.append(f"{many} in the clock, the longest of {float(np.max(steps)):.3g} s")
+    if roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
+        balance, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
+        if balance > BALANCED * coulomb:
+            out.append(
+                f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
+                f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
+            )
+    if "r" in roles.columns:
+        y = roles.columns["y"]
+        found = lead(roles.columns["r"].x, y.x)
+        late = found.samples * h * columns.grid
+        out.append(f"the position follows the reference by {1e3 * late:.3g} ms")
+    return out

@@ -1,0 +1,91 @@
+"""Gains that no header gives: counts and volts of a position, and the rate of counted samples."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.signals.relations import derivative, lead
+from workbench.cards.units import Motion
+from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.roles import Roles
+from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre
+
+COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
+WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
+ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
+ABOUT = 0.05  # that a round gain is off what the log shows
+SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
+SENSOR_OUTPUTS = ("command", "count")
+
+
+def by_reference(roles: Roles, given: Mapping[str, UnitGuess], motion: Motion) -> UnitGuess | None:
+    """The gain of a position in counts or volts, from a reference whose unit is known."""
+    y, r = roles.columns["y"], roles.columns.get("r")
+    if not is_output(y):
+        return None
+    unit = "V" if y.header.unit and y.header.unit.quantity == "command" else "count"
+    per = "turn" if motion == "rotary" else "mm"
+    if r is not None and not is_output(r):
+        together = lead(r.x, y.x)
+        known = given.get("r")
+        usual = USUAL["y" if motion == "linear" else "y rotary"]
+        per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)
+        if abs(together.likeness) > WELL_KNOWN:
+            number = _sensible(_slow_ratio(y.x, r.x), per == "turn")
+            why = f"by its size beside the reference {r.shown}"
+            return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
+    number = 4096.0 if motion == "rotary" else 1000.0
+    if unit == "V":
+        number = _sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0))
+    why = "nothing in the log tells it: the sensor's data sheet does"
+    return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
+
+
+def is_output(column: Column) -> bool:
+    """Whether a position is what a sensor gives: counts, volts, or whole numbers without a unit."""
+    unit = column.header.unit
+    if unit is not None:
+        return unit.quantity in SENSOR_OUTPUTS
+    return column.whole and len(np.unique(column.numbers)) > COUNTED_LEVELS
+
+
+def _slow_ratio(y: Array, r: Array) -> float:
+    """How large a position is beside its reference where both are slow: it overshoots fast ones."""
+    count = max(SLOW_STRETCHES, 2)
+    size = max(1, len(y) // count)
+    a, b = (x[: len(x) // size * size].reshape(-1, size).mean(axis=1) for x in (y, r))
+    a, b = a - a.mean(), b - b.mean()
+    return float(a @ b / (b @ b))
+
+
+def _sensible(number: float, of_turn: bool = False) -> float:
+    """The number to three digits, or a round one (of a turn a power of two) that is as near."""
+    if number == 0.0:
+        return 1.0
+    size = abs(number)
+    decade = 10.0 ** np.floor(np.log10(size))
+    round_ones = [digit * decade for digit in ROUND_DIGITS]
+    round_ones += [2.0 ** round(np.log2(size))] if of_turn else []
+    nearest = min(round_ones, key=lambda one: abs(np.log(one / size)))
+    if abs(nearest / size - 1.0) < ABOUT:
+        return float(np.sign(number) * nearest)
+    return float(f"{number:.3g}")
+
+
+def counts_samples(clock: Column) -> bool:
+    """Whether the clock is the number of a sample."""
+    means = clock.header.means
+    return clock.whole and means.get("count", 0.0) > means.get("time", 0.0)
+
+
+def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:
+    """The rate of a log that counts its samples: by a velocity of known unit, else a usual one."""
+    rate, why = 1000.0, "a usual one: sample numbers tell no time, and nothing else here does"
+    if {"y", "v"} <= set(given) and "v" in roles.columns:
+        motion = roles.columns["y"].motion
+        assert motion is not None
+        slope = derivative(motion, roles.columns["v"].x).factor / columns.grid
+        told = abs(slope) * factor(given["v"].unit) / metre(given["y"].unit, given["y"])
+        rate, why = _sensible(told * columns.step), "by the velocity and the position"
+    return UnitGuess("1", f"{rate:.9g} 1/s", False, why)

@@ -1,0 +1,68 @@
+"""A proposal as the text of a card, each line with what is sure of it and why."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+from identification.errors import UserError
+from workbench.cards.card import load_card
+from workbench.cards.card_text import Line, card_text
+from workbench.logs.runs import read_runs
+from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
+
+_RIG_WORDS = {
+    "electro-pneumatic": "F_e from two pressures",
+    "force": "F_e is logged",
+    "motor": "F_e = force_per_command * u",
+}
+LEGEND = (
+    '"sure" and "guess" say how far the log itself tells a line; look at each guess before you use',
+    "the card. All keys: docs/contract.md, Card.",
+)
+
+
+def written(of: Proposal, *, asked: bool = False) -> str:
+    """The card's text; asked: somebody has confirmed it on a terminal."""
+    by = ", confirmed on a terminal" if asked else ""
+    head = (f"Written by workbench init from {of.path.name}{by}.", *LEGEND)
+    tables: dict[str, Sequence[Line]] = {
+        "card": [Line("name", of.name)],
+        "rig": [Line("kind", of.kind, _RIG_WORDS[of.kind]), *map(_rig_line, of.rig)],
+        "signals": [_signal_line(one) for one in of.signals],
+    }
+    layout = of.spec.model_dump(exclude_defaults=True)
+    if layout:
+        tables["file"] = [Line(key, value) for key, value in layout.items()]
+    return card_text(head, tables, _tail(of))
+
+
+def _rig_line(one: RigGuess) -> Line:
+    return Line(one.key, one.value, _remark(one.sure, f"{one.unit}: {one.why}".lstrip(": ")))
+
+
+def _signal_line(one: SignalGuess) -> Line:
+    value: Mapping[str, object] = {"column": one.column, "unit": one.unit}
+    if one.gain is not None:
+        value = {**value, "gain": one.gain}
+    if one.bits is not None:
+        value = {**value, "bits": one.bits, "signed": True}
+    named = isinstance(one.column, int) and not one.shown.startswith("number")
+    why = f"{one.shown}: {one.why}" if named else one.why
+    return Line(one.name, value, _remark(one.sure, why))
+
+
+def _remark(sure: bool, why: str) -> str:
+    return f"{'sure' if sure else 'guess'}: {why}"
+
+
+def _tail(of: Proposal) -> list[str]:
+    lines = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
+    return [*of.remarks, *lines]
+
+
+def refusal(log: Path, card: Path) -> str:
+    """Why the log cannot be read by the card, in one line; empty where it can."""
+    try:
+        read_runs(log, load_card(card))
+    except UserError as error:
+        return str(error)
+    return ""
