@@ -45,7 +45,7 @@ from workbench.cards.card import load_card
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.export.c import c_files
-from workbench.export.exported import Exported, exported
+from workbench.export.exported import Exported, Precision, exported
 from workbench.logs.fetch import DATA_VARIABLE, card_path
 from workbench.logs.sources import Source, Sources, read_sources
 from workbench.steps.closed_loop import run_driven
@@ -193,9 +193,9 @@ def compared(one: Made, builds: Sequence[str], folder: Path) -> Iterator[str]:
             )
 
 
-def order_four(one: Made, precision: str) -> Exported:
+def order_four(one: Made, precision: Precision) -> Exported:
     """`ORDER_4` above the design's force loop, beside its compensator, all at one rate."""
-    what = exported(one.design, "rst", precision="single" if precision == "single" else "double")
+    what = exported(one.design, "rst", compensated=True, precision=precision)
     assert what.loop.force is not None
     force = replace(what.loop.force, h=ORDER_4.h)
     loop = replace(what.loop, law=drive_law(ORDER_4, 0.1), force=force, limit=5.0)
@@ -253,7 +253,8 @@ def timed(one: Made, folder: Path, build: str) -> None:
     rng = np.random.default_rng(2)
     print(f"\none step, RST of order 4 with force loop and compensator ({build})")
     program: Program | None = None
-    for precision in ("double", "single"):
+    both: tuple[Precision, ...] = ("double", "single")
+    for precision in both:
         what = order_four(one, precision)
         program = what.program
         inputs = 0.01 * rng.standard_normal((STEPS, len(program.inputs)))
