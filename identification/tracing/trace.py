@@ -62,7 +62,7 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
-    begin, choose, settle = rng.spawn(3)
+    begin, settle, choose = rng.spawn(3)
     halt = Halt(keep_going)
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
     report("refitting", 0.0)
@@ -82,11 +82,11 @@ def _chosen(
 ) -> Selection:  # fmt: skip
     """The effects that the equations call for, on logs whose command is known between its samples.
 
-    rngs: of the plain model and the first effect, and of the choice of the others.
+    rngs: of the plain model, which is begun as `fit_plant` begins, and of the choice of effects.
     """
-    begin, choose = rngs
+    _, choose = rngs
     report("recording", 0.0)
-    first = _first(recorded_rows(train, rig, library, halt), rig, library, begin, report)
+    first = _first(recorded_rows(train, rig, library, halt), rig, library, rngs, report)
     share = share_beside(first.plain, first.choice)
     if share == 0.0:
         chosen = selection(first, choose, report)
@@ -94,14 +94,15 @@ def _chosen(
         if share == 0.0:
             return chosen
     rows = recorded_rows(train, rig, library, halt, share)
-    return selection(_first(rows, rig, library, begin, report), choose, report)
+    return selection(_first(rows, rig, library, rngs, report), choose, report)
 
 
 def _first(
-    rows: RecordedRows, rig: Rig, library: Library, rng: np.random.Generator, report: Progress
-) -> FirstEffect:
+    rows: RecordedRows, rig: Rig, library: Library,
+    rngs: tuple[np.random.Generator, np.random.Generator], report: Progress,
+) -> FirstEffect:  # fmt: skip
     """The plain model of the rows, and the effect that the equations call for first beside it."""
-    begin, choose = rng.spawn(2)
+    begin, choose = rngs
     report("refining", 0.0)
     plain = plain_model(rows, library, begin)
     report("tracing", 0.0)

@@ -14,7 +14,7 @@ from tests.workbench.log_files import WRITERS, card, signals
 from workbench.cards.card import load_card
 from workbench.cards.own_effects import load_effect
 from workbench.documents.model import read_model
-from workbench.logs import tables, text
+from workbench.logs import table, tables, text
 from workbench.logs.fetch import card_path
 from workbench.logs.runs import read_log
 from workbench.steps.drift import read_stream
@@ -79,7 +79,7 @@ def test_more_rows_than_memory_bears_are_refused_before_they_are_read(
     WRITERS[name](tmp_path / name, signals())
     sound = card(tmp_path)
     assert len(read_log(tmp_path / name, sound)) == 400
-    monkeypatch.setattr(tables, "MOST_ROWS", 399)
+    monkeypatch.setattr(table, "MOST_ROWS", 399)
     with pytest.raises(UserError, match="has 400 rows, at most 399 are read"):
         read_log(tmp_path / name, sound)
 

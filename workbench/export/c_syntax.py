@@ -7,7 +7,7 @@ from workbench.export.exported import Precision
 from workbench.export.syntax import Syntax, braced, state_names
 
 # Python's names that are keywords of C, and one of a function of its library.
-KEYWORDS = (
+C_KEYWORDS = (
     "auto", "case", "char", "const", "default", "do", "double", "enum", "extern", "float", "goto",
     "inline", "int", "long", "register", "restrict", "short", "signed", "sizeof", "static",
     "struct", "switch", "typedef", "union", "unsigned", "void", "volatile", "free",
@@ -46,7 +46,7 @@ def c_syntax(program: Program, precision: Precision) -> C:
             "or": "||", "==": "==", "!=": "!=", "<": "<", "<=": "<=", ">": ">", ">=": ">=",
         },
         functions={"min": f"{short}_min", "max": f"{short}_max", "abs": f"{short}_abs"},
-        names={word: f"{word}_" for word in KEYWORDS},
+        names={word: f"{word}_" for word in C_KEYWORDS},
         states=state_names(program),
         kept="s->",
     )  # fmt: skip

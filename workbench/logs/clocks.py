@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.errors import BadLog
 from identification.signals.clean import LONGEST_GAP, at_times
 
-_MEASURED = ("y", "F", "p_p", "p_n")
+_SENSED = ("y", "F", "p_p", "p_n")
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
 Clock = Callable[[str], Array]
@@ -47,7 +47,7 @@ def on_one_clock(
         _check(f"{where}, the clock of group {group!r}", times[known])
         period = _period(times)
         for name in members[group]:
-            if name in _MEASURED and period > _SLOWEST * h:
+            if name in _SENSED and period > _SLOWEST * h:
                 raise BadLog(_too_slow(where, name, group, period, h))
             if len(signals[name]) != len(times):
                 raise BadLog(_unequal(where, name, group, len(signals[name]), len(times)))

@@ -15,7 +15,7 @@ NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|[+-]?inf(inity)?
 
 _IN_A_ROW = 3  # lines of data that show where it begins
 _DATA_SHARE = 0.5  # of a line's fields above which numbers and times make it a line of data
-_UNITS = re.compile(
+_UNIT_CELL = re.compile(
     r"[\[(<].{0,20}[\])>]|[mµun]?[sm]|min|h|cm|km|inch?|deg|°|m?rad|rev|inc|"
     r"(?:[mkM]?(?:Pa|bar|N|V|A|W|g|Hz)|hPa|psi|[mk]?N ?m|lbf?|kgf)|%|-|1|"
     r"(?:[mµ]?m|deg|rad|rev|inc|°|U)/(?:s|min)(?:\^?2|²)?|rpm|1/min|min-1|°?[CFK]|"
@@ -102,7 +102,7 @@ def _is_data(line: Sequence[str], width: int) -> bool:
 
 def _is_units(line: Sequence[str]) -> bool:
     told = [field for field in line if field]
-    return 2 * len(told) >= len(line) and all(_UNITS.fullmatch(field) for field in told)
+    return 2 * len(told) >= len(line) and all(_UNIT_CELL.fullmatch(field) for field in told)
 
 
 def _scope(

