@@ -56,6 +56,8 @@ from workbench.steps.simulate import record
 STEPS = 1_000_000
 DWELL = 2.0  # s between the reference's steps
 ROUNDS = 5
+# The dialect of each compiler and the machine's own instructions: multiply and add in one among
+# them, which the source has to forbid by itself.
 BUILDS = {
     "gcc -O0": ("gcc", "-std=c99", "-O0"),
     "gcc -O2": ("gcc", "-O2", "-march=native"),

@@ -47,7 +47,7 @@ from identification.estimation.windowed_run.refinement import (
     refit,
 )
 from identification.estimation.windowed_run.run_errors import misfit
-from identification.estimation.windowed_run.stick_search import WIDEST_BAND, stick_search
+from identification.estimation.windowed_run.stick_search import stick_search, widest_band
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
@@ -369,10 +369,8 @@ def effect_sd(
 def band(model: FittedStructure) -> float:
     """Speed [m/s] above which the free run shows sliding friction; 0 without a free run."""
     p = model.plant.friction
-    signals = [one.signals for one in model.stage.logs]
-    pace = np.concatenate([np.abs(s["v"][s["d"] != 0]) for s in signals])
     # A run that is not followed may have any band; most of the sliding is judged all the same.
-    widest = WIDEST_BAND * float(np.median(pace)) if len(pace) else np.inf
+    widest = widest_band(model.stage.logs)
     return 0.0 if model.imposed else min(ABOVE_BAND * max(p.dv_p, -p.dv_n), widest)
 
 

@@ -19,6 +19,8 @@ SHORT_WINDOW = 1.0  # s, of the windows in which the search begins
 BAND_GRID = (0.12, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9, 1.0, 1.1, 1.3, 1.7, 2.3, 3.5)
 STICK_GRID = (0.8, 0.86, 0.9, 0.94, 0.97, 0.985, 1.0, 1.015, 1.03, 1.06, 1.1, 1.16, 1.25)
 FIRST_BANDS = (0.15, 0.5, 1.0)
+STICKS = (0.9, 1.0, 1.15, 1.4)
+CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 # Of `stick_search`: s of each log; the widest band over the usual speed, the slowest one over the
 # velocity's noise, and how far apart they are at most; stick limits over the Coulomb level; factors
 # close by; members and generations
@@ -27,8 +29,6 @@ WIDEST_BAND, SLOWEST_BAND, BANDS_SPAN = 0.4, 0.5, 200.0
 LIMITS_PER_COULOMB = (0.96, 2.8)
 NEAR_BAND, NEAR_LIMIT = 1.6, 1.06
 SIDE_CROWD, SIDE_GENERATIONS = 24, 10
-STICKS = (0.9, 1.0, 1.15, 1.4)
-CLOSER = (0.75, 0.92, 1.0, 1.08, 1.3)
 
 
 def start_band(plant: Plant, logs: Sequence[MotionLog], drive: Drive, band: float) -> Plant:
@@ -58,6 +58,12 @@ def by_side(plant: Plant, logs: Sequence[MotionLog], drive: Drive) -> Plant:
     return _best_of(best, down, errors_of)
 
 
+def widest_band(logs: Sequence[MotionLog]) -> float:
+    """The widest band [m/s] that a plant of these logs may have; infinite where nothing moves."""
+    pace = np.concatenate([np.abs(one.signals["v"][one.signals["d"] != 0]) for one in logs])
+    return WIDEST_BAND * float(np.median(pace)) if len(pace) else np.inf
+
+
 def stick_search(
     plant: Plant, logs: Sequence[MotionLog], drive: Drive, rng: np.random.Generator
 ) -> Plant:
@@ -68,10 +74,9 @@ def stick_search(
     their usual speed and from the Coulomb level to several times that, then close by.
     """
     part = [shortened(one, PIECE) for one in logs]
-    pace = np.concatenate([np.abs(one.signals["v"][one.signals["d"] != 0]) for one in part])
-    top = WIDEST_BAND * float(np.median(pace)) if len(pace) else 0.0
+    top = widest_band(part)
     slow = max(SLOWEST_BAND * min(one.v_noise for one in part), top / BANDS_SPAN)
-    if slow >= top:
+    if not slow < top < np.inf:
         return plant
     for close in (False, True):
         errors_of = judge(plant, part, drive, SHORT_WINDOW)

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.exported import BUILDS
 from identification.arrays import Array
 from tests.workbench.export.designs import NAMES, START, case, simulated
 from workbench.export.c import c_files
@@ -16,14 +17,6 @@ from workbench.export.exported import Exported, Precision, exported
 MANY, FEWER = 1_000_000, 100_000
 MILLION = ("limited", "emps")  # benchmarks/exported.py takes as many steps of every shipped set
 STRICT = ("-Wall", "-Wextra", "-Wconversion", "-Wshadow", "-pedantic", "-Werror")
-# The dialect of each compiler and the machine's own instructions: multiply and add in one among
-# them, which the source has to forbid by itself.
-BUILDS = {
-    "gcc -O0": ("gcc", "-std=c99", "-O0"),
-    "gcc -O2": ("gcc", "-O2", "-march=native"),
-    "clang -O0": ("clang", "-std=c99", "-O0"),
-    "clang -O2": ("clang", "-O2", "-march=native"),
-}
 DRIVER = """
 #include "{name}.h"
 void drive(long n, {name}_real y_0, const {name}_real *in, {name}_real *out);
