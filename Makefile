@@ -21,7 +21,7 @@ environment: $(VENV)/.installed-dev
 $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c '$(NEEDED)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) install --constraint constraints.txt hatchling
+	$(PIP) install --constraint constraints.txt hatchling 'setuptools>=70.1'
 	$(PIP) install --constraint constraints.txt --no-build-isolation --editable .
 	touch $@
 
