@@ -104,7 +104,7 @@ class Trace:
     it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
     each. complete: the model predicts the test logs down to the sensors' noise; left: what is
     missing beside the effects named. not_tried: in words, what a halted trace has not looked
-    for, so that its verdict is one for the time being.
+    for, so that its verdict is one for the time being. command_period: as of a fit.
     """
 
     verdict: TraceVerdict
@@ -128,3 +128,4 @@ class Trace:
     left: Left = Left(0.0, ())
     remarks: tuple[str, ...] = field(default=())
     not_tried: tuple[str, ...] = ()
+    command_period: float | None = None

@@ -138,6 +138,7 @@ def _told(
         remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
         complete=judged.complete and not not_tried,
         left=judged.rest,
+        command_period=rows.recorded.command_period,
     )
 
 

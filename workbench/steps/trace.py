@@ -143,6 +143,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
             force_relative=errors.force_relative,
             force_rms=errors.force_rms,
             remarks=found.remarks,
+            command_period=found.command_period,
         ),
         log=tuple(_entry(source, errors, chi) for source in sources.runs),
         versions=versions(),
