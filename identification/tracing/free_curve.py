@@ -11,8 +11,8 @@ from identification.tracing.regression.stepwise import Choice
 from identification.tracing.remaining_structure import signals_at
 from identification.tracing.result import FreeCurve
 
-PIECES = 40  # of the curve, with equally many rows each
-ROWS_A_PIECE = 8  # at least
+CURVE_PIECES = 40  # of the curve, with equally many rows each
+CURVE_ROWS = 8  # at least
 
 
 def free_curves(choice: Choice) -> tuple[FreeCurve, ...]:
@@ -31,7 +31,7 @@ def _curve_of(effect: Effect, choice: Choice) -> FreeCurve | None:
         signals = signals_at(choice.end, equation)
         names = [name for name in effect.depends_on if name in signals]
         keep = o.rows.speed >= o.slowest
-        if not own or not names or np.count_nonzero(keep) < 2 * ROWS_A_PIECE:
+        if not own or not names or np.count_nonzero(keep) < 2 * CURVE_ROWS:
             continue
         way = np.sign(signals["v"]) if not effect.place.sign else effect.place.sign
         law = (way * (o.rows.X[:, own] @ o.fit.theta[own]))[keep]
@@ -49,7 +49,7 @@ def _told_best(
 
 
 def _against(key: str, equation: str, name: str, x: Array, left: Array, law: Array) -> FreeCurve:
-    count = int(np.clip(len(x) // ROWS_A_PIECE, 2, PIECES))
+    count = int(np.clip(len(x) // CURVE_ROWS, 2, CURVE_PIECES))
     pieces: Sequence[Array] = np.array_split(np.argsort(x, kind="stable"), count)
     free = [(left + law)[piece] for piece in pieces]
     return FreeCurve(
