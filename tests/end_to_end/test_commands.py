@@ -214,6 +214,7 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     assert main(asked) == 1
     shown = capsys.readouterr().out
     assert "recommended: none" in shown and "RST misses: modulus margin" in shown
+    assert shown.splitlines()[-1].endswith(f"): workbench design {shop / 'id/model.json'}")
     assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
 
 
@@ -364,6 +365,7 @@ def test_a_model_without_a_plant_is_a_refusal(
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "refused"
     assert found["reason"].startswith("no ARX plant")
+    assert found["next"].startswith("workbench doctor short.csv --card ")
 
 
 def test_a_demo_that_fails_says_so_by_its_status(
