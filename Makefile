@@ -43,7 +43,7 @@ wheel: environment
 	$(BIN)/python tools/check_wheel.py
 
 tests: environment
-	$(BIN)/pytest -n $(WORKERS)
+	$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 bench: environment
 	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"

@@ -19,7 +19,7 @@ from workbench.ending import (
     BAD_INPUT,
     DONE,
     FAULT,
-    REFUSAL_OR_ALARM,
+    REFUSAL,
     Refused,
     Step,
     step,
@@ -46,11 +46,11 @@ COMMANDS = {
     "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
 }
 ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
-COMPLETION_VARIABLE = "_WORKBENCH_COMPLETE"  # set by the shell's completion script
+TAB_VARIABLE = "_WORKBENCH_COMPLETE"  # set by the shell's completion script
 COMPLETION = {
-    "bash": f'eval "$({COMPLETION_VARIABLE}=bash_source workbench)" in ~/.bashrc',
-    "zsh": f'eval "$({COMPLETION_VARIABLE}=zsh_source workbench)" in ~/.zshrc',
-    "fish": f"{COMPLETION_VARIABLE}=fish_source workbench | source in config.fish",
+    "bash": f'eval "$({TAB_VARIABLE}=bash_source workbench)" in ~/.bashrc',
+    "zsh": f'eval "$({TAB_VARIABLE}=zsh_source workbench)" in ~/.zshrc',
+    "fish": f"{TAB_VARIABLE}=fish_source workbench | source in config.fish",
 }
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
@@ -93,7 +93,7 @@ class LazyGroup(click.Group):
             formatter.write_dl(list(COMMANDS.items()))
         rows = [
             ("0", DONE),
-            ("1", REFUSAL_OR_ALARM),
+            ("1", REFUSAL),
             ("2", BAD_INPUT),
             ("3", FAULT),
             ("130", "Ctrl-C"),
@@ -207,11 +207,11 @@ def _cleared_on_a_signal() -> Iterator[None]:
 
 def _run(arguments: Sequence[str]) -> int:
     """Exit status of a command that ends without an error."""
-    asked = os.environ.get(COMPLETION_VARIABLE)
+    asked = os.environ.get(TAB_VARIABLE)
     if asked:
         from click.shell_completion import shell_complete
 
-        return shell_complete(cli, {}, "workbench", COMPLETION_VARIABLE, asked)
+        return shell_complete(cli, {}, "workbench", TAB_VARIABLE, asked)
     try:
         with cli.make_context("workbench", list(arguments)) as ctx:
             status = cli.invoke(ctx)

@@ -11,9 +11,7 @@ import click
 from identification.errors import NotIdentifiable
 
 DONE = "done"
-REFUSAL_OR_ALARM = (
-    "done, and the answer is a refusal or an alarm; its last line is the next command"
-)
+REFUSAL = "done, and the answer is a refusal or an alarm; its last line is the next command"
 BAD_INPUT = "bad input: one line says what was found, where, what is needed, what to do"
 FAULT = "a fault of ours; --debug shows where"
 

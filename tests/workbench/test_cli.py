@@ -129,7 +129,7 @@ def test_exit_status_stands_in_every_help() -> None:
 def test_completion(
     line: str, found: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(cli.COMPLETION_VARIABLE, "bash_complete")
+    monkeypatch.setenv(cli.TAB_VARIABLE, "bash_complete")
     monkeypatch.setenv("COMP_WORDS", line)
     monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
     cli.main([])
@@ -140,7 +140,7 @@ def test_completion_of_commands_imports_none_of_them() -> None:
     asked = {
         "COMP_WORDS": "workbench tr",
         "COMP_CWORD": "1",
-        cli.COMPLETION_VARIABLE: "bash_complete",
+        cli.TAB_VARIABLE: "bash_complete",
     }
     code = (
         "import sys; from workbench.cli import main; main([]);"
@@ -155,9 +155,9 @@ def test_completion_is_installed_by_a_script_of_its_shell(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for shell_name in ("zsh", "fish"):  # that of bash asks bash for its version
-        monkeypatch.setenv(cli.COMPLETION_VARIABLE, f"{shell_name}_source")
+        monkeypatch.setenv(cli.TAB_VARIABLE, f"{shell_name}_source")
         assert cli.main([]) == 0
-        assert f"{cli.COMPLETION_VARIABLE}={shell_name}_complete" in capsys.readouterr().out
+        assert f"{cli.TAB_VARIABLE}={shell_name}_complete" in capsys.readouterr().out
 
 
 def test_a_refusal_ends_with_the_next_command(
