@@ -101,7 +101,7 @@ def test_it_is_the_run_of_validate(name: str, tmp_path: Path) -> None:
     loop = present_loop(machine, now)
     every = round(recipe.h / loop.h)
     rng = np.random.default_rng(recipe.seed)
-    t = loop.h * np.arange((len(recipe.t) - 1) * every + 1)
+    t = loop.h * np.arange((len(recipe.t) - 1) * every + 1, dtype=np.float64)
     r = reference_signal(recipe.reference, t, rng)
     run = run_driven(machine, loop, r, rng)
     assert (every, len(log)) == (2 if "fast" in name else 1, 3001)
