@@ -96,23 +96,16 @@ def between(old: Karnopp, new: Karnopp, wear: float) -> Karnopp:
 
 
 def story(
-    root: Path,
-    seed: int,
-    count: int = 24,
-    on_day: Callable[["Told"], None] = lambda _told: None,
-    duration: float = 40.0,
+    root: Path, seed: int, count: int = 24, on_day: Callable[["Told"], None] = lambda _told: None
 ) -> list[Told]:
-    """The first `count` logs, one after the other, each judged by a pass of its own.
-
-    duration: of a log [s].
-    """
+    """The first `count` logs, one after the other, each judged by a pass of its own."""
     machine = root / "machines" / "rig"
     (machine / "logs").mkdir(parents=True)
     (machine / "card.toml").write_text(CARD, encoding="utf-8")
     told = []
     with Registry(str(root / "registry.db")) as registry:
         for day in list(days())[:count]:
-            write(machine / "logs", day, seed, duration)
+            write(machine / "logs", day, seed)
             settings = PassSettings("scenario", first=True, settle=timedelta(0))
             now = day.at + timedelta(minutes=5)
             Pass(registry, Chain(), settings, partial(at, now), silent).run(root / "machines")
@@ -143,7 +136,7 @@ def shipped(name: str) -> Card:
     return load_card(card_path(name))
 
 
-def write(folder: Path, day: Day, seed: int, duration: float = 40.0) -> None:
+def write(folder: Path, day: Day, seed: int) -> None:
     """The day's log, as the machine's logger leaves it."""
     path = folder / f"{day.at:%Y-%m-%d}.csv"
     card = shipped("paper_table2")
@@ -154,7 +147,7 @@ def write(folder: Path, day: Day, seed: int, duration: float = 40.0) -> None:
     recipe = replace(
         recipe,
         plant=plant,
-        duration=duration,
+        duration=40.0,
         h=2e-3,
         reference=shipped("paper_table1_rich").recipe.reference,  # type: ignore[union-attr]
     )

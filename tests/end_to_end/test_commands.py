@@ -46,13 +46,17 @@ def as_json(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status
 
 
 def refusal(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status: int) -> str:
-    """The one line on standard error of a command that ends with `status`."""
+    """The one line on standard error of a command that ends with `status`.
+
+    Of a refusal (1) a second one says what to type next.
+    """
     capsys.readouterr()
     assert main(list(arguments)) == status
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert len(shown.err.splitlines()) == 1
-    return shown.err
+    line, *then = shown.err.splitlines()
+    assert [one.partition(" (")[0] for one in then] == ["next"] * (status == 1)
+    return line
 
 
 @pytest.mark.parametrize("command", list(COMMANDS))

@@ -16,8 +16,8 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def told(home: Path) -> list[Told]:
-    """The whole story; its noise is not that of the README's picture, its logs are shorter."""
-    return story(home, seed=5, duration=20.0)
+    """The whole story; its noise is not that of the README's picture."""
+    return story(home, seed=5)
 
 
 def test_every_log_has_one_verdict(told: list[Told]) -> None:

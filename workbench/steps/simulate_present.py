@@ -28,9 +28,8 @@ def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
     """
     drive, asked = recipe.plant.actuator, recipe.loop
     if isinstance(drive, Motor):
-        rig = replace(
-            rig, kind="motor", force_per_command=rig.force_per_command or drive.k_a
-        )  # fmt: skip
+        per = rig.force_per_command or drive.k_a
+        rig = replace(rig, kind="motor", force_per_command=per)
     try:
         now = present(given, rig, recipe.h)
     except BadSpecification as error:
