@@ -8,13 +8,15 @@ NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
-.PHONY: demo test environment lint types floors wheel tests bench format clean
-.NOTPARALLEL:
+.PHONY: demo test environment lint types floors wheel kernels tests bench format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/workbench demo
 
-test: lint types floors wheel tests
+# Two at a time: what one core checks goes on beside what the other compiles and tests.
+test: environment
+	$(MAKE) --no-print-directory -j 2 lint types floors kernels
+	$(MAKE) --no-print-directory -j 2 wheel tests
 
 environment: $(VENV)/.installed-dev
 
@@ -42,8 +44,11 @@ floors: environment
 wheel: environment
 	$(BIN)/python tools/check_wheel.py
 
+kernels: environment
+	$(BIN)/python tools/compile_kernels.py
+
 tests: environment
-	$(BIN)/pytest -n $(WORKERS)
+	$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
 
 bench: environment
 	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"

@@ -19,16 +19,20 @@ if TYPE_CHECKING:
     from workbench.interface.calls import identify as identify
     from workbench.interface.calls import load_model as load_model
     from workbench.interface.calls import predict as predict
+    from workbench.interface.calls import read_logs as read_logs
     from workbench.interface.calls import simulate as simulate
     from workbench.interface.calls import trace as trace
     from workbench.interface.calls import validate as validate
+    from workbench.interface.effects import check_effects as check_effects
+    from workbench.interface.effects import effects as effects
     from workbench.steps.identify_sources import Options as Options
     from workbench.steps.loop_figures import Limits as Limits
 
 _CALLS = "workbench.interface.calls"
 _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
-    **{name: _CALLS for name in ("simulate", "load_model")},
+    **{name: _CALLS for name in ("simulate", "load_model", "read_logs")},
+    **{name: "workbench.interface.effects" for name in ("effects", "check_effects")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",
     "NotIdentifiable": "identification.errors",

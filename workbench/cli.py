@@ -2,20 +2,29 @@
 
 import errno
 import importlib
-import json
 import os
 import signal
 import sys
 import threading
-import traceback
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from types import FrameType
 
 import click
+from click.shell_completion import CompletionItem
 
 from identification.errors import NotIdentifiable, UserError
+from workbench.ending import (
+    BAD_INPUT,
+    DONE,
+    FAULT,
+    REFUSAL,
+    Refused,
+    Step,
+    step,
+    write_status,
+)
 
 COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
@@ -37,6 +46,12 @@ COMMANDS = {
     "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
 }
 ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
+TAB_VARIABLE = "_WORKBENCH_COMPLETE"  # set by the shell's completion script
+COMPLETION = {
+    "bash": f'eval "$({TAB_VARIABLE}=bash_source workbench)" in ~/.bashrc',
+    "zsh": f'eval "$({TAB_VARIABLE}=zsh_source workbench)" in ~/.zshrc',
+    "fish": f"{TAB_VARIABLE}=fish_source workbench | source in config.fish",
+}
 OURS = ("workbench", "identification", "design")
 BROKEN_PIPE = 141
 LONGEST_WORD = 200  # characters of a name, and of a whole message
@@ -76,6 +91,26 @@ class LazyGroup(click.Group):
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+        rows = [
+            ("0", DONE),
+            ("1", REFUSAL),
+            ("2", BAD_INPUT),
+            ("3", FAULT),
+            ("130", "Ctrl-C"),
+        ]
+        write_status(formatter, rows)
+        with formatter.section("Completion of commands, options and files by the Tab key"):
+            formatter.write_dl([*COMPLETION.items()])
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Commands with their help, none of which is imported for it; else the group's options."""
+        if incomplete.startswith("-"):
+            return super().shell_complete(ctx, incomplete)
+        return [
+            CompletionItem(name, help=said)
+            for name, said in COMMANDS.items()
+            if name.startswith(incomplete)
+        ]
 
 
 @click.group(cls=LazyGroup, invoke_without_command=True)
@@ -137,13 +172,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     except (Exception, KeyboardInterrupt) as error:
         status, message = verdict(error)
         if status == 3 and _debug(arguments):
+            import traceback
+
             traceback.print_exception(error)
-        if status == 1 and _as_json(arguments):
-            _echo_refusal(str(error))
+        then = _then(error, arguments) if status == 1 else None
+        if then and _as_json(arguments):
+            _echo_refusal(str(error), then)
     _flush_or_drop()
-    if message:
+    for line in [message, str(then)] if then else [message]:
         with suppress(OSError):  # of a terminal that is gone
-            click.echo(one_line(message), err=True)
+            click.echo(one_line(line), err=True, nl=bool(line))
     return status
 
 
@@ -169,6 +207,11 @@ def _cleared_on_a_signal() -> Iterator[None]:
 
 def _run(arguments: Sequence[str]) -> int:
     """Exit status of a command that ends without an error."""
+    asked = os.environ.get(TAB_VARIABLE)
+    if asked:
+        from click.shell_completion import shell_complete
+
+        return shell_complete(cli, {}, "workbench", TAB_VARIABLE, asked)
     try:
         with cli.make_context("workbench", list(arguments)) as ctx:
             status = cli.invoke(ctx)
@@ -184,10 +227,21 @@ def _as_json(arguments: Sequence[str]) -> bool:
     return "--json" in options
 
 
-def _echo_refusal(reason: str) -> None:
+def _then(error: BaseException, arguments: Sequence[str]) -> Step:
+    """What to type after a refusal; where the command does not know, its help."""
+    if isinstance(error, Refused):
+        return error.then
+    name = next((one for one in arguments if one in COMMANDS), None)
+    return step("what it needs", name, "--help")
+
+
+def _echo_refusal(reason: str, then: Step) -> None:
     """Print a refusal as JSON; where nobody takes it, the exit status says it alone."""
+    import json
+
+    told = {"verdict": "refused", "reason": one_line(reason), "next": then.command}
     with suppress(OSError):
-        click.echo(json.dumps({"verdict": "refused", "reason": one_line(reason)}, indent=2))
+        click.echo(json.dumps(told, indent=2))
 
 
 def _debug(arguments: Sequence[str]) -> bool:
@@ -223,6 +277,8 @@ def _os_message(error: OSError) -> str:
 
 def _place(error: BaseException) -> str:
     """Module and line of the last frame in our packages."""
+    import traceback
+
     place = "an unknown place"
     for frame, line in traceback.walk_tb(error.__traceback__):
         module = str(frame.f_globals.get("__name__"))

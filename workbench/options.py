@@ -7,6 +7,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import click
+from click.shell_completion import CompletionItem
+
+from workbench.files import shipped_cards
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -31,6 +34,17 @@ SECONDS = Finite(min=0, max=1e9)
 SECONDS_ABOVE_0 = Finite(min=0, max=1e9, min_open=True)
 
 
+def complete_file(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[CompletionItem]:
+    """Completed by the shell as the name of a file."""
+    return [CompletionItem(begun, type="file")]
+
+
+def complete_card(_ctx: click.Context, _param: click.Parameter, begun: str) -> list[CompletionItem]:
+    """The shipped cards that begin so; else, by the shell, names of files."""
+    names = [CompletionItem(name) for name in shipped_cards() if name.startswith(begun)]
+    return names or [CompletionItem(begun, type="file")]
+
+
 def card_option(command: Command) -> Command:
     """The option `--card`, the card of all logs; given twice it is a usage error."""
     return click.option(
@@ -38,6 +52,7 @@ def card_option(command: Command) -> Command:
         multiple=True,
         required=True,
         callback=_the_only,
+        shell_complete=complete_card,
         help="Path of the card, or the name of a shipped one.",
     )(command)
 
@@ -46,6 +61,7 @@ def present_card_option(command: Command) -> Command:
     """The option `--card` of commands that read a model, for another present controller."""
     return click.option(
         "--card",
+        shell_complete=complete_card,
         help="Card whose [controller] is shown as the present one, in place of the model's.",
     )(command)
 

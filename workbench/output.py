@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
 import click
 
 from identification.errors import UserError
+from workbench.ending import Step
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -214,12 +215,20 @@ def dumps(result: object) -> str:
     return json.dumps(strict(result), indent=2, allow_nan=False)
 
 
-def emit(result: object, as_json: bool, table: Callable[[], object]) -> None:
-    """Print `result` as JSON, or what `table()` returns: a text or anything rich can show."""
+def emit(
+    result: object, as_json: bool, table: Callable[[], object], then: Step | None = None
+) -> None:
+    """Print `result` as JSON, or what `table()` returns: a text or anything rich can show.
+
+    then: the command to type next, as JSON the key `next`, else a last line that is not folded.
+    """
     if as_json:
-        click.echo(dumps(result))
+        next_one = {"next": then.command} if then and isinstance(result, Mapping) else {}
+        click.echo(dumps({**result, **next_one} if isinstance(result, Mapping) else result))
         return
     click.echo(as_text(table(), None if sys.stdout.isatty() else PIPED_WIDTH), nl=False)
+    if then:
+        click.echo(str(then))
 
 
 def as_text(shown: object, width: int | None = PIPED_WIDTH) -> str:

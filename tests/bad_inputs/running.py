@@ -42,7 +42,10 @@ class Ended(NamedTuple):
         found = []
         if self.status not in (0, 1, 2):
             found.append(f"exit status {self.status}")
-        if len(self.stderr.splitlines()) > 1:
+        lines = self.stderr.splitlines()
+        if self.status == 1 and lines and lines[-1].startswith("next ("):
+            lines.pop()
+        if len(lines) > 1:
             found.append("more than one line")
         if "Traceback" in self.stderr:
             found.append("traceback")

@@ -48,4 +48,6 @@ def test_an_ending_is_judged(shop: Shop) -> None:
 
     wrong = ended(Case("x", make), shop, lambda _arguments: (3, "a\nb"))
     assert wrong.faults == ("exit status 3", "more than one line", "left over: a.part")
+    refused = ended(Case("x", make), shop, lambda _arguments: (1, "a\nnext (b): c"))
+    assert refused.faults == ("left over: a.part",)
     assert ended(Case("x", make), shop, lambda _arguments: (None, "")).faults == ("does not end",)

@@ -7,7 +7,8 @@ import pytest
 
 from identification.signals.differentiate import differentiate
 from workbench.cards.card import Card, load_card
-from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data, shipped_cards
+from workbench.files import shipped_cards
+from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data
 from workbench.logs.runs import read_runs
 from workbench.steps.simulate import record
 

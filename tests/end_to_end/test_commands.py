@@ -46,13 +46,17 @@ def as_json(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status
 
 
 def refusal(capsys: pytest.CaptureFixture[str], arguments: Sequence[str], status: int) -> str:
-    """The one line on standard error of a command that ends with `status`."""
+    """The one line on standard error of a command that ends with `status`.
+
+    Of a refusal (1) a second one says what to type next.
+    """
     capsys.readouterr()
     assert main(list(arguments)) == status
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert len(shown.err.splitlines()) == 1
-    return shown.err
+    line, *then = shown.err.splitlines()
+    assert [one.partition(" (")[0] for one in then] == ["next"] * (status == 1)
+    return line
 
 
 @pytest.mark.parametrize("command", list(COMMANDS))
@@ -214,6 +218,7 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     assert main(asked) == 1
     shown = capsys.readouterr().out
     assert "recommended: none" in shown and "RST misses: modulus margin" in shown
+    assert shown.splitlines()[-1].endswith(f"): workbench design {shop / 'id/model.json'}")
     assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
 
 
@@ -364,6 +369,7 @@ def test_a_model_without_a_plant_is_a_refusal(
     found = json.loads(capsys.readouterr().out)
     assert found["verdict"] == "refused"
     assert found["reason"].startswith("no ARX plant")
+    assert found["next"].startswith("workbench doctor short.csv --card ")
 
 
 def test_a_demo_that_fails_says_so_by_its_status(

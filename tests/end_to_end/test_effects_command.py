@@ -88,7 +88,9 @@ def test_an_own_effect_is_checked(folder: Path, capsys: pytest.CaptureFixture[st
     assert "the equation gives" in said
     path.write_text(COIL.replace('state_unit="V**2"', 'state_unit="V"'), encoding="utf-8")
     assert main(["effects", "check", str(folder)]) == 1
-    assert "units do not multiply out to V" in " ".join(capsys.readouterr().out.split())
+    shown = capsys.readouterr().out
+    assert "units do not multiply out to V" in " ".join(shown.split())
+    assert shown.splitlines()[-1].endswith(f"workbench effects check {folder}")
     assert main(["effects", "check", str(folder / "none")]) == 2
     assert "no such folder" in capsys.readouterr().err
 

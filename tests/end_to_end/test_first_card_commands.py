@@ -104,7 +104,10 @@ def test_a_log_that_cannot_be_identified_ends_with_1(
     (shop / "made.toml").write_text(turned, "utf-8")
     capsys.readouterr()
     assert main(["doctor", "run.csv", "--card", "made.toml"]) == 1
-    assert "wrong sign" in " ".join(capsys.readouterr().out.split())
+    shown = capsys.readouterr().out
+    assert "wrong sign" in " ".join(shown.split())
+    then = "next (what the columns seem to be): workbench init run.csv --out made-new.toml"
+    assert shown.splitlines()[-1] == then
 
 
 def test_the_installation_and_a_registry_that_is_away(
@@ -121,6 +124,7 @@ def test_the_installation_and_a_registry_that_is_away(
     assert main(["doctor", "--registry", "away.db", "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
     assert found["registry"]["answers"] is False
+    assert found["next"] == "workbench doctor --registry away.db"
     assert not (shop / "away.db").exists()
     url = "postgresql://me:secret@127.0.0.1:1/none"
     assert main(["doctor", "--registry", url]) == 1

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -16,6 +17,7 @@ import pytest
 
 from identification.errors import BadLog, NotIdentifiable, UserError
 from workbench import cli, commands
+from workbench.ending import Refused, StatusCommand, step
 
 HEAVY = ("numpy", "scipy", "numba", "pandas", "matplotlib", "pyarrow", "h5py", "rich", "pydantic")
 Fail = Callable[[BaseException | int | None], None]
@@ -95,6 +97,79 @@ def test_help_is_quick() -> None:
     assert min(seconds() for _ in range(6)) < 0.5
 
 
+def test_exit_status_stands_in_every_help() -> None:
+    group = cli.cli
+    with group.make_context("workbench", [], resilient_parsing=True) as ctx:
+        assert "Exit status:" in group.get_help(ctx)
+        waiting = [group.get_command(ctx, name) for name in cli.COMMANDS]
+        while waiting:
+            command = waiting.pop()
+            if isinstance(command, click.Group):
+                waiting += command.commands.values()
+            else:
+                assert isinstance(command, StatusCommand)
+                shown = command.get_help(click.Context(command, parent=ctx, info_name="x"))
+                (rows,) = re.findall(r"Exit status:\n((?:  .*\n)+)", shown)
+                assert ("\n  1  " in rows) is bool(command.refusal)
+                assert "  0  " in rows and "\n  2  " in rows and "\n  3  " in rows
+
+
+@pytest.mark.parametrize(
+    ("line", "found"),
+    [
+        ("workbench dr", "plain,drift"),
+        ("workbench --ver", "plain,--version"),
+        ("workbench trace --car", "plain,--card"),
+        ("workbench trace --card em", "plain,emps"),
+        ("workbench trace --card ./", "file,./"),
+        ("workbench identify ru", "file,ru"),
+        ("workbench registry pro", "plain,promote"),
+    ],
+)
+def test_completion(
+    line: str, found: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(cli.TAB_VARIABLE, "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+    cli.main([])
+    assert capsys.readouterr().out.split() == [found]
+
+
+def test_completion_of_commands_imports_none_of_them() -> None:
+    asked = {
+        "COMP_WORDS": "workbench tr",
+        "COMP_CWORD": "1",
+        cli.TAB_VARIABLE: "bash_complete",
+    }
+    code = (
+        "import sys; from workbench.cli import main; main([]);"
+        "print([name for name in sys.modules if name.startswith('workbench.commands')])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True,
+                          env={**os.environ, **asked})  # fmt: skip
+    assert done.stdout == "plain,trace\n[]\n"
+
+
+def test_completion_is_installed_by_a_script_of_its_shell(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for shell_name in ("zsh", "fish"):  # that of bash asks bash for its version
+        monkeypatch.setenv(cli.TAB_VARIABLE, f"{shell_name}_source")
+        assert cli.main([]) == 0
+        assert f"{cli.TAB_VARIABLE}={shell_name}_complete" in capsys.readouterr().out
+
+
+def test_a_refusal_ends_with_the_next_command(
+    outcome: Fail, capsys: pytest.CaptureFixture[str]
+) -> None:
+    then = step("which run to add", "doctor", "my run.csv", "--card", "emps")
+    outcome(Refused("F_sn", then))
+    assert cli.main(["probe"]) == 1
+    line = "next (which run to add): workbench doctor 'my run.csv' --card emps"
+    assert capsys.readouterr() == ("", f"refused: F_sn\n{line}\n")
+
+
 def test_no_command_shows_help(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main([]) == 0
     assert "Commands:" in capsys.readouterr().out
@@ -116,7 +191,6 @@ def test_returned_status_is_the_exit_status(outcome: Fail, status: int | None) -
     [
         (UserError("a: no column 'y'"), 2, "error: a: no column 'y'"),
         (BadLog("run 3:\n  t goes\r\nback\x1b[1m"), 2, "error: run 3: t goes back\ufffd[1m"),
-        (NotIdentifiable("F_sn"), 1, "refused: F_sn"),
         (KeyboardInterrupt(), 130, "interrupted"),
         (cli.Terminated(15), 143, "terminated"),
         (click.Abort(), 130, "interrupted"),
@@ -181,8 +255,9 @@ def test_a_refusal_asked_as_json_is_an_object(
     assert cli.main(["probe", "--json"]) == 1
     shown = capsys.readouterr()
     reason = "run 3: no breakaway in the negative direction"
-    assert json.loads(shown.out) == {"verdict": "refused", "reason": reason}
-    assert shown.err == f"refused: {reason}\n"
+    then = "workbench probe --help"
+    assert json.loads(shown.out) == {"verdict": "refused", "reason": reason, "next": then}
+    assert shown.err == f"refused: {reason}\nnext (what it needs): {then}\n"
     assert cli.main(["probe", "--", "--json"]) == 1
     assert capsys.readouterr().out == ""
 

@@ -250,6 +250,11 @@ def card_from(
         raise BadCard(f"{path}: [recipe] {error}") from None
     _need_signals(path, parsed.rig, signals, "[rig]")
     _check_split(path, parsed)
+    if recipe is not None and recipe.by_card and parsed.controller is None:
+        raise BadCard(
+            f"{path}: [recipe] needs a 'loop' with a position where drive is \"loop\", or the card"
+            " a [controller]"
+        )
     return Card(
         path=path,
         about=parsed.card,

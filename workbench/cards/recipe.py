@@ -21,6 +21,8 @@ of an effect is a number in SI or a text with its unit; one that has a default m
     force = { k_i = 0.02, T_i = 0.05 }                  # none with a motor: the force is exact
     control_limit_v = 5.0
     compensator = { N_c = 2.0, e_T = 0.003 }            # (4); friction = { m = ..., ... }: others
+
+Where no position is given, the card's [controller] runs the machine, with its own force loop.
 """
 
 import math
@@ -101,10 +103,10 @@ class RecipeCompensator:
 
 @dataclass(frozen=True)
 class LoopSpec:
-    """Position controller, force controller (`None` for a motor), limit of the command [V] and
-    friction compensator (`None` for none)."""
+    """Position controller (`None`: that of the card), force controller (`None` for a motor), limit
+    of the command [V] and friction compensator (`None` for none)."""
 
-    position: RecipePD | RecipePID | RecipeRST
+    position: RecipePD | RecipePID | RecipeRST | None
     force: RecipeForcePI | None = None
     control_limit: float | None = None
     compensator: RecipeCompensator | None = None
@@ -112,7 +114,8 @@ class LoopSpec:
 
 @dataclass(frozen=True)
 class Recipe:
-    """Everything that makes a log but the code; `loop` is `None` where `drive` is "command".
+    """Everything that makes a log but the code; `loop` is `None` where `drive` is "command", and
+    where the card's controller runs the machine with nothing beside it.
 
     `reference` is r [m] in the loop, and the command u [V] without it. Noise: standard deviations
     of force [N], position [m], pressures [Pa]. duration, h in s. mean_pressure [Pa]: of the two
@@ -130,6 +133,11 @@ class Recipe:
     seed: int = 0
     drive: Literal["loop", "command"] = "loop"
     mean_pressure: float | None = None
+
+    @property
+    def by_card(self) -> bool:
+        """Whether the controller of the card runs the machine."""
+        return self.drive == "loop" and (self.loop is None or self.loop.position is None)
 
     @property
     def t(self) -> Array:
@@ -338,7 +346,9 @@ class CompensatorSection(CardTable):
 class LoopSection(CardTable):
     """`LoopSpec` as a card writes it."""
 
-    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")]
+    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")] | None = (
+        None
+    )
     force: ForceSection | None = None
     control_limit_v: Positive | None = None
     compensator: CompensatorSection | None = None
@@ -347,7 +357,8 @@ class LoopSection(CardTable):
         """The loop."""
         force = RecipeForcePI(self.force.k_i, self.force.T_i) if self.force else None
         beside = self.compensator.value() if self.compensator else None
-        return LoopSpec(self.position.value(), force, self.control_limit_v, beside)
+        position = self.position.value() if self.position else None
+        return LoopSpec(position, force, self.control_limit_v, beside)
 
 
 class ActuatorSection(CardTable):
@@ -385,10 +396,13 @@ class RecipeSection(CardTable):
     def _consistent(self) -> "RecipeSection":
         if (self.actuator is None) == (self.motor is None):
             raise ValueError("needs one of 'actuator' and 'motor'")
-        if (self.drive == "loop") != (self.loop is not None):
-            raise ValueError("needs a 'loop' where drive is \"loop\", and none otherwise")
-        if self.loop and (self.loop.force is None) != (self.actuator is None):
+        if self.drive == "command" and self.loop is not None:
+            raise ValueError("needs no 'loop' where drive is \"command\"")
+        own = self.loop is not None and self.loop.position is not None
+        if self.loop and own and (self.loop.force is None) != (self.actuator is None):
             raise ValueError("needs loop.force with an actuator, and none with a motor")
+        if self.loop and not own and self.loop.force is not None:
+            raise ValueError("needs loop.position above loop.force; or the card's controller.force")
         samples = self.duration_s / self.h_s
         if not SHORTEST_LOG <= samples <= LONGEST_RECIPE:
             raise ValueError(

@@ -8,6 +8,7 @@ import click
 
 from workbench.commands.trace import TRACE_STAGES
 from workbench.course import Course, moving
+from workbench.ending import StatusCommand
 from workbench.output import OutputFolder, emit, output_options, progress
 
 RECIPE = "demo"
@@ -15,7 +16,11 @@ DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.ite
 DEMO_STAGES["designing"] = (0.85, 1.0)
 
 
-@click.command(epilog="Example: workbench demo --out demo")
+@click.command(
+    cls=StatusCommand,
+    refusal="the effect is not found, or the recommended controller does not keep the limits",
+    epilog="Example: workbench demo --out demo",
+)
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True,
     help="Of the search and the simulated check; the log is of the recipe's own seed.",
@@ -26,14 +31,14 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
 
     Simulates two runs of the paper's rig (table 2) with an effect that is declared nowhere but in
     the truth file, finds that effect from one log, judges it on the other, designs PID and RST on
-    the model found, and checks them in simulation. Exit status 1: the effect is not found, or the
-    recommended controller does not keep the limits.
+    the model found, and checks them in simulation.
     """
     from workbench.cards.card import load_card
     from workbench.documents.design import design_document
     from workbench.documents.model import model_document
     from workbench.logs.fetch import card_path
     from workbench.report.demo_tables import demo_view
+    from workbench.report.next_steps import after_demo
     from workbench.report.reports import design_report, validation_report
     from workbench.report.trace import trace_report
     from workbench.report.validation_tables import missed
@@ -67,5 +72,6 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
         "reason": missed(validation),
         "out": folder.final,
     }
-    emit(result, as_json, lambda: demo_view(found, folder.final))
-    return 0 if validation.passed and found.named_rightly else 1
+    then = after_demo(found, folder.final, seed)
+    emit(result, as_json, lambda: demo_view(found, folder.final), then)
+    return 0 if then is None else 1

@@ -6,11 +6,17 @@ from typing import Literal
 
 import click
 
+from workbench.ending import StatusCommand, refused_with
 from workbench.options import POSITIVE, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
-@click.command(epilog="Example: workbench design runs/.../model.json --poles 20,0.9")
+@click.command(
+    cls=StatusCommand,
+    refusal="the model carries no design, or no controller keeps the goals (design.json then says"
+    " what each misses, and recommends none)",
+    epilog="Example: workbench design runs/.../model.json --poles 20,0.9",
+)
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option("--poles", metavar="W_N,ZETA", help="Dominant poles [rad/s, -].  [default: searched]")
 @click.option(
@@ -53,9 +59,7 @@ def command(
     """Design PID and RST controllers by pole placement, with margins and the compensator.
 
     Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
-    keeps the margins. Exit status 1: the model carries no design, or no controller keeps the goals
-    (design.json then says what each misses, and recommends none); 2: the poles asked for cannot be
-    placed.
+    keeps the margins.
     """
     from design.tune import Asked, Goals
     from workbench.cards.own_effects import library
@@ -63,6 +67,7 @@ def command(
     from workbench.documents.model import read_model
     from workbench.options import parse_auxiliary, parse_poles
     from workbench.report.design_tables import design_view
+    from workbench.report.next_steps import after_design, without_design
     from workbench.report.reports import design_report
     from workbench.steps.design import design, effort_limit
     from workbench.steps.present import with_card
@@ -70,7 +75,11 @@ def command(
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     goals = Goals(modulus, delay, effort_limit(model))
-    with OutputFolder("design", out, now=datetime.now()) as folder:
+    kept = _kept(integrator, source, design_period, card, effects)
+    with (
+        refused_with(without_design(model, card)),
+        OutputFolder("design", out, now=datetime.now()) as folder,
+    ):
         with progress("designing", as_json=as_json):
             found = design(model, asked, goals=goals, source=source, period=design_period)
         document = design_document(found)
@@ -80,5 +89,23 @@ def command(
         {**document, "out": folder.final},
         as_json,
         lambda: design_view(found, folder.final, model.rotary),
+        after_design(found, model_file, poles is not None, kept),
     )
     return 1 if found.recommended == "none" else 0
+
+
+def _kept(
+    integrator: bool,
+    source: str | None,
+    period: float | None,
+    card: str | None,
+    effects: tuple[Path, ...],
+) -> tuple[str, ...]:
+    """The options that another try keeps."""
+    return (
+        *(() if integrator else ("--no-integrator",)),
+        *(("--from", source) if source else ()),
+        *(("--design-period", f"{period:g}") if period else ()),
+        *(("--card", card) if card else ()),
+        *(word for folder in effects for word in ("--effects", str(folder))),
+    )

@@ -8,15 +8,26 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench.ending import StatusCommand, step
+from workbench.options import complete_card, complete_file
 from workbench.output import OutputFolder, emit, output_options, progress
 
 if TYPE_CHECKING:
     from workbench.steps.doctor import Examined
 
 
-@click.command(epilog="Example: workbench doctor run1.csv --card card.toml --out look")
-@click.argument("log", required=False)
-@click.option("--card", help="Path of the card, or the name of a shipped one.")
+@click.command(
+    cls=StatusCommand,
+    refusal="the log cannot be identified as it is or tells nothing, or something of the"
+    " installation does not work",
+    epilog="Example: workbench doctor run1.csv --card card.toml --out look",
+)
+@click.argument("log", required=False, shell_complete=complete_file)
+@click.option(
+    "--card",
+    shell_complete=complete_card,
+    help="Path of the card, or the name of a shipped one.",
+)
 @click.option(
     "--registry",
     "where",
@@ -31,8 +42,7 @@ def command(
 
     With LOG and --card: which of the nine parameters it can tell and which not, and what run to
     add; with --out also doctor.json and a picture, doctor.png. Alone: versions, compiled kernels,
-    folder of data, registry. Exit status 1: the log cannot be identified as it is or tells
-    nothing, or something of the installation does not work.
+    folder of data, registry.
     """
     if log is None:
         if card is not None or out is not None:
@@ -49,6 +59,7 @@ def _log(name: str, card_name: str, as_json: bool, out: Path | None) -> int:
     from workbench.cards.card import load_card
     from workbench.logs.fetch import card_path, find_data
     from workbench.report.doctor import doctor_picture, doctor_view
+    from workbench.report.next_steps import after_doctor
     from workbench.steps.doctor import doctor_document, examine
 
     card = load_card(card_path(card_name), with_recipe=False)
@@ -60,11 +71,13 @@ def _log(name: str, card_name: str, as_json: bool, out: Path | None) -> int:
         with OutputFolder("doctor", out, now=datetime.now()) as folder:
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
-    emit({**document, "out": out}, as_json, lambda: doctor_view(found, out))
-    return 1 if found.verdict in ("refused", "nothing") else 0
+    then = after_doctor(found, name, card_name, out)
+    emit({**document, "out": out}, as_json, lambda: doctor_view(found, out), then)
+    return 0 if then is None else 1
 
 
 def _installation(where: str | None, as_json: bool) -> int:
+    from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
     from workbench.report.installation import installation_view
     from workbench.steps.installation import look_over
@@ -76,7 +89,9 @@ def _installation(where: str | None, as_json: bool) -> int:
     if registry and not registry["answers"]:
         wrong.append(str(registry["reason"]))
     result = {"schema": "installation/1", **vars(found), "registry": registry, "wrong": wrong}
-    emit(result, as_json, lambda: installation_view(found, registry, wrong))
+    asked = ("--registry", shown(named)) if named else ()
+    then = step("once that is put right", "doctor", *asked) if wrong else None
+    emit(result, as_json, lambda: installation_view(found, registry, wrong), then)
     return 1 if wrong else 0
 
 

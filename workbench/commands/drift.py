@@ -5,15 +5,20 @@ from pathlib import Path
 
 import click
 
-from workbench.options import POSITIVE, card_option, effects_option
+from workbench.ending import StatusCommand, refused_with
+from workbench.options import POSITIVE, card_option, complete_file, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
 @click.command(
-    epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json"
+    cls=StatusCommand,
+    done="no drift; or NOT JUDGED, where no test alarmed but a change that matters could not have"
+    " been seen (the first line says so)",
+    refusal="drift, a changed structure, or no log that tells anything",
+    epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json",
 )
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
 @card_option
 @click.option(
     "--state",
@@ -62,9 +67,7 @@ def command(
     """Test new logs against the model in force: has the machine changed, and in which parameters?
 
     Every log is judged alone and, with those before it, by their mean, which finds what changes
-    slowly. Writes drift.json and report.html. Exit status 0: no drift, or NOT JUDGED, where no test
-    alarmed but a change that matters could not have been seen (the first line says so); 1: drift, a
-    changed structure, or no log that tells anything.
+    slowly. Writes drift.json and report.html.
     """
     from identification.drift.drift_test import DriftSettings
     from workbench.cards.own_effects import library
@@ -72,13 +75,17 @@ def command(
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_report
     from workbench.report.drift_tables import drift_view
+    from workbench.report.next_steps import after_drift, looked_over
     from workbench.steps.drift import drift_document, drift_of, model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
     model = read_model(model_file, library(effects))
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)
-    with OutputFolder("drift", out, now=datetime.now()) as folder:
+    with (
+        refused_with(looked_over(logs, card)),
+        OutputFolder("drift", out, now=datetime.now()) as folder,
+    ):
         with progress("testing", as_json=as_json):
             found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed
@@ -89,5 +96,6 @@ def command(
     # After the results: a run that is ended between them is simply made again.
     if state_file:
         write_stream(state_file, found.stream)
-    emit({**document, "out": folder.final}, as_json, lambda: drift_view(found, folder.final))
-    return 0 if found.verdict == "none" or (found.verdict == "not_judged" and found.tested) else 1
+    then = after_drift(found, logs, card)
+    emit({**document, "out": folder.final}, as_json, lambda: drift_view(found, folder.final), then)
+    return 0 if then is None else 1

@@ -1,11 +1,12 @@
 """`workbench effects`: the library of effects, and a user's own file checked as they are."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench.ending import StatusGroup, step
 from workbench.options import effects_option
 from workbench.output import emit, progress
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from identification.effects._base import Effect
 
 
-@click.group(epilog="Example: workbench effects list")
+@click.group(cls=StatusGroup, epilog="Example: workbench effects list")
 def command() -> None:
     """Show the effects that 'workbench trace' knows, and check files of your own.
 
@@ -41,7 +42,9 @@ def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool
     emit([described(one) for one in found], as_json, lambda: _lines(found))
 
 
-@command.command(epilog="Example: workbench effects check my_effects")
+@command.command(
+    refusal="an effect breaks a rule", epilog="Example: workbench effects check my_effects"
+)
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
@@ -50,26 +53,30 @@ def check(folder: Path, as_json: bool) -> int:
 
     FOLDER holds one effect a file, declared as EFFECT ('python -c "import
     workbench.cards.own_effects as o; print(o.__doc__)"' shows one). Its Python is run: check only
-    files that you trust. Exit status 1: an effect breaks a rule.
+    files that you trust.
     """
+    with progress("checking", 1.0, as_json=as_json) as advance:
+        result = checked(folder, advance)
+    broken = {key: one["broken"] for key, one in result["effects"].items()}
+    wrong = any(broken.values())
+    then = step("once the files are mended", "effects", "check", folder) if wrong else None
+    emit(result, as_json, lambda: _checked(broken, len(result["checks"])), then)
+    return 1 if wrong else 0
+
+
+def checked(folder: Path, advance: Callable[[float], None]) -> dict[str, Any]:
+    """Which rules the folder's effects keep, by key; advance takes shares of the whole."""
     from identification.effects._library import built_in
     from workbench.cards.effect_runs import CHECKS, failures
     from workbench.cards.own_effects import library
 
     own = {key: one for key, one in library([folder]).items() if key not in built_in()}
-    broken: dict[str, Mapping[str, str]] = {}
-    with progress("checking", float(len(own)), as_json=as_json) as advance:
-        for key, one in own.items():
-            broken[key] = failures(one)
-            advance(1.0)
-    result = {
-        "effects": {
-            key: {"holds": not found, "broken": dict(found)} for key, found in broken.items()
-        },
-        "checks": list(CHECKS),
-    }
-    emit(result, as_json, lambda: _checked(broken, len(CHECKS)))
-    return 1 if any(broken.values()) else 0
+    found = {}
+    for key, one in own.items():
+        broken = dict(failures(one))
+        found[key] = {"holds": not broken, "broken": broken}
+        advance(1.0 / len(own))
+    return {"effects": found, "checks": list(CHECKS)}
 
 
 def described(effect: "Effect") -> dict[str, Any]:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.output import OutputFolder, emit, output_options
 
 if TYPE_CHECKING:
@@ -25,7 +26,10 @@ WHAT_NEXT = {
 }
 
 
-@click.command(epilog="Example: workbench export runs/.../design.json --to c --to st --out code")
+@click.command(
+    cls=StatusCommand,
+    epilog="Example: workbench export runs/.../design.json --to c --to st --out code",
+)
 @click.argument("design_file", metavar="DESIGN", type=click.Path(path_type=Path))
 @click.option(
     "--to",

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from workbench.ending import StatusCommand, Step, step
 from workbench.options import POSITIVE
 from workbench.output import dumps, emit, progress
 
@@ -54,7 +55,11 @@ def fleet_options(command: Command) -> Command:
     return command
 
 
-@click.command(epilog="Example: workbench fleet logs --card card.toml --out fleet --workers 2")
+@click.command(
+    cls=StatusCommand,
+    refusal="some logs were refused, failed, give an alarm or are left to a later run",
+    epilog="Example: workbench fleet logs --card card.toml --out fleet --workers 2",
+)
 @click.argument("logs", metavar="LOGS")
 @fleet_options
 def command(
@@ -76,8 +81,7 @@ def command(
     <machine>.parquet. A machine without a model in force gets its first (without a design) where it
     leaves only noise; else the log is judged as by 'workbench reidentify'. Results go into the
     registry and DIR/results/*.parquet while the run goes on. A run that was killed goes on where it
-    was; logs that are done are skipped. Exit status 1: some logs were refused, failed or give
-    an alarm.
+    was; logs that are done are skipped.
     """
     from workbench.fleet.finding import find_logs
     from workbench.fleet.run import FleetRun, FleetSettings
@@ -98,13 +102,34 @@ def command(
         done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
     result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
-    emit(result, as_json, lambda: fleet_view(done, out))
-    return 1 if done.bad or done.later else 0
+    registry = None if no_registry else where
+    then = after_fleet(done, logs, card, registry, in_registry=not no_registry)
+    emit(result, as_json, lambda: fleet_view(done, out), then)
+    return 0 if then is None else 1
 
 
 def clock() -> datetime:
     """The time now, in UTC."""
     return datetime.now(UTC)
+
+
+def after_fleet(
+    done: "Report", logs: str, card: str | None, where: str | None, *, in_registry: bool
+) -> Step | None:
+    """Look at the first machine or log that somebody has to look at; else run again."""
+    from workbench.addresses import shown
+
+    if not (done.bad or done.later):
+        return None
+    registry = ("--registry", shown(where)) if where else ()
+    if not done.bad:
+        cards = ("--card", card) if card else ()
+        return step("what is left", "fleet", shown(logs), *cards, *registry)
+    first = done.bad[0]
+    if in_registry and first.verdict in ("structure", "promoted", "refused"):
+        return step("what was found, and why", "registry", "show", first.log.machine, *registry)
+    beside = str(Path(first.log.path).with_name("card.toml"))
+    return step("what the log can tell", "doctor", first.log.path, "--card", card or beside)
 
 
 def fleet_view(done: "Report", out: Path) -> "Group":

@@ -8,7 +8,8 @@ from typing import Literal
 import click
 
 from workbench.course import Course, moving
-from workbench.options import POSITIVE, card_option
+from workbench.ending import StatusCommand, refused_with
+from workbench.options import POSITIVE, card_option, complete_file
 from workbench.output import OutputFolder, emit, output_options, progress
 
 IDENTIFY_STAGES = {
@@ -21,8 +22,12 @@ IDENTIFY_STAGES = {
 }
 
 
-@click.command(epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml")
-@click.argument("logs", nargs=-1, required=True, metavar="LOG...")
+@click.command(
+    cls=StatusCommand,
+    refusal="the logs tell nothing",
+    epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
+)
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
 @card_option
 @click.option(
     "--drive",
@@ -53,18 +58,21 @@ def command(
     """Find friction, plant and actuator of a machine from its logs.
 
     Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
-    report.html. LOG is a path, or a file name of the card's set. Exit status 1: the logs tell
-    nothing.
+    report.html. LOG is a path, or a file name of the card's set.
     """
     from workbench.documents.model import model_document
     from workbench.logs.sources import read_sources
     from workbench.options import parse_orders
     from workbench.report.model_tables import model_view
+    from workbench.report.next_steps import after_identify, looked_over
     from workbench.report.reports import identification_report
     from workbench.steps.identify_sources import Options, identify_sources
 
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
-    with OutputFolder("identify", out, now=datetime.now()) as folder:
+    with (
+        refused_with(looked_over(logs, card)),
+        OutputFolder("identify", out, now=datetime.now()) as folder,
+    ):
         with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
             if drive == "force" and sources.rig.kind == "motor":
@@ -83,4 +91,5 @@ def command(
         {**model_document(found.model), "remarks": found.remarks, "out": folder.final},
         as_json,
         lambda: model_view(found.model, found.remarks, folder.final),
+        after_identify(found.model, logs, card, folder.final),
     )

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.output import emit, progress, write_whole
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 CARD = "card.toml"
 
 
-@click.command(epilog="Example: workbench init run1.csv --out bench-a/card.toml")
+@click.command(cls=StatusCommand, epilog="Example: workbench init run1.csv --out bench-a/card.toml")
 @click.argument("log", type=click.Path(path_type=Path))
 @click.option(
     "--out",

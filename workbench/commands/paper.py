@@ -5,10 +5,11 @@ from pathlib import Path
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
-@click.command(epilog="Example: workbench paper --out paper")
+@click.command(cls=StatusCommand, epilog="Example: workbench paper --out paper")
 @click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True,
     help="First of the noise's seeds; what is tuned is tuned on this one + 100.",

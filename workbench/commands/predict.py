@@ -6,13 +6,17 @@ from typing import Literal
 
 import click
 
-from workbench.options import POSITIVE, card_option, effects_option
+from workbench.ending import StatusCommand
+from workbench.options import POSITIVE, card_option, complete_file, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress, written
 
 
-@click.command(epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a")
+@click.command(
+    cls=StatusCommand,
+    epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a",
+)
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("log", metavar="LOG")
+@click.argument("log", metavar="LOG", shell_complete=complete_file)
 @card_option
 @click.option(
     "--window", type=POSITIVE, metavar="S", help="Restart from the measured state every S."

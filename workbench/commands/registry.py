@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from workbench.ending import StatusGroup
 from workbench.options import effects_option
 from workbench.output import OutputFolder, emit
 
@@ -52,7 +53,7 @@ def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
     return value.strip()
 
 
-@click.group(epilog="Example: workbench registry show bench-a --json")
+@click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
 def command() -> None:
     """Models and designs of machines, append-only, with one version in force each.
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench.ending import StatusCommand, Step, step
 from workbench.jobs.options import JobOptions, job_options, worker
 from workbench.output import emit
 
@@ -15,7 +16,11 @@ if TYPE_CHECKING:
     from workbench.jobs.passes import PassReport
 
 
-@click.command(epilog="Example: workbench reidentify machines --registry fleet.db")
+@click.command(
+    cls=StatusCommand,
+    refusal="an alarm: drift, another structure, a log set aside",
+    epilog="Example: workbench reidentify machines --registry fleet.db",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
 @job_options
 def command(as_json: bool, **given: Any) -> int:
@@ -27,16 +32,15 @@ def command(as_json: bool, **given: Any) -> int:
     old only if it wins on held-out data and in simulation. Safe to run at any time and many at
     once; what a killed run left, the next does. A log older than one behind the model in force is
     judged and recorded, and changes nothing. Progress is told as JSON lines on standard error.
-    Exit status 1: an alarm (drift, a log set aside); 2: a machine could not be handled, the
-    registry is away, or the webhook has not taken an alarm. Such an alarm is tried again by later
-    passes, less and less often, and given up after a day.
+    Exit status 2 also where a machine could not be handled, the registry is away, or the webhook
+    has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
+    given up after a day.
     """
-    from workbench.jobs.alarms import ALARMING
-
     with worker(JobOptions(**given)) as found:
         done = found.once()
     judged, alarms = done.judged, done.alarms
-    emit({**vars(judged), "alarms": alarms}, as_json, lambda: pass_view(judged))
+    then = after_pass(judged, given["where"])
+    emit({**vars(judged), "alarms": alarms}, as_json, lambda: pass_view(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]
     if alarms is not None and (alarms.waiting or alarms.given_up):
         errors.append(undelivered(alarms))
@@ -44,7 +48,19 @@ def command(as_json: bool, **given: Any) -> int:
         click.echo(f"error: {line}", err=True)
     if errors:
         return 2
-    return 1 if any(one.verdict in ALARMING for one in judged.outcomes) else 0
+    return 0 if then is None else 1
+
+
+def after_pass(done: "PassReport", where: str | None) -> Step | None:
+    """Look at the first machine with an alarm."""
+    from workbench.addresses import shown
+    from workbench.jobs.alarms import ALARMING
+
+    alarmed = [one for one in done.outcomes if one.verdict in ALARMING]
+    if not alarmed:
+        return None
+    registry = ("--registry", shown(where)) if where else ()
+    return step("what was found, and why", "registry", "show", alarmed[0].machine, *registry)
 
 
 def undelivered(alarms: "Delivery") -> str:

@@ -6,11 +6,14 @@ from typing import Literal
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.options import effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
-@click.command(epilog="Example: workbench simulate paper_table1 --seed 3 --format parquet")
+@click.command(
+    cls=StatusCommand, epilog="Example: workbench simulate paper_table1 --seed 3 --format parquet"
+)
 @click.argument("card_name", metavar="CARD")
 @click.option("--seed", type=click.IntRange(min=0), help="Instead of the recipe's.")
 @click.option(
@@ -41,6 +44,7 @@ def command(
     from workbench.cards.card import load_card
     from workbench.cards.own_effects import library
     from workbench.logs.fetch import card_path
+    from workbench.steps.present import present_of_card
     from workbench.steps.simulate import as_columns, record, truth
 
     card = load_card(card_path(card_name), library(effects))
@@ -48,14 +52,15 @@ def command(
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
     with OutputFolder("simulate", out, now=datetime.now()) as folder:
         with progress("simulating", as_json=as_json):
-            log = record(card.name, card.recipe, seed, card.rig())
+            log = record(card.name, card.recipe, seed, card.rig(), card.controller)
         name = f"{card.name}.{form}"
         frame = pd.DataFrame(as_columns(log, card))
         if form == "csv":
             frame.to_csv(folder.path / name, index=False, float_format="%.12g")
         else:
             frame.to_parquet(folder.path / name, index=False)
-        known = truth(card.name, card.recipe, seed, rig=card.rig())
+        now = present_of_card(card, card.rig(), card.recipe.h)
+        known = truth(card.name, card.recipe, seed, rig=card.rig(), controller=now)
         folder.write_json("truth.json", known)
     result = {"log": folder.final / name, "samples": len(log), "seed": known["seed"], "h": log.h}
     emit({**result, "out": folder.final}, as_json, lambda: _said(result, folder.final))

@@ -8,7 +8,8 @@ from pathlib import Path
 import click
 
 from workbench.course import Course, watched
-from workbench.options import SECONDS_ABOVE_0, card_option, effects_option
+from workbench.ending import StatusCommand, refused_with
+from workbench.options import SECONDS_ABOVE_0, card_option, complete_file, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 TRACE_STAGES = {
@@ -27,14 +28,18 @@ TRACE_STAGES = {
 
 
 @click.command(
-    epilog="Example: workbench trace day1.csv day2.csv --test day3.csv --card bench-a/card.toml"
+    cls=StatusCommand,
+    done="done, whatever the verdict",
+    refusal="too little slides",
+    epilog="Example: workbench trace day1.csv day2.csv --test day3.csv --card bench-a/card.toml",
 )
-@click.argument("logs", nargs=-1, metavar="[LOG...]")
+@click.argument("logs", nargs=-1, metavar="[LOG...]", shell_complete=complete_file)
 @click.option(
     "--test",
     "tests",
     multiple=True,
     metavar="LOG",
+    shell_complete=complete_file,
     help="Held-out log, which neither fit nor choice sees; may be given several times.",
 )
 @card_option
@@ -62,18 +67,22 @@ def command(
     Writes trace.json (verdict, errors before and after, effects, rivals), model.json with the
     effects in it, and report.html. Without --test, stretches of the logs are left out in turn;
     without LOG, the card's [split] names the logs of both kinds. Ended by --budget or Ctrl-C, it
-    says what was not tried. Exit status 0 whatever the verdict.
+    says what was not tried.
     """
     begun = time.monotonic()
     from workbench.cards.own_effects import library
     from workbench.documents.model import model_document
     from workbench.logs.sources import read_sources
+    from workbench.report.next_steps import looked_over
     from workbench.report.trace import trace_report
     from workbench.report.trace_tables import trace_view
     from workbench.steps.trace import named_logs, trace_document, trace_sources
 
     known = library(effects)
-    with OutputFolder("trace", out, now=datetime.now()) as folder:
+    with (
+        refused_with(looked_over([*logs, *tests], card)),
+        OutputFolder("trace", out, now=datetime.now()) as folder,
+    ):
         with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)

@@ -5,11 +5,16 @@ from pathlib import Path
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
-@click.command(epilog="Example: workbench validate runs/.../model.json runs/.../design.json")
+@click.command(
+    cls=StatusCommand,
+    refusal="the recommended controller does not keep the limits on every plant",
+    epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
+)
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
 @click.argument("design_file", metavar="DESIGN", type=click.Path(path_type=Path))
 @click.option(
@@ -65,14 +70,14 @@ def command(
 
     Judged too: overshoot, largest force, and whether the command reaches the card's limit.
 
-    Writes validation.json and report.html. Exit status 1: the recommended controller does not keep
-    the limits on every plant.
+    Writes validation.json and report.html.
     """
     import numpy as np
 
     from workbench.cards.own_effects import library
     from workbench.documents.design import read_design
     from workbench.documents.model import read_model
+    from workbench.report.next_steps import after_validate
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
     from workbench.steps.loop_figures import Limits
@@ -94,5 +99,6 @@ def command(
         {**document, "out": folder.final},
         as_json,
         lambda: validation_view(result, folder.final, model.rotary),
+        after_validate(result, found, model, model_file, plant_file, card),
     )
     return 0 if result.passed else 1

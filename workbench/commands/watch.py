@@ -9,13 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.jobs.options import JobOptions, clock, job_options, worker
 
 if TYPE_CHECKING:
     from workbench.jobs.options import Worker
 
 
-@click.command(epilog="Example: workbench watch machines --cron '0 * * * *' --port 9400")
+@click.command(
+    cls=StatusCommand,
+    done="stopped",
+    epilog="Example: workbench watch machines --cron '0 * * * *' --port 9400",
+)
 @click.option("--cron", default="*/5 * * * *", show_default=True, metavar="EXPR",
               help="When to pass, beside every change of a log file.")  # fmt: skip
 @click.option("--port", type=click.IntRange(1, 65535), metavar="N",

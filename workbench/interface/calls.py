@@ -54,12 +54,15 @@ from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 from workbench.steps.identify_sources import Options, identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
+from workbench.steps.present import present_of_card
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import named_logs, trace_sources
 from workbench.steps.validate import validate as validate_design
 
 if TYPE_CHECKING:
     from typing import Literal
+
+    import pandas as pd
 
     from design.tune import Goals
     from identification.drift.drift_test import DriftSettings
@@ -217,11 +220,30 @@ def simulate(
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
     with _bar("simulating"):
-        log = record(card.name, card.recipe, seed, card.rig())
+        log = record(card.name, card.recipe, seed, card.rig(), card.controller)
     frame = pd.DataFrame(as_columns(log, card))
     frame.attrs["name"] = card.name
-    known = truth(card.name, card.recipe, seed, rig=card.rig())
+    now = present_of_card(card, card.rig(), card.recipe.h)
+    known = truth(card.name, card.recipe, seed, rig=card.rig(), controller=now)
     return SimulateResult(frame, known, card, log)
+
+
+def read_logs(
+    logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None,
+) -> "tuple[pd.DataFrame, ...]":  # fmt: skip
+    """The runs of the logs as the other functions see them: in SI, on an even clock, cleaned.
+
+    A table a run, its columns the signals (`t`, `y`, `F`, ...), its file in `attrs["name"]`.
+    """
+    import pandas as pd
+
+    out = []
+    for run in sources(logs, card, rig, signals).runs:
+        frame = pd.DataFrame(dict(run.log.signals))
+        frame.attrs["name"] = run.file
+        out.append(frame)
+    return tuple(out)
 
 
 def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:

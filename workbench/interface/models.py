@@ -157,6 +157,21 @@ class TraceResult(_OfModel):
         return tuple(one.effect.key for one in self.found.trace.effects)
 
     @property
+    def residuals(self) -> "pd.DataFrame":
+        """What the equation of motion leaves of the training logs, a row a short stretch.
+
+        `before` the effects and `after` them, with its `noise` (one sigma) [N]; `t` [s] over all
+        logs in a row; the signals at the stretch by name. Empty where nothing was judged.
+        """
+        import pandas as pd
+
+        if not self.found.trace.residuals:
+            return pd.DataFrame()
+        rest = self.found.trace.residuals[0]
+        own = {"t": rest.t, "before": rest.before, "after": rest.after, "noise": rest.noise}
+        return pd.DataFrame({**rest.signals, **own})
+
+    @property
     def document(self) -> Mapping[str, Any]:
         from workbench.steps.trace import trace_document
 

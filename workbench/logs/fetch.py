@@ -7,21 +7,11 @@ from pathlib import Path
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, FileEntry
 from workbench.cards.nearest import nearest
-from workbench.files import CARD_FILE, refuse_special
+from workbench.files import CARD_FILE, refuse_special, shipped_cards
 from workbench.links import broken_link
 
 DATA_VARIABLE = "WORKBENCH_DATA"
 """Environment variable naming the folder that holds `<card name>/<file>`."""
-
-
-def shipped_cards() -> dict[str, Path]:
-    """Paths of the shipped cards by name, from the wheel or else from the checkout."""
-    here = Path(__file__).resolve().parents[1]
-    for root in (here / "_datasets", here.parent / "datasets"):
-        found = {path.parent.name: path for path in sorted(root.glob(f"*/{CARD_FILE}"))}
-        if found:
-            return found
-    return {}
 
 
 def card_path(name: str | Path) -> Path:

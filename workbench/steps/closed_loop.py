@@ -14,7 +14,7 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.log import Rig
-from identification.model.plant import Actuator, Motor
+from identification.model.plant import Actuator, Motor, Plant
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import ForceLoop, Present
 from workbench.documents.model import Model
@@ -119,14 +119,36 @@ def run_driven(
             raise BadModel("the machine has an actuator, the design no force loop for it")
     elif loop.force is not None:
         raise BadModel("the design has a force loop, the machine no actuator for it")
-    return simulate_servo(
+    return servo_run(
         plant if plant.actuator else replace(plant, actuator=Motor(1.0)),
-        replace(loop.servo, control_limit=limit_on(machine, loop), direct=direct),
+        replace(loop, direct=direct),
+        limit_on(machine, loop),
+        r,
+        _noise(machine, len(r), rng),
+        _chambers(machine.rig),
+    )
+
+
+def servo_run(
+    plant: Plant,
+    loop: DrivenLoop,
+    limit: float | None,
+    r: Array,
+    noise: LoopNoise | None,
+    chambers: dict[str, OfForce],
+) -> ServoRun:
+    """One reference r [m], (n,) every loop.h, through the loop around a plant that stands at r[0].
+
+    limit: of the command, in its unit; chambers: the pressures by the force, by name.
+    """
+    return simulate_servo(
+        plant,
+        replace(loop.servo, control_limit=limit),
         r,
         loop.h,
-        noise=_noise(machine, len(r), rng),
+        noise=noise,
         start=(float(r[0]), 0.0, 0.0),
-        signals=_chambers(machine.rig),
+        signals=chambers,
     )
 
 

@@ -88,7 +88,7 @@ def simulated_log(card: Card, folder: Path, *, held_out: bool = False) -> Path:
 
     recipe = recipe_of(card)
     seed = recipe.seed + HELD_OUT_SEED if held_out else recipe.seed
-    log = record(card.name, recipe, seed, card.rig())
+    log = record(card.name, recipe, seed, card.rig(), card.controller)
     path = folder / f"{card.name}{'_held_out' if held_out else ''}.parquet"
     pd.DataFrame(as_columns(log, card)).to_parquet(path, index=False)
     return path

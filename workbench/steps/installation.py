@@ -9,7 +9,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from workbench.cards.card import load_card
-from workbench.logs.fetch import DATA_VARIABLE, shipped_cards
+from workbench.files import shipped_cards
+from workbench.logs.fetch import DATA_VARIABLE
 
 TOLD_VERSIONS = (
     "servo-workbench", "numpy", "scipy", "numba", "pandas", "pyarrow", "pint", "matplotlib",

@@ -5,14 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from design.compensator import Compensator
 from design.effect_loop import simulate_effect_loop
-from design.filters import filters_at
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, simulate_loop
 from design.loop_signals import OfForce, pressures
 from design.pid import pd_to_rst, pid_to_rst
 from design.rst import RST
-from design.servo import Compensation
 from identification.arrays import Array
 from identification.errors import BadCard, BadModel
 from identification.log import Log, Rig
@@ -23,11 +20,14 @@ from identification.signals.excitation import reference_signal
 from identification.simulation.free_run import FreeRun, free_run
 from workbench.cards import recipe as recipes
 from workbench.cards.card import Card
+from workbench.cards.controller import CardController
 from workbench.cards.effect_values import exact
 from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
-from workbench.documents.model import as_number
+from workbench.documents.drive import PresentFile
+from workbench.documents.model import as_number, plain
 from workbench.files import ABSURD
+from workbench.steps.simulate_present import compensation, recipe_loop, run_present
 
 MOST_PASSES = 30  # of an open loop in which friction follows pressures, and they the force
 SETTLED_CHANGE = 1e-9  # relative change of the force from which it has settled
@@ -45,19 +45,30 @@ class _Run:
     F_true: Array
 
 
-def record(name: str, recipe: Recipe, seed: int | None = None, rig: Rig | None = None) -> Log:
+def record(
+    name: str,
+    recipe: Recipe,
+    seed: int | None = None,
+    rig: Rig | None = None,
+    controller: CardController | None = None,
+) -> Log:
     """The log of a recipe, sensors' noise included; `seed` instead of the recipe's where given.
 
-    rig: where it is electro-pneumatic, the chambers' pressures are logged too. Raises BadCard
+    rig: where it is electro-pneumatic, the chambers' pressures are logged too. controller: that of
+    the card, which runs the machine where the recipe names no position controller. Raises BadCard
     where an effect needs a signal that is not simulated, or where the machine runs away.
     """
     rng = np.random.default_rng(recipe.seed if seed is None else seed)
-    reference = reference_signal(recipe.reference, recipe.t, rng)
     chambers = _chambers(name, recipe, rig)
     _refuse_unsimulated(name, recipe, chambers)
     try:
-        run = (_open_loop if recipe.loop is None else _in_loop)(recipe, reference, rng, chambers)
-    except BadModel as error:
+        if recipe.by_card:
+            run = _by_card(recipe, controller, rig, rng, chambers)
+        else:
+            reference = reference_signal(recipe.reference, recipe.t, rng)
+            drive = _open_loop if recipe.drive == "command" else _in_loop
+            run = drive(recipe, reference, rng, chambers)
+    except (BadModel, BadCard) as error:
         raise BadCard(f"{name}: {error}") from None
     signals = {"t": recipe.t, "r": run.r, "y": run.y, "F": run.F, "u": run.u}
     log = Log(name, signals | _logged_pressures(name, recipe, chambers, run.F_true, rng))
@@ -80,7 +91,7 @@ def _in_loop(
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
     cascade = Cascade(_position(recipe), force, loop.control_limit)
     parts = (recipe.plant, cascade, reference, recipe.h)
-    beside = _compensation(recipe)
+    beside = compensation(recipe, recipe.h)
     run: LoopRun
     if recipe.plant.effects or beside:
         run = simulate_effect_loop(*parts, noise=noise, signals=chambers, friction=beside)
@@ -89,13 +100,16 @@ def _in_loop(
     return _Run(run.r, run.y_measured, run.F_measured, run.u, run.F)
 
 
-def _compensation(recipe: Recipe) -> Compensation | None:
-    """The recipe's compensator behind the filters that a design has at the recipe's period."""
-    asked = recipe.loop.compensator if recipe.loop else None
-    if asked is None:
-        return None
-    compensator = Compensator(asked.friction or recipe.plant.friction, asked.N_c, asked.e_T)
-    return Compensation(compensator, filters_at(recipe.h))
+def _by_card(
+    recipe: Recipe, controller: CardController | None, rig: Rig | None,
+    rng: np.random.Generator, chambers: Chambers,
+) -> _Run:  # fmt: skip
+    """The reference as that of the card's own controller, at the controller's clock."""
+    if controller is None or rig is None:
+        raise BadCard("no position controller; give recipe.loop.position, or add [controller]")
+    loop = recipe_loop(recipe, controller, rig)
+    run, at = run_present(recipe, loop, rng, chambers)
+    return _Run(run.r[at], run.y_measured[at], run.F_measured[at], run.u[at], run.F[at])
 
 
 def _open_loop(recipe: Recipe, u: Array, rng: np.random.Generator, chambers: Chambers) -> _Run:
@@ -199,11 +213,17 @@ def as_columns(log: Log, card: Card) -> dict[str, Array]:
 
 
 def truth(
-    name: str, recipe: Recipe, seed: int | None = None, *, rig: Rig | None = None
+    name: str,
+    recipe: Recipe,
+    seed: int | None = None,
+    *,
+    rig: Rig | None = None,
+    controller: PresentFile | None = None,
 ) -> dict[str, Any]:
     """What the log does not hold: parameters, effects, loop, noise and seed.
 
     A parameter is as in every result, without an interval: what a recipe sets is known exactly.
+    controller: that of the card, as results have it, where it runs the machine.
     """
     motion, command = (rig.motion, rig.command_unit) if rig else ("linear", "V")
     friction, actuator = friction_units(motion), actuator_units(motion, command)
@@ -222,6 +242,7 @@ def truth(
         "duration_s": recipe.duration,
         "h_s": recipe.h,
         "loop": asdict(recipe.loop) if recipe.loop else None,
+        **({"controller": plain(controller)} if controller and recipe.by_card else {}),
     }
 
 
@@ -231,7 +252,7 @@ def _exact(value: float, unit: str) -> dict[str, Any]:
 
 def _position(recipe: Recipe) -> RST:
     """The recipe's position controller as RST at the recipe's period; volts for a motor."""
-    assert recipe.loop is not None
+    assert recipe.loop is not None and recipe.loop.position is not None
     match recipe.loop.position:
         case recipes.RecipePD(k_d, T_d, eps):
             found = pd_to_rst(k_d, T_d, eps, recipe.h)

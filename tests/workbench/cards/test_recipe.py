@@ -194,7 +194,7 @@ def test_a_compensator_knows_the_plant_s_friction_or_another(tmp_path: Path) -> 
         ("F_sn = -23", "F_sn = 23", "F_sn = 23 N, must be negative"),
         ("m = 1,", "m = 0,", "m = 0 kg, must be > 0"),
         ("actuator = { k1 = 19530.0, k2 = 10405.0 }", "", "one of 'actuator' and 'motor'"),
-        ("seed = 7", 'drive = "command"', "needs a 'loop'"),
+        ("seed = 7", 'drive = "command"', "needs no 'loop'"),
         (", force = { k_i = 0.02, T_i = 0.05 }", "", "needs loop.force with an actuator"),
         ("T_i = 0.05 } }", "T_i = 0.05 }, compensator = { e_T = 0 } }", "compensator.e_T] 0"),
         ("T_i = 0.05 } }", "T_i = 0.05 }, compensator = { e_T = 1, N_c = 1 } }", "N_c] 1"),

@@ -124,11 +124,10 @@ def test_identify_trace_and_design_say_it(
     ))  # fmt: skip
     out = tmp_path / "model"
     said = "signals.t, read in 's': sampled every 2 s"
-    for words in (["identify", "--out", str(out)], ["trace", "--out", str(tmp_path / "trace")]):
-        command = [words[0], str(tmp_path / "run.csv"), "--card", str(card), *words[1:]]
-        assert main(command) == 0
-        assert said in " ".join(capsys.readouterr().out.split())
-    assert main([*command, "--json"]) == 0
+    read = [str(tmp_path / "run.csv"), "--card", str(card)]
+    assert main(["identify", *read, "--out", str(out)]) == 0
+    assert said in " ".join(capsys.readouterr().out.split())
+    assert main(["trace", *read, "--out", str(tmp_path / "trace"), "--json"]) == 0
     assert any(said in line for line in json.loads(capsys.readouterr().out)["remarks"])
     assert main(["design", str(out / "model.json"), "--out", str(tmp_path / "d"), "--json"]) < 2
     remarks = json.loads(capsys.readouterr().out)["remarks"]

@@ -14,8 +14,25 @@ import workbench as wb
 from tests.chain import CARD
 from workbench.cli import main
 from workbench.interface.result import Result
+from workbench.output import dumps
 
 LOGS = ("day1.csv", "day2.csv")
+PULL = '''"""A magnet."""
+
+from identification.effects._base import Effect, Param
+
+
+def value(t, y, v, F, u, d, z, c, f, s, p):
+    """-k y."""
+    return -p[0] * y
+
+
+EFFECT = Effect(
+    key="pull", meaning="a magnet", equation="-k*y", source="our bench", acts="force",
+    params=(Param("k", "N/m", 0.0, 1e6, 40.0, "its stiffness", linear=True),),
+    value=value, depends_on=("y",),
+)
+'''
 
 
 @dataclass(frozen=True)
@@ -106,6 +123,9 @@ def test_trace(bench: Bench, tmp_path: Path) -> None:
     the_same(found, folder, tmp_path)
     assert (found.verdict, found.effects) == ("none", ())
     shown_well(found, "Nothing is missing")
+    rest = found.residuals
+    assert {"t", "v", "y", "before", "after", "noise"} <= set(rest)
+    assert 0.3 < float(np.std(rest["before"] / rest["noise"])) < 3.0
 
 
 def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
@@ -166,6 +186,34 @@ def test_simulate(bench: Bench, tmp_path: Path) -> None:
     assert found.to_json() + "\n" == (folder / "truth.json").read_text("utf-8")
     assert repr(found).startswith("short: 3001 samples every 0.002 s, seed 3")
     assert "<table" in found._repr_html_()
+
+
+def test_read_logs(bench: Bench) -> None:
+    (found,) = wb.read_logs(bench.path("day1.csv"), bench.path("card.toml"))
+    raw = bench.frame("day1.csv")
+    assert list(found) == list(raw) and found.attrs["name"] == "day1.csv"
+    np.testing.assert_allclose(found.to_numpy(), raw.to_numpy(), rtol=0.0, atol=1e-9)
+    mm = raw.assign(y=1e3 * raw["y"]).rename(columns={"y": "y [mm]"})
+    (again,) = wb.read_logs(mm, rig="force")
+    np.testing.assert_allclose(again["y"], found["y"], rtol=0.0, atol=1e-12)
+
+
+def test_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "pull.py").write_text(PULL, "utf-8")
+    for keys in ((), ("stribeck", "pull")):
+        capsys.readouterr()
+        assert main(["effects", "list", *keys, "--effects", str(tmp_path), "--json"]) == 0
+        printed = json.loads(capsys.readouterr().out)
+        assert json.loads(dumps(wb.effects(*keys, folders=[tmp_path]))) == printed
+        assert not keys or [one["key"] for one in printed] == list(keys)
+    wrong = PULL.replace("-p[0] * y", "p[0] * y")
+    for text, status in ((PULL, 0), (wrong, 1)):
+        (tmp_path / "pull.py").write_text(text, "utf-8")
+        assert main(["effects", "check", str(tmp_path), "--json"]) == status
+        printed = json.loads(capsys.readouterr().out)
+        printed.pop("next", None)
+        assert wb.check_effects(tmp_path) == printed
+        assert printed["effects"]["pull"]["holds"] is (status == 0)
 
 
 def test_how_a_model_shows_itself(model: Any) -> None:

@@ -8,7 +8,8 @@ import pytest
 
 from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card, load_card
-from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data, shipped_cards
+from workbench.files import shipped_cards
+from workbench.logs.fetch import DATA_VARIABLE, card_path, find_data
 
 BYTES = b"t,y,F\n0,0,0\n"
 

@@ -124,6 +124,7 @@ def test_drift_is_status_1_and_names_the_parameter(
     (moved,) = found["log"][1]["moved"]
     assert moved["name"] == "F_cp"
     assert moved["change"]["low"] < 0.25 < moved["change"]["high"]
+    assert found["next"].startswith("workbench identify ") and "c.csv" in found["next"]
 
 
 def test_the_state_carries_the_test_and_counts_no_log_twice(

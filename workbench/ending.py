@@ -1,0 +1,78 @@
+"""How a command ends: its exit status, told in its help, and the command to type next."""
+
+import shlex
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from os import PathLike
+from typing import Any, NamedTuple
+
+import click
+
+from identification.errors import NotIdentifiable
+
+DONE = "done"
+REFUSAL = "done, and the answer is a refusal or an alarm; its last line is the next command"
+BAD_INPUT = "bad input: one line says what was found, where, what is needed, what to do"
+FAULT = "a fault of ours; --debug shows where"
+
+
+class StatusCommand(click.Command):
+    """A command whose help ends with its exit status; refusal: what 1 means, "" where it has none.
+
+    done: what 0 means.
+    """
+
+    def __init__(self, *given: Any, refusal: str = "", done: str = DONE, **named: Any) -> None:
+        super().__init__(*given, **named)
+        self.refusal, self.done = refusal, done
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The exit status, then the example."""
+        rows = [("0", self.done), ("1", self.refusal), ("2", BAD_INPUT), ("3", FAULT)]
+        write_status(formatter, [row for row in rows if row[1]])
+        super().format_epilog(ctx, formatter)
+
+
+class StatusGroup(click.Group):
+    """A command of several; each of them tells its exit status."""
+
+    command_class = StatusCommand
+
+
+def write_status(formatter: click.HelpFormatter, rows: list[tuple[str, str]]) -> None:
+    """The section of a help page on the exit status."""
+    with formatter.section("Exit status"):
+        formatter.write_dl(rows)
+
+
+class Step(NamedTuple):
+    """A command line to type next, and why."""
+
+    why: str
+    command: str
+
+    def __str__(self) -> str:
+        return f"next ({self.why}): {self.command}"
+
+
+def step(why: str, *words: str | PathLike[str] | None) -> Step:
+    """The step of these words after `workbench`, quoted for a shell; those that are None fall."""
+    every = ["workbench", *(str(word) for word in words if word is not None)]
+    return Step(why, shlex.join(every))
+
+
+class Refused(NotIdentifiable):
+    """A refusal that knows what to type next."""
+
+    def __init__(self, reason: str, then: Step) -> None:
+        super().__init__(reason)
+        self.then = then
+
+
+@contextmanager
+def refused_with(then: Callable[[str], Step]) -> Iterator[None]:
+    """Within the block a refusal becomes one that says `then(its reason)` as the next step."""
+    try:
+        yield
+    except NotIdentifiable as error:
+        raise Refused(str(error), then(str(error))) from error

@@ -1,0 +1,158 @@
+"""What to type after a refusal or an alarm: one command, with the names of the files at hand."""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workbench.ending import Step, step
+from workbench.files import CARD_FILE, shipped_cards
+
+if TYPE_CHECKING:
+    from workbench.documents.design import Controller, Design
+    from workbench.documents.model import Model
+    from workbench.steps.demo import Demonstration
+    from workbench.steps.doctor import Examined
+    from workbench.steps.drift import Drifted
+    from workbench.steps.loop_figures import Limits, LoopFigures
+    from workbench.steps.validate import Validation
+
+SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
+TWO_DIGITS = 100.0
+LOOK_FOLDER = "look"  # where a picture of a log is proposed
+
+
+def looked_over(logs: Sequence[str], card: str) -> Callable[[str], Step]:
+    """After a refusal of logs: look at the one that its reason names, else at the first."""
+
+    def then(reason: str) -> Step:
+        named = (log for log in logs if Path(log).name in reason)
+        log = next(named, logs[0] if logs else "LOG")
+        return step("which run to add", "doctor", log, "--card", card)
+
+    return then
+
+
+def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path) -> Step:
+    """Trace what the model lacks; design on one that leaves noise."""
+    if not model.fit.adequate:
+        return step("an effect is missing", "trace", *logs, "--card", card)
+    return step("a controller for it", "design", folder / "model.json")
+
+
+def without_design(model: "Model", card: str | None) -> Callable[[str], Step]:
+    """After a refusal to design: look over the log that the model is of."""
+    return looked_over([one.file for one in model.log], _card_of(model, card))
+
+
+def _card_of(model: "Model", card: str | None) -> str:
+    """The card by which the model's logs are read: given, shipped, or where it is likely to lie."""
+    if card is not None or model.card in shipped_cards():
+        return card or model.card
+    likely = (Path(model.card) / CARD_FILE, Path(CARD_FILE))
+    return str(next((path for path in likely if path.is_file()), likely[0]))
+
+
+def after_design(
+    found: "Design", model_file: Path, asked_poles: bool, kept: Iterable[str]
+) -> Step | None:
+    """Where no controller keeps the goals: what the best of them does keep.
+
+    kept: the other options of the command. None where one is recommended.
+    """
+    if found.recommended != "none":
+        return None
+    words = ("design", str(model_file), *kept)
+    if asked_poles:
+        return step("poles that keep the goals are searched", *words)
+    best = max(found.controllers.values(), key=lambda one: (-len(one.missed), _worst(one)))
+    modulus, delay = _floor(_worst(best)), best.margins.delay_samples
+    of_margins = all("margin" in missed for missed in best.missed)
+    if of_margins and modulus > 0.0:
+        samples = math.inf if delay is None else _floor(delay)
+        least = () if samples >= 2.0 else ("--delay", f"{samples:g}")
+        return step("the goals that can be kept", *words, "--modulus", f"{modulus:g}", *least)
+    return step("a slower loop", *words, "--poles", _poles(best, SLOWER))
+
+
+def _worst(one: "Controller") -> float:
+    return min(one.margins.worst_modulus or 0.0, one.margins.modulus)
+
+
+def _floor(value: float) -> float:
+    return math.floor(TWO_DIGITS * value) / TWO_DIGITS
+
+
+def _poles(one: "Controller", factor: float) -> str:
+    w_n, zeta = one.dominant
+    return f"{factor * w_n:.3g},{zeta:.3g}"
+
+
+def after_validate(
+    found: "Validation", of: "Design", model: "Model", model_file: Path, plant_file: Path | None,
+    card: str | None,
+) -> Step | None:  # fmt: skip
+    """What to change where the judged controller misses a limit; None where it keeps all."""
+    failed = {place: one for place, one in found.figures[found.judged].items() if not one.passed}
+    if not failed:
+        return None
+    if "model" not in failed and plant_file is not None:
+        return step("a design for that machine", "design", plant_file)
+    if not model.fit.adequate and not model.effects:
+        logs = [one.file for one in model.log]
+        return step("an effect is missing", "trace", *logs, "--card", _card_of(model, card))
+    words = ("design", str(model_file), *(("--card", card) if card else ()))
+    one, limits, controller = failed["model"], found.limits, of.controllers[found.judged]
+    if one.stable and not _keeps_margins(one, limits):
+        asked = ("--modulus", f"{limits.modulus:g}", "--delay", f"{limits.delay:g}")
+        return step("the margins that were missed", *words, *asked)
+    if _too_fast(one, limits):
+        return step("a slower loop", *words, "--poles", _poles(controller, SLOWER))
+    return step("a faster loop", *words, "--poles", _poles(controller, FASTER))
+
+
+def _keeps_margins(one: "LoopFigures", limits: "Limits") -> bool:
+    m = one.margins
+    slow = m is not None and (m.delay_samples is None or m.delay_samples >= limits.delay)
+    return m is not None and m.modulus >= limits.modulus and slow
+
+
+def _too_fast(one: "LoopFigures", limits: "Limits") -> bool:
+    pushed = one.force_peak > limits.force * one.force_seen or one.limited > 0.0
+    return not one.stable or one.overshoot > limits.overshoot or pushed
+
+
+def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None:
+    """Trace another structure, re-tune after drift, look over a log that tells nothing."""
+    if found.verdict == "none" or (found.verdict == "not_judged" and found.tested):
+        return None
+    files = {one.source.file for one in found.tests if one.test.verdict == found.verdict}
+    named = [log for log in logs if Path(log).name in files] or list(logs)
+    if found.verdict == "structure":
+        return step("an effect is missing", "trace", *named, "--card", card)
+    if found.verdict == "drift":
+        return step("the machine as it is now", "identify", *named, "--card", card)
+    return step("which run to add", "doctor", named[0], "--card", card)
+
+
+def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
+    """Another card where the log is refused, a picture where it tells nothing."""
+    if found.verdict not in ("refused", "nothing"):
+        return None
+    if found.verdict == "nothing" and out is None:
+        return step("see the log", "doctor", log, "--card", card, "--out", LOOK_FOLDER)
+    if found.verdict == "nothing":
+        return step("once a run is added as above", "doctor", log, "--card", card)
+    path = Path(card)
+    place = path.with_name(f"{path.stem}-new.toml") if path.suffix else Path(CARD_FILE)
+    return step("what the columns seem to be", "init", log, "--out", place)
+
+
+def after_demo(found: "Demonstration", folder: Path, seed: int) -> Step | None:
+    """Another search where the effect was not found, another design where a limit is missed."""
+    if not found.named_rightly:
+        return step("another search", "demo", "--seed", str(seed + 1))
+    model = found.traced.model
+    return after_validate(
+        found.validation, found.design, model, folder / "model.json", None, model.card
+    )
