@@ -43,7 +43,8 @@ class PredictResult(Result):
         sections = [prediction_section(self.found, self.rotary)]
         if more:
             sections.append(Section("In words", render("lines", lines=more)))
-        return page("Prediction", f"{first}.", sections, then_of_prediction("LOG", "CARD"))
+        lead, then = first.rstrip(".") + ".", then_of_prediction("LOG", "CARD")
+        return page("Prediction", lead, sections, then)
 
     def _lines(self) -> list[str]:
         from workbench.report.prediction import prediction_lines
