@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from workbench.report.page import safe
+from workbench.report.templating import safe
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -20,9 +20,21 @@ if TYPE_CHECKING:
 MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
 GREY = "#7a7a7a"
-CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL, "present": GREY}
+BEFORE = "#8a8a8a"
+# The colours of the pages' style in place of the figures'.
+SCHEME = {
+    "#000000": "var(--measured)",
+    MODEL: "var(--model)",
+    REFERENCE: "var(--reference)",
+    OTHER: "var(--other)",
+    BAND: "var(--band)",
+    GREY: "var(--before)",
+    "#ffffff": "var(--paper)",
+    "#dddddd": "var(--grid)",
+}
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
+SHOWN_SHARE = 0.995  # of the points that axes hold; the rarest would flatten the rest
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.size": 9.0,
@@ -78,6 +90,8 @@ def inline(drawn: "Figure", name: str, description: str) -> Any:
     # Group ids repeat from figure to figure and nothing refers to them.
     svg = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")', r"<svg \1", svg, count=1)
+    # Colours follow the page's scheme, light or dark.
+    svg = re.sub("|".join(SCHEME), lambda found: SCHEME[found[0]], svg)
     return safe(svg.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1))
 
 

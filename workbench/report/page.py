@@ -1,12 +1,12 @@
-"""A report as one HTML file: sections in order, no network, no script."""
+"""A report as one HTML file without network: what was found, what next, a picture, the rest."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from typing import TYPE_CHECKING, Any
+from importlib.resources import files
 
-if TYPE_CHECKING:
-    from jinja2 import Environment
+from workbench.report.chart import chart_assets
+from workbench.report.symbols import used_symbols
+from workbench.report.templating import render
 
 
 @dataclass(frozen=True)
@@ -17,31 +17,20 @@ class Section:
     html: str
 
 
-def page(title: str, lead: str, sections: Sequence[Section]) -> str:
-    """The HTML of a whole report."""
-    return render("page", title=title, lead=lead, sections=sections)
+def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str] = ()) -> str:
+    """The HTML of a whole report: `lead` says what was found, `then` what to do next, a line each.
 
-
-def render(template: str, **values: Any) -> str:
-    """The template `<template>.html.j2` filled in; values are escaped unless marked safe."""
-    return _environment().get_template(f"{template}.html.j2").render(**values)
-
-
-def safe(html: str) -> Any:
-    """HTML of our own making, not to be escaped."""
-    from markupsafe import Markup
-
-    return Markup(html)
-
-
-@cache
-def _environment() -> "Environment":
-    from jinja2 import Environment, PackageLoader, StrictUndefined
-
-    return Environment(
-        loader=PackageLoader("workbench.report"),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+    The first section is on the first screen. Scripts are in it only where a chart is.
+    """
+    body = "".join(section.html for section in sections)
+    # The chart's style holds the colours of both schemes, which every report uses.
+    needed = chart_assets() if '<figure class="chart"' in body else {"chart.css": ""}
+    styles = [
+        text for name, text in chart_assets().items() if name.endswith(".css") and name in needed
+    ]
+    styles.append((files("workbench") / "assets/report.css").read_text("utf-8"))
+    scripts = [text for name, text in needed.items() if name.endswith(".js")]
+    return render(
+        "page", title=title, lead=lead, then=then, sections=sections, styles=styles,
+        scripts=scripts, symbols=used_symbols(lead + body + "".join(then)),
+    )  # fmt: skip

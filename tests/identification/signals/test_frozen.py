@@ -66,7 +66,7 @@ def test_an_encoder_at_rest_is_no_fault_though_its_clock_jitters() -> None:
     y = jittering(1e-6)
     assert np.mean(np.diff(y) == 0.0) > 0.2  # it stands, and repeats nothing else
     assert not np.any(frozen(y))
-    check(Log("encoder", {"t": 1e-3 * np.arange(len(y)), "y": y}), Rig("force"))
+    check(Log("encoder", {"t": 1e-3 * np.arange(len(y), dtype=np.float64), "y": y}), Rig("force"))
 
 
 def test_an_encoder_with_noise_at_rest_is_one_where_it_stands() -> None:
@@ -74,4 +74,6 @@ def test_an_encoder_with_noise_at_rest_is_one_where_it_stands() -> None:
     y[2000:2300] = y[2000]
     assert np.flatnonzero(frozen(y)).tolist() == list(range(2000, 2300))
     with pytest.raises(BadLog, match="sticks"):
-        check(Log("encoder", {"t": 1e-3 * np.arange(len(y)), "y": y}), Rig("force"))
+        check(
+            Log("encoder", {"t": 1e-3 * np.arange(len(y), dtype=np.float64), "y": y}), Rig("force")
+        )
