@@ -1,4 +1,4 @@
-# make demo | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
+# make demo | make docs | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
 PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
@@ -8,13 +8,13 @@ NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
-.PHONY: demo test environment lint types floors wheel tests bench format clean
+.PHONY: demo test environment lint types floors wheel docs tests bench format clean
 .NOTPARALLEL:
 
 demo: $(VENV)/.installed
 	$(BIN)/workbench demo
 
-test: lint types floors wheel tests
+test: lint types floors wheel docs tests
 
 environment: $(VENV)/.installed-dev
 
@@ -41,6 +41,11 @@ floors: environment
 
 wheel: environment
 	$(BIN)/python tools/check_wheel.py
+
+# Runs every command of the pages; -E reads all pages anew, whose outputs are of this code.
+docs: environment
+	$(BIN)/python -m sphinx -W --keep-going -E -q -d build/doctrees docs build/site
+	@echo "the site: build/site/index.html"
 
 tests: environment
 	$(BIN)/pytest -n $(WORKERS)
