@@ -185,23 +185,28 @@ class Pages:
 
         workers: pages at a time.
         """
-        waiting, faults = dict(self._sources), []
+        order = self._order()
         with ThreadPoolExecutor(workers) as pool:
-            while waiting:
-                ready = [name for name in waiting if _after(waiting[name]) not in waiting]
-                if not ready:
-                    raise PageFault(f"pages wait for each other: {', '.join(waiting)}")
-                running: dict[str, Future[list[str]]] = {
-                    name: pool.submit(self._page, name, waiting.pop(name)) for name in ready
-                }
-                for name, done in running.items():
-                    try:
-                        self.printed[name] = done.result()
-                    except PageFault as fault:
-                        faults.append(str(fault))
-                        waiting = {k: v for k, v in waiting.items() if _after(v) != name}
+            running: dict[str, Future[list[str]]] = {}
+            for name in order:  # the one before it has begun by then, so nobody waits for ever
+                running[name] = pool.submit(
+                    self._page, name, running.get(_after(self.source(name)))
+                )
+        faults = [str(done.exception()) for done in running.values() if done.exception()]
         if faults:
             raise PageFault("\n\n".join(faults))
+        self.printed = {name: done.result() for name, done in running.items()}
+
+    def _order(self) -> list[str]:
+        """The pages, each behind the one that it begins after."""
+        waiting, order = dict(self._sources), list[str]()
+        while waiting:
+            ready = [name for name, text in waiting.items() if _after(text) not in waiting]
+            if not ready:
+                raise PageFault(f"pages wait for each other: {', '.join(waiting)}")
+            order += ready
+            waiting = {name: text for name, text in waiting.items() if name not in ready}
+        return order
 
     def source(self, name: str) -> str:
         """The page as it is written."""
@@ -221,10 +226,14 @@ class Pages:
                 lines[block.end : block.end] = "\n".join(below).splitlines()
         return "\n".join(lines) + "\n"
 
-    def _page(self, name: str, source: str) -> list[str]:
-        """What each block printed."""
-        folder, before = self.folder(name), _after(source)
-        if before:
+    def _page(self, name: str, earlier: Future[list[str]] | None) -> list[str]:
+        """What each block printed; earlier: the page that it begins after."""
+        source, folder = self.source(name), self.folder(name)
+        before = _after(source)
+        if before and not earlier:
+            raise PageFault(f"{name}.md: begins after {before}, which is no page")
+        if before and earlier:
+            earlier.result()
             shutil.copytree(self.folder(before), folder)
         else:
             folder.mkdir(parents=True)
@@ -237,6 +246,7 @@ class Pages:
             session.close()
 
 
-def _after(source: str) -> str | None:
+def _after(source: str) -> str:
+    """The page after which this one begins; empty where it begins by itself."""
     found = AFTER.search(source)
-    return found[1] if found else None
+    return found[1] if found else ""
