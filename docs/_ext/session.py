@@ -25,7 +25,7 @@ from pathlib import Path
 from markdown_it import MarkdownIt
 
 ROOT = Path(__file__).parents[2]
-LONGEST = 300.0  # s that a block may take
+LONGEST = 900.0  # s that a block may take
 AFTER = re.compile(r"<!-- after: ([\w./-]+) -->")
 INSTALLED = re.compile(r"(?:\S*bin/)?pip install '?servo-workbench(?:\[(?P<extras>[\w,]+)\])?'?")
 COLOURS = re.compile(r"\x1b\[[0-9;]*m")
