@@ -126,4 +126,4 @@ def _upright(name: str) -> str:
     """A name of more than one letter as a formula has it."""
     base, _, below = name.partition("_")
     word = f"\\{base}" if base in GREEK else rf"\mathrm{{{base}}}"
-    return rf"{word}_{{{below.replace('_', ' ')}}}" if below else word
+    return rf"{word}_{{{below.replace('_', ' ')}}}\," if below else rf"{word}\,"
