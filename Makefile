@@ -1,4 +1,4 @@
-# make demo | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
+# make demo | make docs | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
 PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
@@ -8,7 +8,7 @@ NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
-.PHONY: demo test environment lint types floors wheel kernels tests bench format clean
+.PHONY: demo test environment lint types floors wheel docs kernels tests bench format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/workbench demo
@@ -16,7 +16,7 @@ demo: $(VENV)/.installed
 # Two at a time: what one core checks goes on beside what the other compiles and tests.
 test: environment
 	$(MAKE) --no-print-directory -j 2 lint types floors kernels
-	$(MAKE) --no-print-directory -j 2 wheel tests
+	$(MAKE) --no-print-directory -j 2 docs wheel tests
 
 environment: $(VENV)/.installed-dev
 
@@ -46,6 +46,11 @@ wheel: environment
 
 kernels: environment
 	$(BIN)/python tools/compile_kernels.py
+
+# Runs every command of the pages; -E reads all pages anew, whose outputs are of this code.
+docs: environment
+	$(BIN)/python -m sphinx -W --keep-going -E -q -d build/doctrees docs build/site
+	@echo "the site: build/site/index.html"
 
 tests: environment
 	$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder

@@ -1,29 +1,7 @@
 """Cards: what a machine is and how its logs are to be read (CONTRACT, "Card").
 
-Beyond the contract's example a card may say (all optional, all additive):
-
-    [card]   title, licence, citation, url, notes = ["a trap", ...]
-    [file]   format = "csv" | "parquet" | "mat" | "hdf5" | "json" | "tdms" | "mdf" | "mcap" |
-             "ulog" | "excel"    # default: by content
-             header = false      # csv; default: a first line that is not all numbers is one
-             skip_rows = 15      # rows dropped before the header, or before the data without one
-             delimiter, decimal, comment = "#", encoding = "utf-8"  # default: found by looking
-             rows = "data"       # json key, HDF5 group, MAT struct ("a.b"), sheet, or group of
-                                 # channels (TDMS, MDF), topic or message that holds the signals
-    [signals] a column number counts from 0; column = gain * signal + offset, the offset in the
-             column's unit; gain = "80 V/m" beside the column's unit = "V", or a number: see
-             workbench/cards/sensors.py; bits = 16, signed = true reads a column logged as
-             unsigned as two's complement; a scalar beside the rows is a constant signal
-    [rig]    kind = "force": areas and pressures given as well make F_e = F + S_p p_p - S_n p_n
-             kind = "electro-pneumatic": F_e = S_p p_p - S_n p_n - (S_p - S_n) supply_pressure_pa,
-             paper eq. (7); without supply_pressure_pa the last term is 0, as for gauge pressures
-             command_unit = "%": what the drive takes, in which u is held; default: V, A, 1, N or
-             N m, as the unit of u is; force_per_command = 35.0 or "35 N/A"; control_limit = 8.0 or
-             "8 A"; a number of both is in command_unit (control_limit_v is the older name)
-    [split]  train = [...], test = [...] and further groups of file names, fixed before any fit
-    [[files]] name, url, sha256, rig = { key = value }      # what differs for this file
-    [recipe] see workbench/cards/recipe.py
-    [controller] the one that the machine has now: see workbench/cards/controller.py
+Every key is said below its field; `[recipe]` is in workbench/cards/recipe.py, `[controller]` in
+workbench/cards/controller.py, and what a gain means in workbench/cards/sensors.py.
 """
 
 import re
@@ -43,8 +21,9 @@ from identification.model.plant import over
 from workbench.cards.controller import CardController, ControllerSection
 from workbench.cards.nearest import nearest
 from workbench.cards.quantities import in_unit_of
-from workbench.cards.recipe import CardTable, Positive, Recipe, RecipeSection
+from workbench.cards.recipe import Recipe, RecipeSection
 from workbench.cards.sensors import column_scale, command_unit, parse_gain
+from workbench.cards.table import CardTable, Positive
 from workbench.cards.units import LONGEST_UNIT, Scale, force_unit, si_unit
 from workbench.files import CARD_BYTES, refuse_larger, refuse_special
 
@@ -64,36 +43,61 @@ class About(CardTable):
     """`[card]`: name of the set and where it comes from."""
 
     name: str = Field(pattern=r"^[\w.-]+$")
+    """of the machine: letters, digits, `_`, `.`, `-`; also the folder of its files under
+    `WORKBENCH_DATA`"""
     title: str = ""
+    """in a line"""
     source: str = ""
+    """who recorded the logs, and how"""
     licence: str = ""
+    """of the logs"""
     citation: str = ""
+    """how their authors want them cited"""
     url: str = ""
+    """where they are described"""
     notes: tuple[str, ...] = ()
+    """traps, one a text"""
 
 
 class FileSpec(CardTable):
     """`[file]`: how the bytes are laid out; `None` means found by looking."""
 
     format: Format | None = None
+    """of the files; without it, by their content"""
     header: bool | None = None
+    """of text: whether a row of names is there; without it, by looking"""
     skip_rows: int = Field(default=0, ge=0)
+    """rows to drop before the header, or before the data where there is none"""
     delimiter: str | None = Field(default=None, min_length=1, max_length=1)
+    """of text; without it, by looking"""
     decimal: Literal[".", ","] | None = None
+    """of text; without it, by looking"""
     comment: str = "#"
+    """of text: rows that begin so are dropped"""
     rows: str | None = None
+    """what holds the signals: JSON key, HDF5 group, MAT struct (`a.b`), sheet, group of channels,
+    topic or message"""
     encoding: str = "utf-8"
+    """of text"""
 
 
 class SignalSpec(CardTable):
     """One signal: column = gain * signal + offset (see workbench/cards/sensors.py)."""
 
     column: str | int
+    """its name in the log, or its number from 0"""
     unit: str
+    """of the column; of a sensor's output where `gain` is a number of that output for each SI
+    unit"""
     gain: Annotated[float, Strict()] | str = 1.0
+    """column = gain * signal + offset: a text with its unit (`"80 V/m"`, `"4096 count/turn"`), or a
+    number"""
     offset: float = 0.0
+    """what the column shows where the signal is 0, in the unit of the column"""
     bits: int | None = Field(default=None, ge=2, le=52)
+    """of a counter in two's complement"""
     signed: bool = False
+    """whether an unsigned column is such a counter; needs `bits`"""
 
     @model_validator(mode="after")
     def _invertible(self) -> "SignalSpec":
@@ -116,15 +120,27 @@ class RigSection(CardTable):
     """`[rig]` as a card writes it."""
 
     kind: RigKind
+    """how the force on the body is known: from two pressures, logged as F, or as force_per_command
+    times u"""
     area_p_m2: Positive | None = None
+    """piston area of the chamber that pushes towards +y, m²; with `force` given too, the pressures
+    correct F"""
     area_n_m2: Positive | None = None
+    """piston area of the other chamber, m²"""
     supply_pressure_pa: float | None = None
+    """P_s of eq. (7), Pa; left out (0) where areas are the same or pressures are gauge pressures"""
     force_per_command: float | str | None = None
+    """of a motor: N for each unit of u, or a text (`"35.15 N/A"`)"""
     command_unit: str | None = Field(default=None, min_length=1, max_length=LONGEST_UNIT)
+    """the unit of u inside; without it V, A, 1, N or N m, as the unit of its column is"""
     control_limit: Positive | str | None = None
+    """of the size of u, in `command_unit`, or a text (`"8 A"`)"""
     control_limit_v: Positive | None = None
+    """the older name of `control_limit`"""
     stroke_m: tuple[float, float] | None = None
+    """low and high end of the motion, m (rad)"""
     motion: Literal["linear", "rotary"] = "linear"
+    """rotary: rad, N m and kg m² in place of m, N and kg"""
 
     @model_validator(mode="after")
     def _complete(self) -> "RigSection":
@@ -175,20 +191,34 @@ class FileEntry(CardTable):
     """`[[files]]`: one file of the set, where to fetch it, and what of the rig differs for it."""
 
     name: str
+    """of the file"""
     url: str | None = None
+    """where it can be fetched"""
     sha256: str | None = Field(default=None, pattern=r"^[0-9a-f]{64}$")
+    """of its bytes; another file is refused"""
     rig: dict[str, Any] = Field(default_factory=dict)
+    """keys of `[rig]` that differ for this file"""
 
 
-class _CardFile(CardTable):
+class CardFile(CardTable):
+    """A card as it is written."""
+
     card: About
+    """what the machine is called, and where its logs come from"""
     rig: RigSection
+    """the machine"""
     signals: dict[str, SignalSpec] = Field(default_factory=dict)
+    """what each column is; `t`, `y`, and by kind `p_p` and `p_n`, `F`, or `u` are needed"""
     file: FileSpec = FileSpec()
+    """how the files are laid out; all of it is found by looking where it is not given"""
     files: tuple[FileEntry, ...] = ()
+    """the files of the set, one table each"""
     split: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    """names of groups of files; `trace` takes `train` and `test`"""
     recipe: RecipeSection | None = None
+    """in place of a log: what `simulate` makes one from"""
     controller: ControllerSection | None = None
+    """the controller that the machine has now"""
 
 
 @dataclass(frozen=True)
@@ -233,12 +263,12 @@ def card_from(
 ) -> Card:
     """As `load_card`, of a card's tables; path: what messages call the card."""
     try:
-        parsed = _CardFile.model_validate(raw)
+        parsed = CardFile.model_validate(raw)
         signals = parsed.signals or (_recipe_signals(parsed.rig) if parsed.recipe else {})
         rigs = {"": _rig(path, parsed.rig, signals)}
         for number, entry in enumerate(parsed.files):
             if entry.rig:
-                merged = _CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
+                merged = CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
                 rigs[entry.name] = _rig(path, merged, signals)
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
         wanted = parsed.recipe if with_recipe else None
@@ -275,7 +305,7 @@ def _rig(path: Path, section: RigSection, signals: Mapping[str, SignalSpec]) -> 
         raise BadCard(f"{path}: {error}") from None
 
 
-def _controller(path: Path, parsed: _CardFile, rig: Rig) -> CardController | None:
+def _controller(path: Path, parsed: CardFile, rig: Rig) -> CardController | None:
     try:
         return None if parsed.controller is None else parsed.controller.value(rig)
     except BadCard as error:
@@ -361,7 +391,7 @@ def _shown(found: object) -> str:
 
 def _keys_at(loc: tuple[int | str, ...]) -> list[str]:
     """Keys of the section that stands at `loc`, found by walking the sections' fields."""
-    sections: list[type[CardTable]] = [_CardFile]
+    sections: list[type[CardTable]] = [CardFile]
     for part in loc:
         found = [s.model_fields[str(part)].annotation for s in sections if part in s.model_fields]
         if found:
@@ -421,7 +451,7 @@ def _refuse_twice(path: Path, signals: Mapping[str, SignalSpec]) -> None:
                     )
 
 
-def _check_split(path: Path, parsed: _CardFile) -> None:
+def _check_split(path: Path, parsed: CardFile) -> None:
     known = [entry.name for entry in parsed.files]
     for group, names in parsed.split.items():
         for name in names:

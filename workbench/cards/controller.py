@@ -1,33 +1,6 @@
 """The controller that a machine has now, as its card names it under `[controller]`.
 
 A gain is a number in SI (with the unit of the command in place of V), or a text with a unit.
-
-    [controller]
-    kind = "PD"                 # k_d (1 + T_d s/(eps s + 1)) (r - y)
-    k_d = "8 A/mm"
-    T_d = "12 ms"
-    eps = 1e-3
-
-    kind = "PID"                # k_R (b r - y + (r - y)/(T_i s) + T_d s/(eps s + 1) (c r - y))
-    k_R, T_i, T_d, eps; b = 1.0, c = 1.0
-
-    kind = "P-PI"               # k_p (1 + 1/(T_i s)) (v_ref - v), v_ref = k_v (r - y) + v_ff dr/dt
-    k_v = "40 1/s"
-    k_p = "120 A s/m"
-    T_i = "8 ms"
-    eps = 0.0                   # v is the difference of y behind 1/(eps s + 1)
-    v_ff = 0.0                  # share of the reference's speed that is fed forward
-
-    kind = "RST"                # S u = T r - R y, in z^-1
-    R, S, T = [...]
-
-For all of them:
-
-    period_s = 5e-4             # default: that of the logs
-    output = "command"          # what it gives; "force": a motor's force, or that for a force loop
-    force = { k_i = "0.02 V/N", T_i = 0.05, period_s = 1e-3 }    # the force loop below it
-    reference_rate = "0.5 m/s"  # at most this speed of the reference
-    anti_windup_s = 0.05        # in which the sum forgets what a limit cut off; "none"; default T_i
 """
 
 from collections.abc import Iterator, Mapping
@@ -42,7 +15,7 @@ from identification.model.estimates import Estimate
 from identification.model.plant import over
 from workbench.cards.parameter_units import shown
 from workbench.cards.quantities import in_unit_of
-from workbench.cards.recipe import CardTable, NotNegative, Positive
+from workbench.cards.table import CardTable, NotNegative, Positive
 
 Quantity = Positive | str
 QuantityOrNone = NotNegative | str
@@ -78,17 +51,26 @@ class CardController:
 
 class _ForceSection(CardTable):
     k_i: Quantity
+    """command for each N"""
     T_i: Quantity
+    """s"""
     period_s: Positive | None = None
+    """of the force loop; without it that of the position loop"""
 
 
 class _Common(CardTable):
     kind: Kind
+    """the law"""
     period_s: Positive | None = None
+    """sampling period of the position loop, s; without it that of the logs"""
     output: Literal["command", "force"] | None = None
+    """what the law gives: the command, or a force (a motor's, or the reference of `force`)"""
     force: _ForceSection | None = None
+    """the force loop below"""
     reference_rate: Quantity | None = None
+    """largest speed of the reference, m/s or a text"""
     anti_windup_s: NotNegative | Literal["none"] | None = None
+    """time in which its sum forgets what a limit cut off; without it T_i"""
 
     def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
         """Names of the gains and their units; output: unit of what the controller gives."""
@@ -133,9 +115,13 @@ class PresentPD(_Common):
     """A PD as a card writes it."""
 
     kind: Literal["PD"]
+    """k_d (1 + T_d s/(eps s + 1)) (r - y)"""
     k_d: Quantity
+    """number in SI with the command's unit for V, or a text (`"8 A/mm"`)"""
     T_d: QuantityOrNone
+    """s, or a text"""
     eps: Quantity
+    """s, or a text"""
 
     def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
         """See `_Common.units`."""
@@ -146,12 +132,19 @@ class PresentPID(_Common):
     """A PID as a card writes it."""
 
     kind: Literal["PID"]
+    """k_R (b r - y + (r - y)/(T_i s) + T_d s/(eps s + 1) (c r - y))"""
     k_R: Quantity
+    """as `k_d`"""
     T_i: Quantity
+    """s, or a text"""
     T_d: QuantityOrNone
+    """s, or a text"""
     eps: Quantity
+    """s, or a text"""
     b: NotNegative = 1.0
+    """share of the reference in the proportional term"""
     c: NotNegative = 1.0
+    """share of the reference in the derivative"""
 
     def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
         """See `_Common.units`."""
@@ -163,11 +156,17 @@ class PresentPPI(_Common):
     """A position P above a speed PI as a card writes it."""
 
     kind: Literal["P-PI"]
+    """k_p (1 + 1/(T_i s)) (v_ref - v), v_ref = k_v (r - y) + v_ff dr/dt"""
     k_v: Quantity
+    """1/s, or a text"""
     k_p: Quantity
+    """command for each m/s, or a text (`"120 A s/m"`)"""
     T_i: Quantity
+    """s, or a text"""
     eps: QuantityOrNone = 0.0
+    """v is the difference of y behind 1/(eps s + 1)"""
     v_ff: NotNegative = 0.0
+    """share of the reference's speed that is fed forward"""
 
     def units(self, per_length: str, output: str) -> Iterator[tuple[str, str]]:
         """See `_Common.units`."""
@@ -180,9 +179,13 @@ class PresentRST(_Common):
     """An RST as a card writes it."""
 
     kind: Literal["RST"]
+    """S u = T r - R y"""
     R: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
     S: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
     T: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
 
 
 ControllerSection = Annotated[

@@ -3,36 +3,13 @@
 Values only. In a card it stands under `[recipe]`; levels and amplitudes are in m (rad) where the
 loop is closed and in V where `drive = "command"`; noise is a standard deviation in SI. A parameter
 of an effect is a number in SI or a text with its unit; one that has a default may be left out.
-
-    [recipe]
-    duration_s = 40.0
-    h_s = 1e-3
-    seed = 1
-    noise_F = 1e-2
-    noise_y = 1e-5
-    drive = "loop"                          # or "command": reference is u, open loop
-    friction = { m = 1.0, F_cp = 12.0, ... }            # the nine
-    actuator = { k1 = 19530.0, k2 = 10405.0 }           # or motor = { k_a = 35.15 }
-    reference = { kind = "steps", levels = [0.0, 0.1], dwell_s = 5.0 }
-    effects.stribeck = { F_s = 5.0, v_s = "20 mm/s" }   # effect key -> its parameters
-    mean_pressure_pa = 3e5                  # of the two chambers; default: half the supply's
-    [recipe.loop]
-    position = { kind = "PID", k_R = 1754.0, T_d = 0.018, T_i = 0.072, eps = 0.2 }
-    force = { k_i = 0.02, T_i = 0.05 }                  # none with a motor: the force is exact
-    control_limit_v = 5.0
-    compensator = { N_c = 2.0, e_T = 0.003 }            # (4); friction = { m = ..., ... }: others
-
-Where no position is given, the card's [controller] runs the machine, with its own force loop.
 """
 
-import math
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
 from identification.arrays import Array
 from identification.effects._base import Acting
@@ -41,17 +18,11 @@ from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.check import SHORTEST_LOG
-from identification.signals.excitation import (
-    Multisine,
-    Ramps,
-    RandomSteps,
-    ReferenceSpec,
-    Steps,
-    Sum,
-)
+from identification.signals.excitation import ReferenceSpec
 from workbench.cards.effect_values import written_effect
+from workbench.cards.references import ReferenceSection, multisines
+from workbench.cards.table import CardTable, Divisor, NotNegative, Positive
 from workbench.cards.units import Motion
-from workbench.files import ABSURD
 
 LONGEST_RECIPE = 1e8  # samples of a recipe: a gigabyte a signal
 
@@ -145,137 +116,17 @@ class Recipe:
         return self.h * np.arange(round(self.duration / self.h) + 1, dtype=np.float64)
 
 
-class CardTable(BaseModel):
-    """A table of a card: unknown keys are refused with the nearest right one."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _known_keys(cls, values: object) -> object:
-        if isinstance(values, Mapping):
-            for key in values:
-                if key not in cls.model_fields:
-                    raise PydanticCustomError("unknown_key", "{key}", {"key": str(key)})
-                _refuse_absurd(str(key), values[key])
-                if isinstance(values[key], bool) and not _takes_bool(cls, str(key)):
-                    raise ValueError(f"{key} needs a value, not true or false")
-        return values
-
-
-def _refuse_absurd(key: str, value: object) -> None:
-    """Raises ValueError where the value, or one in the list, is a number that no machine has."""
-    for one in value if isinstance(value, list) else [value]:
-        if isinstance(one, int | float) and ABSURD < abs(one) < math.inf:
-            raise ValueError(
-                f"{key!r} = {str(one)[:20]} is a number that no machine has; correct it"
-            )
-
-
-def _takes_bool(section: type[CardTable], key: str) -> bool:
-    annotation = section.model_fields[key].annotation
-    return annotation is bool or bool in getattr(annotation, "__args__", ())
-
-
-def _more_than_nothing(value: float) -> float:
-    """The value; raises ValueError where it is so small that what is divided by it overflows."""
-    if 0.0 < value < 1.0 / ABSURD:
-        raise ValueError(f"is nothing, {1.0 / ABSURD:.0e} or more needed")
-    return value
-
-
-Divisor = Annotated[float, AfterValidator(_more_than_nothing)]
-Positive = Annotated[Divisor, Field(gt=0)]
-NotNegative = Annotated[float, Field(ge=0)]
-
-
-class StepsSection(CardTable):
-    """`Steps` as a card writes it."""
-
-    kind: Literal["steps"]
-    levels: tuple[float, ...] = Field(min_length=1)
-    dwell_s: Positive
-
-    def value(self) -> Steps:
-        """The specification."""
-        return Steps(self.levels, self.dwell_s)
-
-
-class RandomStepsSection(CardTable):
-    """`RandomSteps` as a card writes it."""
-
-    kind: Literal["random_steps"]
-    amplitude: Positive
-    dwell_s: Positive
-
-    def value(self) -> RandomSteps:
-        """The specification."""
-        return RandomSteps(self.amplitude, self.dwell_s)
-
-
-class RampsSection(CardTable):
-    """`Ramps` as a card writes it."""
-
-    kind: Literal["ramps"]
-    amplitude: Positive
-    rate: Positive
-
-    def value(self) -> Ramps:
-        """The specification."""
-        return Ramps(self.amplitude, self.rate)
-
-
-class MultisineSection(CardTable):
-    """`Multisine` as a card writes it."""
-
-    kind: Literal["multisine"]
-    amplitude: Positive
-    low_hz: Positive
-    high_hz: Positive
-    lines: int = Field(default=20, ge=1)
-
-    @model_validator(mode="after")
-    def _ordered(self) -> "MultisineSection":
-        if self.high_hz <= self.low_hz:
-            raise ValueError("high_hz must be above low_hz")
-        return self
-
-    def value(self) -> Multisine:
-        """The specification."""
-        return Multisine(self.amplitude, self.low_hz, self.high_hz, self.lines)
-
-
-class SumSection(CardTable):
-    """`Sum` as a card writes it."""
-
-    kind: Literal["sum"]
-    parts: "tuple[ReferenceSection, ...]" = Field(min_length=1)
-
-    def value(self) -> Sum:
-        """The specification."""
-        return Sum(tuple(part.value() for part in self.parts))
-
-
-ReferenceSection = Annotated[
-    StepsSection | RandomStepsSection | RampsSection | MultisineSection | SumSection,
-    Field(discriminator="kind"),
-]
-
-
-def _multisines(reference: ReferenceSection) -> list[MultisineSection]:
-    """The multisines among a reference and its parts."""
-    if isinstance(reference, SumSection):
-        return [found for part in reference.parts for found in _multisines(part)]
-    return [reference] if isinstance(reference, MultisineSection) else []
-
-
 class PDSection(CardTable):
     """`RecipePD` as a card writes it."""
 
     kind: Literal["PD"]
+    """k_d (1 + T_d s/(eps s + 1))"""
     k_d: Positive
+    """N/m"""
     T_d: NotNegative
+    """s"""
     eps: Positive
+    """s"""
 
     def value(self) -> RecipePD:
         """The controller."""
@@ -286,10 +137,15 @@ class PIDSection(CardTable):
     """`RecipePID` as a card writes it."""
 
     kind: Literal["PID"]
+    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1))"""
     k_R: Positive
+    """N/m"""
     T_d: NotNegative
+    """s"""
     T_i: Positive
+    """s"""
     eps: Positive
+    """s"""
 
     def value(self) -> RecipePID:
         """The controller."""
@@ -300,9 +156,13 @@ class RSTSection(CardTable):
     """`RecipeRST` as a card writes it."""
 
     kind: Literal["RST"]
+    """S F_ref = T r - R y, in z^-1"""
     R: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
     S: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
     T: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
 
     def value(self) -> RecipeRST:
         """The controller."""
@@ -313,29 +173,43 @@ class ForceSection(CardTable):
     """`RecipeForcePI` as a card writes it."""
 
     k_i: Positive
+    """V/N"""
     T_i: Positive
+    """s"""
 
 
 class FrictionSection(CardTable):
     """The nine parameters; signs are checked by `Karnopp`."""
 
     m: Divisor
+    """moving mass, kg"""
     F_cp: float
+    """Coulomb level of motion towards +y, N"""
     F_cn: float
+    """Coulomb level of motion towards -y, N"""
     F_vp: float
+    """viscous friction towards +y, N s/m"""
     F_vn: float
+    """viscous friction towards -y, N s/m"""
     dv_p: float
+    """upper end of the band in which the body may stick, m/s"""
     dv_n: float
+    """its lower end, m/s, negative"""
     F_sp: float
+    """stick limit towards +y, N"""
     F_sn: float
+    """stick limit towards -y, N, negative"""
 
 
 class CompensatorSection(CardTable):
     """`RecipeCompensator` as a card writes it."""
 
     N_c: Annotated[float, Field(gt=1)] = 2.0
+    """by which the band is divided for its term near standstill"""
     e_T: Positive
+    """position error at which that term is at the stick limit, m (rad)"""
     friction: FrictionSection | None = None
+    """the nine that it knows; without it those of the plant"""
 
     def value(self) -> RecipeCompensator:
         """The compensator."""
@@ -349,9 +223,13 @@ class LoopSection(CardTable):
     position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")] | None = (
         None
     )
+    """the position controller; without one the card's [controller] runs the machine"""
     force: ForceSection | None = None
+    """the force loop below it; none with a motor"""
     control_limit_v: Positive | None = None
+    """of the size of the command"""
     compensator: CompensatorSection | None = None
+    """of friction, eq. (4)"""
 
     def value(self) -> LoopSpec:
         """The loop."""
@@ -365,32 +243,49 @@ class ActuatorSection(CardTable):
     """The linear electro-pneumatic actuator."""
 
     k1: Positive
+    """dF/dt = k1 u - k2 v: N/(V s)"""
     k2: NotNegative
+    """N/m"""
 
 
 class MotorSection(CardTable):
     """The motor without dynamics."""
 
     k_a: float
+    """F = k_a u: N for each unit of the command"""
 
 
 class RecipeSection(CardTable):
     """`[recipe]` of a card."""
 
     duration_s: Positive
+    """length of the log, s"""
     h_s: Positive
+    """sampling period, s"""
     friction: FrictionSection
+    """the nine"""
     reference: ReferenceSection
+    """of the position, or the command itself where the loop is open"""
     actuator: ActuatorSection | None = None
+    """this or `motor`"""
     motor: MotorSection | None = None
+    """this or `actuator`"""
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
+    """by key of an effect its parameters, numbers in SI or texts with a unit"""
     loop: LoopSection | None = None
+    """the closed loop"""
     drive: Literal["loop", "command"] = "loop"
+    """whether the loop is closed, or the reference is the command"""
     noise_F: NotNegative = 0.0
+    """standard deviation of the force's noise, N"""
     noise_y: NotNegative = 0.0
+    """of the position's, m"""
     noise_p: NotNegative = 0.0
+    """of each pressure's, Pa"""
     mean_pressure_pa: Positive | None = None
+    """of both chambers, Pa; without it half the supply pressure"""
     seed: int = Field(default=0, ge=0)
+    """of noise and random references"""
 
     @model_validator(mode="after")
     def _consistent(self) -> "RecipeSection":
@@ -409,7 +304,7 @@ class RecipeSection(CardTable):
                 f"duration_s = {self.duration_s:g} at h_s = {self.h_s:g} makes {samples:.4g}"
                 f" samples, {SHORTEST_LOG} to {LONGEST_RECIPE:.0e} needed"
             )
-        for part in _multisines(self.reference):
+        for part in multisines(self.reference):
             if part.high_hz >= 0.5 / self.h_s:
                 raise ValueError(
                     f"reference.high_hz = {part.high_hz:g} is not below half the sampling rate"
