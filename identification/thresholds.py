@@ -42,6 +42,7 @@ ALONE = 0.15  # of any rival's, left by one that is taken too where that is near
 UNCONTESTED = 0.1  # left by effects that need no contest
 NEEDLESS = 1.02  # times the misfit, without an effect that is not needed
 DOES_NOTHING = 1.002  # the same, of the plant as it is
+IDLE = 1.0001  # the same, of a single effect that the equations call for, whose size is none
 
 # What is left, and whether it carries over (blind.py: removed; outside.py --strange; chapters.py).
 SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt

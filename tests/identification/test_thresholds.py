@@ -66,6 +66,7 @@ from identification.tracing.free_run.backward_elimination import (
     earned,
     enough,
     equations_explained,
+    is_idle,
     is_needless,
     known,
 )
@@ -366,6 +367,12 @@ def test_does_nothing() -> None:
     """An effect goes without which the plant as it is follows as well, to a trifle."""
     assert does_nothing(5.005, 5.0)
     assert not does_nothing(5.02, 5.0)
+
+
+def test_idle() -> None:
+    """A single effect of the equations goes where the run is the same without it."""
+    assert is_idle(1.00006, 1.0)
+    assert not is_idle(1.00016, 1.0)
 
 
 def test_share_left() -> None:

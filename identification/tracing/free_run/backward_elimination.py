@@ -34,6 +34,7 @@ from identification.thresholds import (
     DOES_NOTHING,
     EARNS,
     FOLLOWED,
+    IDLE,
     MUCH,
     NEARLY_FOLLOWED,
     NEEDLESS,
@@ -282,14 +283,17 @@ def pruned(
     """Without the effects that a run which is followed does as well without."""
     for step in choice.steps:
         free = loose(model.plant, setting.drive)
-        if (len(choice.steps) < 2 and not free) or model.misfit > NEARLY_FOLLOWED:
+        if model.misfit > NEARLY_FOLLOWED:
             break
-        if _slow(step) and choice.steps == setting.doubted:
-            continue
         stay = tuple(one for one in choice.steps if one is not step)
         less = only(choice, stay)
         bare = keeping(model.plant, stay)
-        if free and does_nothing(misfit(bare, setting.logs, setting.drive), model.misfit):
+        as_it_is = misfit(bare, setting.logs, setting.drive)
+        if len(choice.steps) < 2 and not free:
+            return (less, setting.plain) if is_idle(as_it_is, model.misfit) else (choice, model)
+        if _slow(step) and choice.steps == setting.doubted:
+            continue
+        if free and does_nothing(as_it_is, model.misfit):
             found = refit(bare, setting.logs, setting.drive, prior=even(bare), effort="near")
         elif (
             free
@@ -323,6 +327,12 @@ def is_needless(without: float, before: float) -> bool:
 def does_nothing(without: float, before: float) -> bool:
     """Whether a plant leaves the same misfit as before, an effect just taken out of it."""
     return without <= DOES_NOTHING * before
+
+
+def is_idle(without: float, before: float) -> bool:
+    """Whether a plant leaves the same misfit to the last digits that noise tells: what was taken
+    out of it had no size."""
+    return without <= IDLE * before
 
 
 def keeping(plant: Plant, stay: Sequence[Step]) -> Plant:

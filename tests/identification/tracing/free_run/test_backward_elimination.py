@@ -186,6 +186,21 @@ def test_what_does_nothing_goes_though_sliding_calls_for_it(
     assert [one.effects for one in near] == [()]
 
 
+@pytest.mark.parametrize(("bare", "count"), [(1.00005, 0), (1.001, 1)])
+def test_a_single_effect_of_no_size_goes_where_a_command_holds_the_run(
+    found: tuple[Setting, Choice], monkeypatch: pytest.MonkeyPatch, bare: float, count: int
+) -> None:
+    setting, choice = found
+    kept = without_slow(choice)
+    model = replace(setting.plain, plant=plant(SPRING), misfit=1.0)
+    place = "identification.tracing.free_run.backward_elimination"
+    monkeypatch.setattr(f"{place}.loose", lambda *_: False)
+    monkeypatch.setattr(f"{place}.misfit", lambda *_: bare)
+    less, left = pruned(kept, model, setting)
+    assert len(less.steps) == count
+    assert left is (model if count else setting.plain)
+
+
 def test_the_fewest_effects_with_which_the_run_is_followed(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     beside = next(one for one in choice.tried if one.effect.key == "stribeck")
