@@ -1,0 +1,211 @@
+"""The search for the reference that tells most: segments, their shares of the time, then exchange.
+
+1. Each segment of the library is run alone, on the machine as the model has it and as it may be;
+   one that comes near a limit on any of them is left out.
+2. How the time is best shared among them is a convex program (`allocation`).
+3. The shares are rounded to a run, and the run changed piece by piece, each time simulated as a
+   whole, as long as it tells more and somebody waits.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.experiment.allocation import MOST_REPEATS, Allocation
+from design.experiment.limits import MotionLimits, Peaks
+from design.experiment.segments import DWELL, Segment, allowed, library, reference
+from identification.arrays import Array
+from identification.errors import NotIdentifiable
+from identification.progress import KeepGoing, Progress
+
+NEAR = 0.97  # share of a limit that a run of the search may use
+LIVELY = 48  # segments that go into the convex program, at most
+STALE = 60  # changes in a row that do not help, after which the run is done
+AT_ONCE = 2  # runs
+FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What a reference does and tells: extremes over all plants, and a value the larger the better
+    it tells; told: whatever the criterion adds up over segments."""
+
+    peaks: Peaks
+    value: float
+    told: object = None
+
+
+Look = Callable[[Array], Seen | None]  # at r [m], (n,); None where the run cannot be followed
+
+
+@dataclass(frozen=True, eq=False)
+class Criterion:
+    """What a run is to tell. alone: looks at one segment's reference; whole: at a whole run's;
+    shared: the best shares of the time of segments that were seen; joined: the value of so many
+    repeats of each, as their sum."""
+
+    alone: Look
+    whole: Look
+    shared: Callable[[Sequence[Seen], Array, float], Allocation]
+    joined: Callable[[Sequence[Seen], Array], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A reference r [m], (n,), its segments, what it does and tells; bound: what the best shares
+    reach, joined: what the rounded ones do, both as sums over segments; tried: segments, runs."""
+
+    segments: tuple[Segment, ...]
+    r: Array
+    seen: Seen
+    bound: float
+    joined: float
+    tried: tuple[int, int]
+
+
+def best_run(
+    criterion: Criterion, limits: MotionLimits, h: float, rng: np.random.Generator,
+    report: Progress, keep_going: KeepGoing,
+) -> Plan:  # fmt: skip
+    """The run to make next; h [s]: period of the reference.
+
+    keep_going: asked between runs; once it says no, the best so far is given. Raises
+    NotIdentifiable where no segment stays within the limits, or none tells anything.
+    """
+    report("segments", 0.0)
+    parts, seen = _looked_at(criterion.alone, limits, h, report, keep_going)
+    report("sharing the time", 0.0)
+    seconds = np.array([one.seconds(h) for one in parts])
+    room = limits.seconds - DWELL
+    shares = criterion.shared(seen, seconds, room)
+    times = _rounded(criterion, seen, seconds, room, shares)
+    joined = criterion.joined(seen, times)
+    order = _in_turn(times)
+    chosen = tuple(parts[i] for i in order)
+    report("whole runs", 0.0)
+    plan, count = _exchanged(criterion, chosen, parts, limits, h, rng, report, keep_going)
+    segments, one = plan
+    r = reference(segments, limits, h)
+    bound = criterion.joined(seen, shares.times)
+    return Plan(segments, r, one, bound, joined, (len(parts), count))
+
+
+def _looked_at(
+    look: Look, limits: MotionLimits, h: float, report: Progress, keep_going: KeepGoing
+) -> tuple[list[Segment], list[Seen]]:
+    """The segments that stay within the limits on every plant, and what they tell."""
+    every = [one for one in library(limits) if allowed(one, limits, h)]
+
+    def seen_of(one: Segment) -> Seen | None:
+        if not keep_going():
+            return None
+        r = np.concatenate([np.zeros(round(DWELL / h)), one.signal(h)])
+        return look(limits.home + r)
+
+    parts, seen = [], []
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        for i, (one, found) in enumerate(zip(every, pool.map(seen_of, every), strict=True)):
+            report("segments", (i + 1) / len(every))
+            if found is not None and found.peaks.share_of(limits) <= NEAR:
+                parts.append(one)
+                seen.append(found)
+    if not parts:
+        raise NotIdentifiable(
+            f"none of {len(every)} pieces of motion stays within stroke {limits.stroke[0]:.3g} to"
+            f" {limits.stroke[1]:.3g}, speed {limits.speed:.3g}, force {limits.force:.3g} and command"
+            f" {limits.command:.3g} on this model; widen the limits, or give a longer time"
+        )
+    return parts, seen
+
+
+def _rounded(
+    criterion: Criterion, seen: Sequence[Seen], seconds: Array, room: float, shares: Allocation
+) -> Array:
+    """Whole numbers of repeats (k,) near the best shares, that fit into the time."""
+    times = np.floor(shares.times + 1e-6)
+    near = np.flatnonzero(shares.times > 1e-3)
+    near = near if len(near) else np.arange(len(seen))
+    while True:
+        left = room - float(times @ seconds)
+        fits = [i for i in near if seconds[i] <= left and times[i] < MOST_REPEATS]
+        if not fits:
+            return times
+        now = criterion.joined(seen, times)
+        gains = [criterion.joined(seen, times + np.eye(len(seen))[i]) - now for i in fits]
+        worth = np.array(gains) / seconds[fits]
+        times[fits[int(np.argmax(worth))]] += 1.0
+
+
+def _in_turn(times: Array) -> list[int]:
+    """Numbers of segments, each as often as it is repeated, its repeats apart."""
+    out: list[int] = []
+    left = times.copy()
+    while np.any(left >= 1.0):
+        for i in np.flatnonzero(left >= 1.0):
+            out.append(int(i))
+            left[i] -= 1.0
+    return out
+
+
+def _exchanged(
+    criterion: Criterion, chosen: tuple[Segment, ...], parts: Sequence[Segment],
+    limits: MotionLimits, h: float, rng: np.random.Generator, report: Progress,
+    keep_going: KeepGoing,
+) -> tuple[tuple[tuple[Segment, ...], Seen], int]:  # fmt: skip
+    """The best run that changes of one piece at a time lead to, and how many were tried."""
+
+    def looked(segments: tuple[Segment, ...]) -> Seen | None:
+        found = criterion.whole(reference(segments, limits, h))
+        return found if found is not None and found.peaks.share_of(limits) <= NEAR else None
+
+    best = (chosen, looked(chosen))
+    count, stale = 1, 0
+    while best[1] is None and chosen:  # a run as a whole may go further than its pieces
+        chosen = tuple(one.changed(0.9, 1.0) for one in chosen)
+        best = (chosen, looked(chosen))
+        count += 1
+        if count > STALE:
+            raise NotIdentifiable("no run within the limits was found; widen them")
+    with ThreadPoolExecutor(AT_ONCE) as pool:
+        while stale < STALE and keep_going():
+            trials = [_changed(best[0], parts, limits, h, rng) for _ in range(AT_ONCE)]
+            for segments, found in zip(trials, pool.map(looked, trials), strict=True):
+                count += 1
+                better = found is not None and best[1] is not None
+                if better and found is not None and found.value > (best[1] or found).value:
+                    best, stale = (segments, found), 0
+                else:
+                    stale += 1
+            report("whole runs", stale / STALE)
+    assert best[1] is not None
+    return (best[0], best[1]), count
+
+
+def _changed(
+    segments: tuple[Segment, ...], parts: Sequence[Segment], limits: MotionLimits, h: float,
+    rng: np.random.Generator,
+) -> tuple[Segment, ...]:  # fmt: skip
+    """A run in which one piece is another, larger, smaller, faster, slower, or elsewhere."""
+    out = list(segments)
+    i = int(rng.integers(len(out)))
+    way = rng.random()
+    if way < 0.35:
+        out[i] = parts[int(rng.integers(len(parts)))]
+    elif way < 0.85:
+        factors = [1.0, 1.0]
+        factors[int(rng.integers(2))] = float(rng.choice(FACTORS))
+        out[i] = out[i].changed(*factors)
+    else:
+        k = int(rng.integers(len(out)))
+        out[i], out[k] = out[k], out[i]
+    if not all(allowed(one, limits, h) for one in out):
+        return segments
+    while sum(one.seconds(h) for one in out) > limits.seconds - DWELL and len(out) > 1:
+        del out[int(rng.integers(len(out)))]
+    left = limits.seconds - DWELL - sum(one.seconds(h) for one in out)
+    fits = [one for one in parts if one.seconds(h) <= left]
+    if fits:
+        out.append(fits[int(rng.integers(len(fits)))])
+    return tuple(out)
