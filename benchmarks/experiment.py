@@ -2,9 +2,9 @@
 
     python benchmarks/experiment.py [--first 500] [--machines 50] [--seconds 15] [--budget 25]
 
-Every seed draws a machine (of `blind_machines`: electro-pneumatic, motor, measured force) and gives
-it a poor log: 6 s of a few moves, under ten times the usual noise. Its model goes to the search with
-stroke, speed and force limits of its own. The true machine then runs the reference, with noise, and
+Every seed draws a machine (of `blind_machines`: electro-pneumatic, motor, measured force) and
+gives it a poor log: 6 s of a few moves, under ten times the usual noise. Its model goes to the
+search with stroke, speed and force limits of its own. The true machine then runs the reference, with noise, and
 `fit_plant` identifies the log from nothing; so it does with two rivals of the same length within
 the same limits, each as large as they allow: 0.1 to 3 Hz multisine, and the paper's steps.
 
@@ -20,14 +20,15 @@ Seeds below 500 served to choose the method; those from 500 on judge it.
 import argparse
 import time
 from dataclasses import dataclass, replace
+from typing import Literal
 
 import numpy as np
 
 from benchmarks.blind_machines import (
-    H,
     NOISE_F,
     NOISE_Y,
     SUPPLY,
+    H,
     Machine,
     move,
     random_machine,
@@ -114,7 +115,7 @@ def model_of(one: Machine, log: Log, seed: int) -> Model:
     law = one.controller(H)
     polynomials = {"R": tuple(law.R), "S": tuple(law.S), "T": tuple(law.T)}
     force = None if one.force is None else CardForceLoop(one.force.k_i, one.force.T_i, None)
-    output = "command" if one.kind == "motor" else "force"
+    output: Literal["command", "force"] = "command" if one.kind == "motor" else "force"
     card = CardController("RST", {}, polynomials, H, output, force, None, None)
     own = present_file(present(card, rig, H), one.limit, DriveUnits("linear", rig.command_unit))
     fit = replace(model.fit, noise_y=NOISE_Y, noise_F=0.0 if one.kind == "motor" else NOISE_F)
@@ -129,7 +130,7 @@ def limits_of(one: Machine, seconds: float) -> Wanted:
 
 
 def largest(one: Machine, shape: Array, limits: MotionLimits) -> Array | None:
-    """A reference of this shape (n,) in -1 to 1, as large as the limits allow on the true machine."""
+    """A reference of this shape (n,) in -1 to 1, as large as the limits allow on the machine."""
     best = None
     for share in np.geomspace(0.03, 1.0, SIZES):
         r = limits.home + share * limits.reach * shape
@@ -143,7 +144,7 @@ def largest(one: Machine, shape: Array, limits: MotionLimits) -> Array | None:
 
 def rivals(one: Machine, limits: MotionLimits) -> tuple[Array | None, Array | None]:
     """Multisine and the paper's steps, of the same length and within the same limits."""
-    t = H * np.arange(round(limits.seconds / H))
+    t = H * np.arange(round(limits.seconds / H), dtype=np.float64)
     rng = np.random.default_rng(0)
     sines = reference_signal(Multisine(1.0, SLOWEST, QUICKEST), t, rng)
     steps = 2.0 * reference_signal(Steps((0.0, 1.0), DWELL), t, rng) - 1.0
@@ -242,7 +243,8 @@ def main() -> None:
         f" {np.mean([x.covered for x in found]):.0%}; median ratio of the least certain to the"
         f" multisine's {np.median([x.ratios[0] for x in found]):.2f}, to the steps'"
         f" {np.median([x.ratios[1] for x in found]):.2f}; limits exceeded on"
-        f" {sum(bool(x.exceeded) for x in found)}; longest search {max(x.seconds for x in found):.0f} s"
+        f" {sum(bool(x.exceeded) for x in found)}; longest search"
+        f" {max(x.seconds for x in found):.0f} s"
     )
 
 

@@ -1,13 +1,13 @@
 """How a run's time is best shared among segments, whose information adds up: two convex programs.
 
 Continuous D- and T-optimal designs (Fedorov, Theory of Optimal Experiments, 1972; Atkinson,
-Fedorov, Biometrika 62 (1975) 57), solved by CasADi with IPOPT. What they reach bounds what any whole
-number of these segments does.
+Fedorov, Biometrika 62 (1975) 57), solved by CasADi with IPOPT. What they reach bounds what any
+whole number of these segments does.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -33,28 +33,14 @@ class Allocation:
     value: float
 
 
-@dataclass(frozen=True, eq=False)
-class Divergence:
-    """What tells one plant from a rival, in units of the noise, segment by segment.
+class PairLike(Protocol):
+    """Places of an effect in the information, and of all that its rival can change instead."""
 
-    square (k,): of the difference of their runs; b (k, d), M (k, d, d): its products with the
-    rival's sensitivities, and theirs, which take away what other parameters of the rival mend.
-    """
+    @property
+    def one(self) -> int: ...
 
-    square: Array
-    b: Array
-    M: Array
-
-    def left(self, times: Array) -> float:
-        """What no parameters of the rival mend, with each segment repeated so often."""
-        M = np.tensordot(times, self.M, 1)
-        b = times @ self.b
-        size = np.sqrt(np.maximum(np.diag(M), 0.0))
-        scale = np.where(size > 0.0, size, 1.0)
-        solved = np.linalg.lstsq(
-            M / np.outer(scale, scale) + RIDGE * np.eye(len(b)), b / scale, rcond=None
-        )[0]
-        return max(float(times @ self.square - (b / scale) @ solved), 0.0)
+    @property
+    def others(self) -> tuple[int, ...]: ...
 
 
 def d_optimal(
@@ -68,31 +54,36 @@ def d_optimal(
     import casadi as ca
 
     w = ca.SX.sym("w", len(seconds))
-    value = 0.0
+    value: Any = 0.0
     for M in matrices:
         value += _log_det(ca, w, M, asked) / len(matrices)
-    return _solved(ca, w, value, None, seconds, total)
+    return _solved(ca, w, value, seconds, total)
 
 
-def t_optimal(pairs: Sequence[Divergence], seconds: Array, total: float) -> Allocation:
-    """The times with which the pair of plants that is hardest to tell apart differs most."""
+def t_optimal(
+    matrices: Array, pairs: Sequence[PairLike], seconds: Array, total: float
+) -> Allocation:
+    """The times that make the mean log of what tells the pairs apart largest.
+
+    matrices (k, d, d): information of k segments, of parameters and effects; seconds (k,), total:
+    of time [s]. What tells a pair apart is the square of what one effect changes, in units of the
+    noise, and the other places do not make up for.
+    """
     import casadi as ca
 
-    w, least = ca.SX.sym("w", len(seconds)), ca.SX.sym("least")
-    bounds = []
+    w = ca.SX.sym("w", len(seconds))
+    k, d, _ = matrices.shape
+    size = np.sqrt(np.maximum(np.mean(np.einsum("kii->ki", matrices), axis=0), 1e-300))
+    scaled = matrices / np.outer(size, size)
+    M = ca.reshape(ca.mtimes(ca.DM(scaled.reshape(k, d * d).T), w), d, d)
+    value: Any = 0.0
     for pair in pairs:
-        k, d = pair.b.shape
-        size = np.sqrt(np.maximum(np.einsum("kii->i", pair.M), 0.0))
-        scale = np.where(size > 0.0, size, 1.0)
-        M = ca.reshape(
-            ca.mtimes(ca.DM((pair.M / np.outer(scale, scale)).reshape(k, d * d).T), w), d, d
-        )
-        b = ca.mtimes(ca.DM((pair.b / scale).T), w)
-        R = ca.chol(M + RIDGE * ca.SX.eye(d))
-        half = ca.solve(R.T, b)
-        left = ca.dot(ca.DM(pair.square), w) - ca.dot(half, half)
-        bounds.append(ca.log(ca.fmax(left, 0.0) + 1.0) - least)
-    return _solved(ca, w, least, bounds, seconds, total)
+        at = list(pair.others)
+        R = ca.chol(M[at, at] + RIDGE * ca.SX.eye(len(at)))
+        half = ca.solve(R.T, M[at, pair.one])
+        left = ca.fmax(M[pair.one, pair.one] - ca.dot(half, half), 0.0)
+        value += ca.log(left * float(size[pair.one]) ** 2 + 1.0) / len(pairs)
+    return _solved(ca, w, value, seconds, total)
 
 
 def _log_det(ca: Any, w: Any, M: Array, asked: IntArray) -> Any:
@@ -108,22 +99,12 @@ def _log_det(ca: Any, w: Any, M: Array, asked: IntArray) -> Any:
     return 2.0 * ca.sum1(ca.log(ca.diag(R)[d - len(asked) :]))
 
 
-def _solved(
-    ca: Any, w: Any, value: Any, above: list[Any] | None, seconds: Array, total: float
-) -> Allocation:
-    """The largest value under the time; above: expressions that are not negative, and `value` is
-    then an unknown of its own."""
+def _solved(ca: Any, w: Any, value: Any, seconds: Array, total: float) -> Allocation:
+    """The times with the largest value within the total time."""
     k = len(seconds)
-    begin = np.full(k, total / float(np.sum(seconds)))
-    begin = np.minimum(begin, MOST_REPEATS)
-    used = ca.dot(ca.DM(seconds), w)
-    x, x0, low, high = w, begin, np.zeros(k), np.full(k, MOST_REPEATS)
-    g, g_low, g_high = used, [0.0], [total]
-    if above is not None:
-        x, g = ca.vertcat(w, value), ca.vertcat(used, *above)
-        x0, low, high = np.append(begin, 0.0), np.append(low, -1.0), np.append(high, 1e3)
-        g_low, g_high = [0.0] + [0.0] * len(above), [total] + [np.inf] * len(above)
-    solver = ca.nlpsol("allocation", "ipopt", {"x": x, "f": -value, "g": g}, IPOPT)
-    found = solver(x0=x0, lbx=low, ubx=high, lbg=g_low, ubg=g_high)
-    times = np.clip(np.array(found["x"]).ravel()[:k], 0.0, MOST_REPEATS)
+    begin = np.minimum(np.full(k, total / float(np.sum(seconds))), MOST_REPEATS)
+    program = {"x": w, "f": -value, "g": ca.dot(ca.DM(seconds), w)}
+    solver = ca.nlpsol("allocation", "ipopt", program, IPOPT)
+    found = solver(x0=begin, lbx=0.0, ubx=MOST_REPEATS, lbg=0.0, ubg=total)
+    times = np.clip(np.array(found["x"]).ravel(), 0.0, MOST_REPEATS)
     return Allocation(times, -float(found["f"]))

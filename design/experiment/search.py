@@ -7,6 +7,7 @@
    whole, as long as it tells more and somebody waits.
 """
 
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -21,7 +22,8 @@ from identification.errors import NotIdentifiable
 from identification.progress import KeepGoing, Progress
 
 NEAR = 0.97  # share of a limit that a run of the search may use
-LIVELY = 48  # segments that go into the convex program, at most
+AT_LEAST = 24  # segments that are looked at, however little time there is
+ALIKE = ("steps", "multisine")  # of which a whole run may be made, repeated
 STALE = 60  # changes in a row that do not help, after which the run is done
 AT_ONCE = 2  # runs
 FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
@@ -82,8 +84,7 @@ def best_run(
     shares = criterion.shared(seen, seconds, room)
     times = _rounded(criterion, seen, seconds, room, shares)
     joined = criterion.joined(seen, times)
-    order = _in_turn(times)
-    chosen = tuple(parts[i] for i in order)
+    chosen = [tuple(parts[i] for i in _in_turn(times)), *_repeated(parts, seen, seconds, room)]
     report("whole runs", 0.0)
     plan, count = _exchanged(criterion, chosen, parts, limits, h, rng, report, keep_going)
     segments, one = plan
@@ -97,9 +98,12 @@ def _looked_at(
 ) -> tuple[list[Segment], list[Seen]]:
     """The segments that stay within the limits on every plant, and what they tell."""
     every = [one for one in library(limits) if allowed(one, limits, h)]
+    # Mixed, so that where the time is short some of each kind have been seen.
+    every = [every[i] for i in np.random.default_rng(0).permutation(len(every))]
+    begun = itertools.count()
 
     def seen_of(one: Segment) -> Seen | None:
-        if not keep_going():
+        if next(begun) >= AT_LEAST and not keep_going():
             return None
         r = np.concatenate([np.zeros(round(DWELL / h)), one.signal(h)])
         return look(limits.home + r)
@@ -113,9 +117,9 @@ def _looked_at(
                 seen.append(found)
     if not parts:
         raise NotIdentifiable(
-            f"none of {len(every)} pieces of motion stays within stroke {limits.stroke[0]:.3g} to"
-            f" {limits.stroke[1]:.3g}, speed {limits.speed:.3g}, force {limits.force:.3g} and command"
-            f" {limits.command:.3g} on this model; widen the limits, or give a longer time"
+            f"none of {len(every)} pieces of motion stays within stroke {limits.stroke[0]:.3g}"
+            f" to {limits.stroke[1]:.3g}, speed {limits.speed:.3g}, force {limits.force:.3g} and"
+            f" command {limits.command:.3g} on this model; widen the limits, or give a longer time"
         )
     return parts, seen
 
@@ -149,19 +153,34 @@ def _in_turn(times: Array) -> list[int]:
     return out
 
 
+def _repeated(
+    parts: Sequence[Segment], seen: Sequence[Seen], seconds: Array, room: float
+) -> list[tuple[Segment, ...]]:
+    """Runs of one and the same segment, of each kind that is usual the most telling one."""
+    out = []
+    for kind in ALIKE:
+        of_kind = [i for i, one in enumerate(parts) if one.kind == kind]
+        if of_kind:
+            best = max(of_kind, key=lambda i: seen[i].value)
+            out.append((parts[best],) * max(1, int(room / seconds[best])))
+    return out
+
+
 def _exchanged(
-    criterion: Criterion, chosen: tuple[Segment, ...], parts: Sequence[Segment],
+    criterion: Criterion, begun: Sequence[tuple[Segment, ...]], parts: Sequence[Segment],
     limits: MotionLimits, h: float, rng: np.random.Generator, report: Progress,
     keep_going: KeepGoing,
 ) -> tuple[tuple[tuple[Segment, ...], Seen], int]:  # fmt: skip
-    """The best run that changes of one piece at a time lead to, and how many were tried."""
+    """The best run that changes of one piece at a time lead to from the best of those begun with,
+    and how many were tried."""
 
     def looked(segments: tuple[Segment, ...]) -> Seen | None:
         found = criterion.whole(reference(segments, limits, h))
         return found if found is not None and found.peaks.share_of(limits) <= NEAR else None
 
-    best = (chosen, looked(chosen))
-    count, stale = 1, 0
+    looks = [(one, looked(one)) for one in begun if one]
+    best = max(looks, key=lambda one: -np.inf if one[1] is None else one[1].value)
+    count, stale, chosen = len(looks), 0, best[0]
     while best[1] is None and chosen:  # a run as a whole may go further than its pieces
         chosen = tuple(one.changed(0.9, 1.0) for one in chosen)
         best = (chosen, looked(chosen))

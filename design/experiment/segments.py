@@ -13,8 +13,9 @@ import numpy as np
 
 from design.experiment.limits import MotionLimits
 from identification.arrays import Array
+from identification.signals.excitation import Multisine, reference_signal
 
-Kind = Literal["steps", "strokes", "creep", "sine", "sweep", "stairs"]
+Kind = Literal["steps", "strokes", "creep", "sine", "sweep", "stairs", "multisine"]
 DWELL = 0.4  # s of rest after a segment
 HOLD = 0.5  # s, least time at a level of a step
 FADE = 0.3  # s in which a sine comes and goes
@@ -29,6 +30,7 @@ CREEPS = (0.02, 0.05, 0.12, 0.3)
 AMPLITUDES = (0.1, 0.2, 0.4, 0.85)
 FREQUENCIES = (0.3, 0.6, 1.2, 2.4, 4.0)
 CYCLES = 3
+SINES, SINES_SECONDS, LOWEST = 12, 5.0, 0.2  # of a multisine: lines, length [s], first [Hz]
 
 
 @dataclass(frozen=True)
@@ -102,6 +104,13 @@ def _stairs(amplitude: float, rate: float, h: float) -> Array:
     return np.repeat(amplitude * levels, max(1, round(1.0 / rate / h)))
 
 
+def _multisine(amplitude: float, rate: float, h: float) -> Array:
+    """Sines up to the frequency `rate` [Hz], the largest deviation being the amplitude."""
+    t = np.arange(0.0, SINES_SECONDS, h)
+    x = reference_signal(Multisine(1.0, LOWEST, rate, SINES), t, np.random.default_rng(0))
+    return _faded(amplitude * x / float(np.max(np.abs(x))), h)
+
+
 _SHAPES = {
     "steps": _steps,
     "strokes": _strokes,
@@ -109,6 +118,7 @@ _SHAPES = {
     "sine": _sine,
     "sweep": _sweep,
     "stairs": _stairs,
+    "multisine": _multisine,
 }
 
 
@@ -132,16 +142,18 @@ def library(limits: MotionLimits) -> Iterator[Segment]:
             size = min(share * reach, 0.9 * fastest / (2.0 * np.pi * f))
             yield Segment("sine", float(size), f)
             yield Segment("sweep", float(size), f)
+        for f in FREQUENCIES[2:]:
+            yield Segment("multisine", share * reach, f)
 
 
 def allowed(one: Segment, limits: MotionLimits, h: float) -> bool:
-    """Whether a segment's reference is within the limits, and not too long or too fast to be one."""
+    """Whether a segment's reference is within the limits, neither too long nor too fast."""
     if abs(one.amplitude) > limits.reach or one.rate <= 0.0:
         return False
     if one.kind in ("strokes", "creep"):
         if one.rate > limits.speed or 10.0 * abs(one.amplitude) / one.rate > 1e6 * h:
             return False
-    elif one.kind in ("sine", "sweep") and one.rate * SWEEP > 0.1 / h:
+    elif one.kind in ("sine", "sweep", "multisine") and one.rate * SWEEP > 0.1 / h:
         return False
     return one.seconds(h) <= min(LONGEST, limits.seconds)
 

@@ -6,7 +6,7 @@ unbiased estimator beats (Cramer, Rao). Stops and breakaways are in it as the ex
 stick limit shows in nothing but when the body leaves.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,12 +86,12 @@ def information(plant: Plant, errors_of: Errors, drive: Drive) -> Information:
 
     A shape of an effect that is at its default is not asked for, as in a fit.
     """
-    names, x, unit = _unknowns(plant, drive)
+    names, x, unit = unknowns(plant, drive)
     J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
     return Information(names, unit, J.T @ J, loose)
 
 
-def _unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:
+def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:
     """Names (d,) of what a fit would look for, their values in units of their sizes, and these."""
     held = even(plant)
     names = tuple(name for name in names_of(plant, drive) if name not in held)
@@ -101,8 +101,8 @@ def _unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array
 
 
 def lasting_jacobian(fun: Callable[[Array], Array], x: Array) -> tuple[Array, float]:
-    """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, 0 elsewhere;
-    and the share of `fun`'s values that hang on luck.
+    """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, else 0, and
+    the share of `fun`'s values that hang on luck.
 
     Where a stop turns on next to nothing, a run depends on a parameter beyond all measure, but only
     within next to nothing: no fit finds the parameter by that, and many find a wrong one.
@@ -118,21 +118,27 @@ def lasting_jacobian(fun: Callable[[Array], Array], x: Array) -> tuple[Array, fl
 
 
 def of_logs(plant: Plant, recorded: RecordedLogs) -> Information:
-    """What recorded logs tell of the plant, in the windows in which a fit would follow them.
+    """What recorded logs tell of the plant, as a fit of them would see it.
 
-    Whole runs where the command alone drives them; less what the windows' states are unsure of and
-    what the noise of a driving force makes of a run.
+    Less what the windows' states are unsure of and what the noise of a driving force makes of a
+    run.
     """
+    errors_of = log_errors(plant, recorded)
+    names, x, unit = unknowns(plant, recorded.drive)
+    J = smooth_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
+    J = np.where(np.isfinite(J), J, 0.0)
+    return Information(names, unit, J.T @ J)
+
+
+def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:
+    """Errors of plants like this one along recorded logs, in the windows in which a fit would
+    follow them: whole runs where the command alone drives them."""
     steady = recorded.drive == "command" and not any(
         walks(one, recorded.drive) for one in recorded.logs
     )
     longest = MOTOR_WINDOW if isinstance(plant.actuator, Motor) else WHOLE
     seconds = longest if steady else RUN_WINDOW
-    errors_of = judge(plant, recorded.logs, recorded.drive, seconds)
-    names, x, unit = _unknowns(plant, recorded.drive)
-    J = smooth_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
-    J = np.where(np.isfinite(J), J, 0.0)
-    return Information(names, unit, J.T @ J)
+    return judge(plant, recorded.logs, recorded.drive, seconds)
 
 
 def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Errors:

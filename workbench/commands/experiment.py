@@ -1,4 +1,4 @@
-"""`workbench experiment`: a model -> the run to make next: reference.csv, experiment.json, a page."""
+"""`workbench experiment`: a model -> the run to make next, as CSV, JSON and a page."""
 
 import time
 from datetime import datetime

@@ -37,6 +37,7 @@ KINDS = {
     "sine": "three sines",
     "sweep": "a sweep of sines",
     "stairs": "stairs up and down",
+    "multisine": "a multisine",
 }
 BAND_POINTS = 600
 
@@ -142,9 +143,9 @@ def experiment_report(found: Experiment) -> str:
                                            lines=experiment_lines(found))),
     ]  # fmt: skip
     if found.separation:
-        rows = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
-        head = ("if the machine is", "rival", "deviations of the noise")
-        sections.append(Section("What it tells apart", render("table", head=head, rows=rows,
+        apart = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
+        between = ("if the machine has", "rival", "deviations of the noise")
+        sections.append(Section("What it tells apart", render("table", head=between, rows=apart,
                                                               lines=[])))  # fmt: skip
     head = ("", "piece", "amplitude", "pace")
     sections.append(Section("Pieces", render("table", head=head, rows=pieces, lines=[])))
@@ -155,7 +156,7 @@ def _rate(found: Experiment, index: int) -> str:
     one = found.segments[index]
     if one.kind in ("strokes", "creep"):
         return f"{one.rate:.3g} {shown(found.motion == 'rotary').velocity}"
-    if one.kind in ("sine", "sweep"):
+    if one.kind in ("sine", "sweep", "multisine"):
         return f"{one.rate:.3g} Hz"
     return f"{1.0 / one.rate:.3g} s each"
 

@@ -1,12 +1,13 @@
 """A model's machine as it is thought to be, and as it may be: plants drawn by what is not sure."""
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from identification.estimation.windowed_run.parameters import plant_with
 from identification.model.plant import Plant
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import in_the_loop
 from workbench.steps.drift import model_in_force
 
@@ -39,11 +40,11 @@ def _is_of(plant: Plant, name: str) -> bool:
     return "." not in name or name.split(".")[0] in {one.key for one in plant.effects}
 
 
-def _assumed(model: Model, untold: object) -> dict[str, float]:
+def _assumed(model: Model, untold: Mapping[str, str]) -> dict[str, float]:
     """Values that simulations use of the friction and actuator parameters that no log tells."""
     every = {**model.friction, **(model.actuator or {})}
     return {
-        name: one.assumed if one.value is None else one.value
+        name: used(one)
         for name, one in every.items()
-        if name in untold and name != "k_a" and (one.value or one.assumed)  # type: ignore[operator]
-    }  # type: ignore[return-value]
+        if name in untold and name != "k_a" and used(one) != 0.0
+    }

@@ -8,16 +8,20 @@ import numpy as np
 from design.experiment.precision import Machine
 from design.loop import LoopNoise, LoopRun
 from identification.arrays import Array
+from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
 from identification.experiment.information import (
+    Errors,
     Information,
     information,
-    of_logs,
+    log_errors,
     rests_of,
     run_errors,
 )
+from identification.experiment.structures import structures
 from identification.log import Log
+from identification.model.estimates import Drive
 from identification.model.plant import Actuator, Motor, Plant
 from workbench.documents.design import Design
 from workbench.documents.model import Model
@@ -43,6 +47,11 @@ class Bench:
         """Whether a fit's runs are driven by the logged command."""
         return self.model.fit.drive == "command" and self.model.simulated.actuator is not None
 
+    @property
+    def drive(self) -> Drive:
+        """What drives a fit's runs."""
+        return "command" if self.by_command else "force"
+
     def run(self, plant: Plant, r: Array, rng: np.random.Generator | None = None) -> LoopRun:
         """The loop on a plant along r [m], (n,) every loop.h; with the sensors' noise by rng."""
         noise = None
@@ -67,24 +76,33 @@ class Bench:
 
     def recorded(self, log: Log) -> RecordedLogs:
         """A log as the estimator takes it."""
-        return recorded_logs([log], self.model.rig, "command" if self.by_command else "force")
+        return recorded_logs([log], self.model.rig, self.drive)
 
-    def told(self, plant: Plant, run: LoopRun) -> Information:
-        """What a run without noise tells; of a measured force with the noise that it would have."""
-        log = self.log(run)
-        fit = self.model.fit
+    def errors(self, plant: Plant, run: LoopRun) -> Errors:
+        """Errors of plants along a run without noise; where the measured force drives a fit's runs,
+        with the noise that it would have."""
+        log, fit = self.log(run), self.model.fit
         if self.by_command:
             at = rests_of(run.v, float(run.t[1]))
-            errors = run_errors(log, run.y, at, fit.noise_y, fit.noise_F)
-            return information(plant, errors, "command")
+            return run_errors(log, run.y, at, fit.noise_y, fit.noise_F)
         rng = np.random.default_rng(0)
-        y, F = (x + s * rng.standard_normal(len(log)) for x, s in
-                ((log["y"], fit.noise_y), (log["F"], fit.noise_F)))  # fmt: skip
-        return of_logs(self.fitted(plant), self.recorded(log.with_signals(y=y, F=F)))
+        noisy = {
+            key: log[key] + sd * rng.standard_normal(len(log))
+            for key, sd in (("y", fit.noise_y), ("F", fit.noise_F))
+        }
+        return log_errors(self.fitted(plant), self.recorded(log.with_signals(**noisy)))
 
-    def machine(self, plant: Plant) -> Machine:
-        """The plant as the search takes it."""
-        return Machine(plant, lambda r: self.run(plant, r), lambda run: self.told(plant, run))
+    def machine(self, plant: Plant, rivals: tuple[Acting, ...] = ()) -> Machine:
+        """The plant as the search takes it, and what a run tells of it and of these rivals."""
+        own = self.fitted(plant)
+
+        def told(run: LoopRun) -> Information:
+            errors_of = self.errors(plant, run)
+            if rivals:
+                return structures(own, rivals, errors_of, self.drive)
+            return information(own, errors_of, self.drive)
+
+        return Machine(plant, lambda r: self.run(plant, r), told)
 
 
 def bench_of(model: Model, found: Design | None) -> Bench:
@@ -113,7 +131,7 @@ def bench_of(model: Model, found: Design | None) -> Bench:
     return Bench(model, loop, f"present {now.kind}")
 
 
-def asked_of(model: Model, wanted: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
+def asked_of(wanted: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     """The parameters asked for, by default all; raises BadModel where one is none of them."""
     for name in wanted:
         if name not in known:

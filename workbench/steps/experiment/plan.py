@@ -1,12 +1,20 @@
 """Model and limits -> the run to make next: searched, made safe, and promised."""
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 
 from design.experiment.precision import looked_at, precision
 from design.experiment.search import best_run
+from design.experiment.separation import pairs_of, separation
 from identification.arrays import Array
-from identification.errors import NotIdentifiable
+from identification.effects._base import Acting
+from identification.experiment.information import Information, unknowns
+from identification.experiment.structures import looked_for, told_apart
+from identification.model.plant import Plant
 from identification.progress import KeepGoing, Progress
+from workbench.cards.effect_values import known_effect
 from workbench.documents.design import Design
 from workbench.documents.model import Model, versions
 from workbench.steps.closed_loop import effects_left_out
@@ -14,6 +22,7 @@ from workbench.steps.experiment.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import Bench, asked_of, bench_of
 from workbench.steps.experiment.planned import (
     Experiment,
+    Separation,
     Traces,
     Wanted,
     limits_of,
@@ -47,33 +56,33 @@ def experiment(
     search, draw, check, promise = np.random.default_rng(wanted.seed).spawn(4)
     plant = in_loop(model)
     plants = (plant, *drawn_plants(model, draw, CHECKED))
-    machines = [bench.machine(one) for one in plants[: 1 + SEARCHED]]
-    home = limits.home + np.zeros(round(1.0 / bench.loop.h))
-    first = looked_at(machines[:1], home)
-    if first is None:
-        raise NotIdentifiable("the model's machine cannot be simulated at rest in its loop")
-    asked = asked_of(model, wanted.parameters, first[1][0].names)
-    criterion = precision(machines, asked)
+    rivals = _rivals(model, wanted)
+    if rivals:
+        plants = tuple(_without(one, wanted.rivals) for one in plants)
+    machines = [bench.machine(one, rivals) for one in plants[: 1 + SEARCHED]]
+    keys = tuple(one.key for one in rivals)
+    asked = asked_of(wanted.parameters, unknowns(bench.fitted(plants[0]), bench.drive)[0])
+    criterion = separation(machines, keys) if rivals else precision(machines, asked)
     plan = best_run(criterion, limits, bench.loop.h, search, report, keep_going)
     report("safety", 0.0)
     r, safety = made_safe(bench, plants, plan.r, limits, check)
     promises = promised(bench, plants[: 1 + PROMISED], r, promise, report)
     seen = looked_at(machines[:1], r)
-    efficiency = float(np.exp((plan.joined - plan.bound) / len(asked)))
+    per = len(asked) if not rivals else 1
     return Experiment(
         card=model.card,
         motion=model.rig.motion,
         command_unit=model.rig.command_unit,
-        criterion="D",
+        criterion="T" if rivals else "D",
         parameters=asked,
         limits=limits,
         h=bench.loop.law.h,
         controller=bench.controller,
         segments=plan.segments,
         promise=promises,
-        separation=(),
+        separation=_apart(seen[1][0], keys) if seen and rivals else (),
         safety=safety,
-        efficiency=efficiency,
+        efficiency=float(np.exp((plan.joined - plan.bound) / per)),
         loose=seen[1][0].loose if seen else 1.0,
         tried=plan.tried,
         seed=wanted.seed,
@@ -84,13 +93,36 @@ def experiment(
     )
 
 
+def _rivals(model: Model, wanted: Wanted) -> tuple[Acting, ...]:
+    """The rivals as the model has them, else at a size that matters."""
+    limits, plant = limits_of(model, wanted), in_loop(model)
+    own = {one.key: one for one in plant.effects}
+    return tuple(
+        own.get(key) or looked_for(known_effect(key, model.library), plant, limits.stroke)
+        for key in wanted.rivals
+    )
+
+
+def _without(plant: Plant, keys: Sequence[str]) -> Plant:
+    return replace(plant, effects=tuple(one for one in plant.effects if one.key not in keys))
+
+
+def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
+    """How far the run tells each pair apart, the hardest first."""
+    found = [
+        Separation(*pair.names, float(np.sqrt(told_apart(told.matrix, pair.one, pair.others))))
+        for pair in pairs_of(told, keys)
+    ]
+    return tuple(sorted(found, key=lambda one: one.deviations))
+
+
 def _at_rate(r: Array, bench: Bench) -> Array:
     """The reference at the samples of the position controller."""
     return r[:: max(1, round(bench.loop.law.h / bench.loop.h))]
 
 
-def _traces(bench: Bench, plants: tuple[object, ...], r: Array) -> Traces:
-    runs = [bench.run(one, r) for one in plants]  # type: ignore[arg-type]
+def _traces(bench: Bench, plants: Sequence[Plant], r: Array) -> Traces:
+    runs = [bench.run(one, r) for one in plants]
     return Traces(
         t=runs[0].t,
         r=r,

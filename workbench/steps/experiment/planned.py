@@ -21,7 +21,7 @@ SECONDS = 20.0
 @dataclass(frozen=True)
 class Wanted:
     """What is asked: parameters to be told (none: all), limits where they are not those of card and
-    logs, seed. rivals: keys of effects of which one is at work, so that they are to be told apart."""
+    logs, seed. rivals: keys of effects of which one is at work, which the run is to tell apart."""
 
     parameters: tuple[str, ...] = ()
     stroke: tuple[float, float] | None = None

@@ -38,8 +38,7 @@ def promised(
             continue
         found.append(fit.estimates)
     plant = bench.fitted(plants[0])
-    drive = "command" if bench.by_command else "force"
-    names = names_of(plant, drive)
+    names = names_of(plant, bench.drive)
     values = dict(zip(names, values_of(plant, names).tolist(), strict=True))
     units = {**bench.model.friction, **(bench.model.actuator or {})}
     out = []
@@ -53,7 +52,9 @@ def promised(
         told = len(relative) / len(plants)
         after = abs(value) * float(np.median(relative)) if told >= 0.5 else None
         unit = now.unit if now is not None else units[name].unit
-        out.append(Promised(name, unit, value, now and half_width(now), after, told))
+        out.append(
+            Promised(name, unit, value, None if now is None else half_width(now), after, told)
+        )
     return tuple(out)
 
 
