@@ -4,9 +4,10 @@
 
 Every seed draws a machine (of `blind_machines`: electro-pneumatic, motor, measured force) and
 gives it a poor log: 6 s of a few moves, under ten times the usual noise. Its model goes to the
-search with stroke, speed and force limits of its own. The true machine then runs the reference, with noise, and
-`fit_plant` identifies the log from nothing; so it does with two rivals of the same length within
-the same limits, each as large as they allow: 0.1 to 3 Hz multisine, and the paper's steps.
+search with stroke, speed and force limits of its own. The true machine then runs the reference,
+with noise, and `fit_plant` identifies the log from nothing; so it does with two rivals of the same
+length within the same limits, each as large as they allow: multisine (0.1 to 3 Hz), and the paper's
+steps.
 
 - kept: share of the told parameters whose interval is within a factor of 1.5 of the promise.
 - covered: share of the true values within the intervals.
@@ -95,16 +96,19 @@ def logged(
     return Log("run", signals if one.kind == "force" else signals | {"u": run.u}), peaks(run)
 
 
-def poor_log(one: Machine, seed: int, effects: tuple[Acting, ...] = ()) -> Log:
-    """A few moves with dwells, under much noise."""
+def poor_log(
+    one: Machine, seed: int, effects: tuple[Acting, ...] = (), *, seconds: float = POOR,
+    worse: float = WORSE,
+) -> Log:  # fmt: skip
+    """A few moves with dwells, under so many times the usual noise."""
     rng = stream(seed, "poor")
     level, parts = 0.0, [np.zeros(100)]
-    while sum(map(len, parts)) < round(POOR / H):
+    while sum(map(len, parts)) < round(seconds / H):
         to = float(rng.uniform(-one.travel, one.travel))
         parts.append(move(level, to, one.speed * rng.uniform(0.3, 1.5), rng))
         level = to
-    r = np.concatenate(parts)[: round(POOR / H)]
-    return logged(one, r, rng, worse=WORSE, effects=effects)[0]
+    r = np.concatenate(parts)[: round(seconds / H)]
+    return logged(one, r, rng, worse=worse, effects=effects)[0]
 
 
 def model_of(one: Machine, log: Log, seed: int) -> Model:

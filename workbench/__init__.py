@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from identification.errors import UserError as UserError
     from workbench.interface.calls import design as design
     from workbench.interface.calls import drift as drift
+    from workbench.interface.calls import experiment as experiment
     from workbench.interface.calls import identify as identify
     from workbench.interface.calls import load_model as load_model
     from workbench.interface.calls import predict as predict
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 _CALLS = "workbench.interface.calls"
 _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
-    **{name: _CALLS for name in ("simulate", "load_model")},
+    **{name: _CALLS for name in ("simulate", "experiment", "load_model")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",
     "NotIdentifiable": "identification.errors",

@@ -134,6 +134,7 @@ def _rounded(
     while True:
         left = room - float(times @ seconds)
         fits = [i for i in near if seconds[i] <= left and times[i] < MOST_REPEATS]
+        fits = fits or [i for i in range(len(seen)) if seconds[i] <= left and times[i] < 1.0]
         if not fits:
             return times
         now = criterion.joined(seen, times)

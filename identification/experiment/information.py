@@ -80,14 +80,17 @@ class Information:
         return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
 
-def information(plant: Plant, errors_of: Errors, drive: Drive) -> Information:
+def information(
+    plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = LOST
+) -> Information:
     """What the runs with these errors (n,), in units of the sensors' noise, tell of the plant, as
     far as it is to be counted on (`lasting_jacobian`).
 
-    A shape of an effect that is at its default is not asked for, as in a fit.
+    lost: error of the plant itself from which a sample says nothing. A shape of an effect that is
+    at its default is not asked for, as in a fit.
     """
     names, x, unit = unknowns(plant, drive)
-    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
+    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
     return Information(names, unit, J.T @ J, loose)
 
 
@@ -100,7 +103,9 @@ def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]
     return names, values / unit, unit
 
 
-def lasting_jacobian(fun: Callable[[Array], Array], x: Array) -> tuple[Array, float]:
+def lasting_jacobian(
+    fun: Callable[[Array], Array], x: Array, lost: float = LOST
+) -> tuple[Array, float]:
     """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, else 0, and
     the share of `fun`'s values that hang on luck.
 
@@ -112,7 +117,7 @@ def lasting_jacobian(fun: Callable[[Array], Array], x: Array) -> tuple[Array, fl
     down = -jacobian(lambda at: fun(2.0 * x - at), x, here, LASTING_STEP)
     apart = np.abs(up - down)
     lasts = apart <= LASTING * np.maximum(np.abs(up), np.abs(down))
-    lasts &= (np.abs(here) < LOST)[:, np.newaxis] & np.isfinite(apart)
+    lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
     luck = np.any(~lasts & ~(apart * LASTING_STEP < UNSURE), axis=1)
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
 

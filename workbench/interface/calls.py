@@ -44,13 +44,17 @@ from workbench.interface.inputs import (
     sources,
 )
 from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
-from workbench.interface.loops import DesignResult, ValidateResult
+from workbench.interface.loops import DesignResult, ExperimentResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
 from workbench.output import Bar, progress
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
+from workbench.steps.experiment.plan import EXPERIMENT_STAGES
+from workbench.steps.experiment.plan import experiment as plan_experiment
+from workbench.steps.experiment.planned import Wanted
+from workbench.steps.experiment.rivals import read_rivals, rivals_of
 from workbench.steps.identify_sources import Options, identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
@@ -154,13 +158,38 @@ def validate(
     plant: another machine on which it has to work too; limits: what the judged controller keeps.
     """
     known = _model(model)
-    made = read_design(Path(design)) if isinstance(design, str | os.PathLike) else design
-    made = made.design if isinstance(made, DesignResult) else made
+    made = _design(design)
     other = None if plant is None else _model(plant)
     with _bar("simulating the loop"):
         rng = np.random.default_rng(seed)
         found, traces = validate_design(known, made, rng, plant=other, limits=limits)
     return ValidateResult(found, traces, known.rotary)
+
+
+def experiment(
+    model: ModelLike, *, design: DesignLike | None = None, parameters: Sequence[str] = (),
+    stroke: tuple[float, float] | None = None, speed: float | None = None,
+    force: float | None = None, command: float | None = None, seconds: float = 20.0,
+    rivals: "TraceResult | PathLike | Sequence[str]" = (), budget: float = 30.0, seed: int = 0,
+) -> ExperimentResult:  # fmt: skip
+    """The run to make next on a machine, as `workbench experiment`.
+
+    design: whose controller moves the machine, by default the model's present one; parameters: to
+    be told, by default all; stroke, speed, force, command: limits [SI, unit of the command], by
+    default those of card and logs; rivals: a trace that leaves some open, or keys of effects, to
+    be told apart. budget [s]: end the search after so long. Raises NotIdentifiable where no run
+    within the limits tells anything.
+    """
+    known = _model(model)
+    wanted = Wanted(
+        tuple(parameters), stroke, speed, force, command, seconds, seed, _rivals(rivals, known)
+    )
+    made = None if design is None else _design(design)
+    with _bar("experiment", 1.0) as bar:
+        course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
+        with watched(course):
+            found = plan_experiment(known, wanted, made, course.report, course.keep_going)
+    return ExperimentResult(found)
 
 
 def predict(
@@ -245,6 +274,20 @@ def _model(given: ModelLike) -> Model:
         f"{type(given).__name__} found, a model needed: the path of a model.json, or what identify"
         " or trace gave"
     )
+
+
+def _design(given: DesignLike) -> Design:
+    made = read_design(Path(given)) if isinstance(given, str | os.PathLike) else given
+    return made.design if isinstance(made, DesignResult) else made
+
+
+def _rivals(given: "TraceResult | PathLike | Sequence[str]", model: Model) -> tuple[str, ...]:
+    """Keys of the effects that are to be told apart."""
+    if isinstance(given, TraceResult):
+        return rivals_of(given.document, model, model.library)
+    if isinstance(given, str | os.PathLike):
+        return read_rivals(Path(given), model, model.library)
+    return tuple(given)
 
 
 def _machine(

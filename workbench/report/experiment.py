@@ -57,8 +57,12 @@ def promise_rows(found: Experiment) -> list[Row]:
 def _row(one: Promised) -> Row:
     now = "not told" if one.before is None else f"{one.before:.2g}"
     after = "not told" if one.after is None else f"{one.after:.2g}"
-    share = "-" if one.after is None or one.value == 0.0 else f"{one.after / abs(one.value):.2%}"
+    share = "-" if one.after is None or one.value == 0.0 else _percent(one.after / abs(one.value))
     return one.name, f"{one.value:.4g}", one.unit, now, after, share
+
+
+def _percent(share: float) -> str:
+    return f"{100.0 * share:.2g} %"
 
 
 def experiment_lead(found: Experiment) -> str:
@@ -71,7 +75,7 @@ def experiment_lead(found: Experiment) -> str:
     )
     if worst is not None and worst.value != 0.0:
         share = (worst.after or 0.0) / abs(worst.value)
-        what += f"; the least certain, {worst.name}, within {share:.2%}"
+        what += f"; the least certain, {worst.name}, within {_percent(share)}"
     if found.separation:
         least = min(found.separation, key=lambda one: one.deviations)
         what += (

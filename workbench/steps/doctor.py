@@ -288,8 +288,8 @@ def doctor_document(found: Examined, card: str) -> dict[str, Any]:
         "bad_samples": [one.as_json() for one in found.bad],
         "delays": [asdict(one) for one in found.delays],
         "motion": None if found.ways is None else asdict(found.ways),
-        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None}
-                 for one in found.told},
+        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None,
+                            "within": one.within} for one in found.told},
         "add": found.add,
         "remarks": found.remarks,
     }  # fmt: skip

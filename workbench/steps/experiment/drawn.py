@@ -11,12 +11,27 @@ from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import in_the_loop
 from workbench.steps.drift import model_in_force
 
+LEAST_BAND, USUAL_BAND = 1e-3, 0.03  # of the logs' speed: a band that none has, and a usual one
 UNTOLD = 0.3  # log of a value that no log tells, one sigma
 
 
 def in_loop(model: Model) -> Plant:
-    """The plant as its simulated loop has it."""
-    return replace(model.simulated, effects=in_the_loop(model))
+    """The plant as its simulated loop has it; a band that is next to none is taken for one that no
+    log told, whatever its interval."""
+    plant = replace(model.simulated, effects=in_the_loop(model))
+    lost = lost_bands(model)
+    return plant_with(plant, tuple(lost), np.array(list(lost.values()))) if lost else plant
+
+
+def lost_bands(model: Model) -> dict[str, float]:
+    """Bands narrower than a thousandth of the logs' speed, with what is assumed in their place."""
+    speed, nine = model.speed or 0.0, model.karnopp
+    ways = {"dv_p": (nine.dv_p, 1.0), "dv_n": (nine.dv_n, -1.0)}
+    return {
+        name: sign * USUAL_BAND * speed
+        for name, (band, sign) in ways.items()
+        if abs(band) < LEAST_BAND * speed
+    }
 
 
 def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Plant, ...]:
@@ -27,11 +42,13 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     told = rng.multivariate_normal(
         known.values, known.covariance, count, check_valid="ignore", method="svd"
     )
-    assumed = _assumed(model, known.untold)
+    lost = lost_bands(model)
+    assumed = {**_assumed(model, known.untold), **lost}
     free = np.exp(UNTOLD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
     sets = np.hstack([told, free * np.array(list(assumed.values()))])
-    kept = [i for i, name in enumerate(names) if _is_of(plant, name)]
+    last = {name: i for i, name in enumerate(names)}  # what is assumed stands in for what was lost
+    kept = [i for name, i in last.items() if _is_of(plant, name)]
     return tuple(plant_with(plant, [names[i] for i in kept], row[kept]) for row in sets)
 
 

@@ -1,11 +1,16 @@
 """Which effects a run is to tell apart: those that a trace could not."""
 
 import json
+import re
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from identification.effects._library import Library
 from identification.errors import BadModel
 from workbench.documents.model import Model
+
+EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
 
 
 def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
@@ -28,11 +33,14 @@ def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
     return rivals_of(found, model, library)
 
 
-def rivals_of(found: dict[str, object], model: Model, library: Library) -> tuple[str, ...]:
+def rivals_of(found: Mapping[str, Any], model: Model, library: Library) -> tuple[str, ...]:
     """The same of what trace.json holds."""
-    usable = [key for key, one in library.items() if not one.needs and not one.signals]
     if found["verdict"] == "unknown":
+        usable = (key for key, one in library.items() if not one.signals)
         return tuple(key for key in usable if key not in model.effects)
-    listed = [*found["effects"], *found["rivals"]]  # type: ignore[misc]
-    keys = list(dict.fromkeys(str(one["key"]) for one in listed))
-    return tuple(key for key in keys if key in library)
+    keys = [str(one["key"]) for one in found["effects"]]
+    for one in found["rivals"]:
+        equal = EQUAL.match(str(one["why_not"]))
+        if equal:
+            keys += [equal[1], str(one["key"])]
+    return tuple(key for key in dict.fromkeys(keys) if key in library)

@@ -1,0 +1,83 @@
+"""The gate before a fit: how well a log can tell each parameter, by its run at a first estimate.
+
+No fit is made. The equations and the breakaways give a first plant; the sensitivities of its run,
+in windows from measured states, are the information that the log holds. Bands and stick limits of
+a first plant may be far off, so what is promised is wider than the information alone would have it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.errors import UserError
+from identification.estimation.estimates import NORMAL_95
+from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.windowed_run.run_errors import judge
+from identification.estimation.windowed_run.windows import RUN_WINDOW
+from identification.experiment.information import information
+from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.thresholds import GATE_MARGIN, WIDEST_SD
+
+# Half intervals over the value, below which nothing is promised: what a fit gives that loses a stop
+# (benchmarks/experiment.py --gate, seeds below 400).
+NO_SURER = {
+    "m": 0.01,
+    "F_c": 0.005,
+    "F_v": 0.005,
+    "dv_": 0.05,
+    "F_s": 0.01,
+    "k1": 0.002,
+    "k2": 0.002,
+}
+LEAST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
+
+
+@dataclass(frozen=True)
+class Tellable:
+    """Half the 95 % interval, over the value, that a fit should give at most; infinite where the
+    run says nothing. can: whether that is narrow enough to be told at all."""
+
+    name: str
+    within: float
+
+    @property
+    def can(self) -> bool:
+        """Whether an estimate of it would be given."""
+        return self.within <= NORMAL_95 * WIDEST_SD
+
+
+def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
+    """How well logs can tell each of the nine, and k1 and k2 where a command drives their runs.
+
+    Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
+    """
+    plant = first_plant(recorded)
+    try:
+        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
+        told = information(plant, errors_of, recorded.drive, lost=np.inf)
+    except UserError:
+        return {}
+    relative = np.sqrt(np.diag(told.covariance)) / told.unit
+    return {
+        name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), NO_SURER[name[:3]]))
+        for name, sd in zip(told.names, relative, strict=True)
+    }
+
+
+def first_plant(recorded: RecordedLogs) -> Plant:
+    """The plant that equations, breakaways and stops give, the median over the logs."""
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = np.median(found, axis=0)
+    least = LEAST * max(float(np.max(np.abs(nine))), 1e-300)
+    signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
+    nine = signs * np.maximum(signs * nine, least)
+    actuator: Actuator | Motor | None = None
+    if recorded.held:
+        actuator = Motor(recorded.rig.force_per_command or 1.0)
+    elif recorded.by_command:
+        drive = fit_actuator(recorded.plain)
+        actuator = Actuator(max(drive.k1, LEAST), max(drive.k2, 0.0))
+    return Plant(Karnopp.from_array(nine), actuator)
