@@ -1,13 +1,13 @@
 """The run that makes the parameters asked for surest: D-optimal, by the exact simulation."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.experiment.allocation import Allocation, d_optimal
+from design.experiment.allocation import d_optimal
 from design.experiment.limits import Peaks, peaks
-from design.experiment.search import Criterion, Seen
+from design.experiment.search import Criterion, Joint, Seen
 from design.loop import LoopRun
 from identification.arrays import Array, IntArray
 from identification.errors import UserError
@@ -16,17 +16,25 @@ from identification.model.plant import Plant
 
 NO_IDEA = 1e3  # relative deviation of what a run says nothing of
 UNKNOWN = 1e-12  # of the information's scale, granted where a run says nothing
-LOOSE = 0.01  # share of a run that may hang on luck
+# Share of a run that may hang on luck: by the command of an actuator a fit follows it as a whole,
+# and loses its way there; where a force drives it, in windows, of which some may be lost.
+LOOSE_WHOLE, LOOSE_WINDOWS = 0.02, 0.3
 PER_LOOSE = 300.0  # log of a deviation, that all of a run beyond it is taken to cost
 
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine in question: what it does along a reference, and what that run tells of it."""
+    """A machine in question: what it does along a reference, and what that run tells of it; whole:
+    a fit follows its runs as a whole."""
 
     plant: Plant
     run: Callable[[Array], LoopRun]
     told: Callable[[LoopRun], Information]
+    whole: bool
+
+    def luck(self, told: Information) -> float:
+        """What it costs that a part of a run hangs on luck."""
+        return PER_LOOSE * max(told.loose - (LOOSE_WHOLE if self.whole else LOOSE_WINDOWS), 0.0)
 
 
 def looked_at(machines: Sequence[Machine], r: Array) -> tuple[Peaks, list[Information]] | None:
@@ -47,7 +55,9 @@ def looked_at(machines: Sequence[Machine], r: Array) -> tuple[Peaks, list[Inform
 
 
 def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
-    """The criterion: mean log-determinant of what is told of the asked parameters."""
+    """The criterion: log-determinant of what is told of the asked parameters, the mean over the
+    machines for the shares of the time; and for a whole run `worth` on the machine that it tells
+    least of."""
 
     def look(r: Array) -> Seen | None:
         found = looked_at(machines, r)
@@ -55,38 +65,55 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
             return None
         worst, told = found
         places = _places(told[0], asked)
-        value = float(np.mean([worth(one, places) for one in told]))
-        return Seen(worst, value, told)
+        values = [
+            worth(own, places) - one.luck(own) for one, own in zip(machines, told, strict=True)
+        ]
+        return Seen(worst, min(values), told)
 
-    def matrices(seen: Sequence[Seen]) -> list[Array]:
-        each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
-        return [np.array([told[i].matrix for told in each]) for i in range(len(machines))]
+    def joint(seen: Sequence[Seen]) -> Joint:
+        told = told_by(seen)
+        places = _places(told[0][0], asked)
+        matrices = stacked(told)
+        first = [one[0] for one in told]
 
-    def places_in(seen: Sequence[Seen]) -> IntArray:
-        told: list[Information] = seen[0].told  # type: ignore[assignment]
-        return _places(told[0], asked)
+        def measure(times: Array) -> float:
+            sums = [np.tensordot(times, M, 1) for M in matrices]
+            return float(np.mean([log_det(M, places) for M in sums]))
 
-    def shared(seen: Sequence[Seen], seconds: Array, room: float) -> Allocation:
-        return d_optimal(matrices(seen), places_in(seen), seconds, room)
+        def value(times: Array) -> float:
+            sums = [np.tensordot(times, M, 1) for M in matrices]
+            both = zip(first, sums, strict=True)
+            return min(worth(replace(one, matrix=M), places) for one, M in both)
 
-    def joined(seen: Sequence[Seen], times: Array) -> float:
-        places = places_in(seen)
-        return float(np.mean([log_det(np.tensordot(times, M, 1), places) for M in matrices(seen)]))
+        return Joint(
+            lambda seconds, room: d_optimal(matrices, places, seconds, room), measure, value
+        )
 
-    return Criterion(look, look, shared, joined)
+    return Criterion(look, joint)
 
 
-def worth(told: Information, asked: IntArray) -> float:
-    """How well a run tells the asked parameters: minus the log of their mean (geometric) relative
-    deviation, and of the largest, less what hangs on luck."""
-    mean = 0.5 * log_det(told.matrix, asked) / len(asked)
-    spread = np.sqrt(np.diag(told.covariance)[asked]) / told.unit[asked]
-    least = -float(np.log(min(float(np.max(spread)), NO_IDEA)))
-    return mean + least - PER_LOOSE * max(told.loose - LOOSE, 0.0)
+def told_by(seen: Sequence[Seen]) -> list[list[Information]]:
+    """What each segment tells, a list a machine."""
+    each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
+    return [list(one) for one in zip(*each, strict=True)]
+
+
+def stacked(told: Sequence[Sequence[Information]]) -> list[Array]:
+    """Their matrices, (k, d, d) a machine."""
+    return [np.array([one.matrix for one in own]) for own in told]
 
 
 def _places(told: Information, asked: Sequence[str]) -> IntArray:
     return np.array([told.names.index(name) for name in asked], dtype=np.int64)
+
+
+def worth(told: Information, asked: IntArray) -> float:
+    """How well a run tells the asked parameters: minus the log of their mean (geometric) relative
+    deviation, and of the largest."""
+    mean = 0.5 * log_det(told.matrix, asked) / len(asked)
+    spread = np.sqrt(np.diag(told.covariance)[asked]) / told.unit[asked]
+    least = -float(np.log(min(float(np.max(spread)), NO_IDEA)))
+    return mean + least
 
 
 def log_det(matrix: Array, asked: IntArray) -> float:

@@ -24,6 +24,7 @@ from identification.progress import KeepGoing, Progress
 NEAR = 0.97  # share of a limit that a run of the search may use
 AT_LEAST = 24  # segments that are looked at, however little time there is
 ALIKE = ("steps", "multisine")  # of which a whole run may be made, repeated
+SWAPS = 1500  # exchanges tried among segments, as sums of what they tell
 STALE = 60  # changes in a row that do not help, after which the run is done
 AT_ONCE = 2  # runs
 FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
@@ -43,15 +44,21 @@ Look = Callable[[Array], Seen | None]  # at r [m], (n,); None where the run cann
 
 
 @dataclass(frozen=True, eq=False)
-class Criterion:
-    """What a run is to tell. alone: looks at one segment's reference; whole: at a whole run's;
-    shared: the best shares of the time of segments that were seen; joined: the value of so many
-    repeats of each, as their sum."""
+class Joint:
+    """Segments together, as the sum of what they tell. shared: the best shares of the time [s];
+    measure: what these are the best of, of so many repeats of each; value: as a `Seen` has it."""
 
-    alone: Look
-    whole: Look
-    shared: Callable[[Sequence[Seen], Array, float], Allocation]
-    joined: Callable[[Sequence[Seen], Array], float]
+    shared: Callable[[Array, float], Allocation]
+    measure: Callable[[Array], float]
+    value: Callable[[Array], float]
+
+
+@dataclass(frozen=True, eq=False)
+class Criterion:
+    """What a run is to tell. look: at a reference; joint: segments that were looked at."""
+
+    look: Look
+    joint: Callable[[Sequence[Seen]], Joint]
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,19 +84,20 @@ def best_run(
     NotIdentifiable where no segment stays within the limits, or none tells anything.
     """
     report("segments", 0.0)
-    parts, seen = _looked_at(criterion.alone, limits, h, report, keep_going)
+    parts, seen = _looked_at(criterion.look, limits, h, report, keep_going)
     report("sharing the time", 0.0)
     seconds = np.array([one.seconds(h) for one in parts])
     room = limits.seconds - DWELL
-    shares = criterion.shared(seen, seconds, room)
-    times = _rounded(criterion, seen, seconds, room, shares)
-    joined = criterion.joined(seen, times)
+    joint = criterion.joint(seen)
+    shares = joint.shared(seconds, room)
+    times = _rounded(joint, seconds, room, shares.times)
+    times = _swapped(joint, seconds, room, times, rng)
     chosen = [tuple(parts[i] for i in _in_turn(times)), *_repeated(parts, seen, seconds, room)]
     report("whole runs", 0.0)
     plan, count = _exchanged(criterion, chosen, parts, limits, h, rng, report, keep_going)
     segments, one = plan
     r = reference(segments, limits, h)
-    bound = criterion.joined(seen, shares.times)
+    bound, joined = joint.measure(shares.times), joint.measure(times)
     return Plan(segments, r, one, bound, joined, (len(parts), count))
 
 
@@ -124,23 +132,47 @@ def _looked_at(
     return parts, seen
 
 
-def _rounded(
-    criterion: Criterion, seen: Sequence[Seen], seconds: Array, room: float, shares: Allocation
-) -> Array:
-    """Whole numbers of repeats (k,) near the best shares, that fit into the time."""
-    times = np.floor(shares.times + 1e-6)
-    near = np.flatnonzero(shares.times > 1e-3)
-    near = near if len(near) else np.arange(len(seen))
+def _rounded(joint: Joint, seconds: Array, room: float, shares: Array) -> Array:
+    """Whole numbers of repeats (k,) near the best shares (k,), that fit into the time."""
+    times = np.floor(shares + 1e-6)
+    near = np.flatnonzero(shares > 1e-3)
+    near = near if len(near) else np.arange(len(seconds))
     while True:
         left = room - float(times @ seconds)
         fits = [i for i in near if seconds[i] <= left and times[i] < MOST_REPEATS]
-        fits = fits or [i for i in range(len(seen)) if seconds[i] <= left and times[i] < 1.0]
+        fits = fits or [i for i in range(len(times)) if seconds[i] <= left and times[i] < 1.0]
         if not fits:
             return times
-        now = criterion.joined(seen, times)
-        gains = [criterion.joined(seen, times + np.eye(len(seen))[i]) - now for i in fits]
+        now = joint.value(times)
+        gains = [joint.value(times + _one_more(i, len(times))) - now for i in fits]
         worth = np.array(gains) / seconds[fits]
         times[fits[int(np.argmax(worth))]] += 1.0
+
+
+def _one_more(i: int, k: int) -> Array:
+    out = np.zeros(k)
+    out[i] = 1.0
+    return out
+
+
+def _swapped(
+    joint: Joint, seconds: Array, room: float, times: Array, rng: np.random.Generator
+) -> Array:
+    """Repeats (k,) in which segments were exchanged for others as long as that tells more."""
+    best, value = times, joint.value(times)
+    for _ in range(SWAPS):
+        trial = best.copy()
+        trial[int(rng.choice(np.flatnonzero(trial > 0.0)))] -= 1.0
+        while True:
+            left = room - float(trial @ seconds)
+            fits = np.flatnonzero((seconds <= left) & (trial < MOST_REPEATS))
+            if not len(fits):
+                break
+            trial[int(rng.choice(fits))] += 1.0
+        found = joint.value(trial)
+        if found > value:
+            best, value = trial, found
+    return best
 
 
 def _in_turn(times: Array) -> list[int]:
@@ -176,7 +208,7 @@ def _exchanged(
     and how many were tried."""
 
     def looked(segments: tuple[Segment, ...]) -> Seen | None:
-        found = criterion.whole(reference(segments, limits, h))
+        found = criterion.look(reference(segments, limits, h))
         return found if found is not None and found.peaks.share_of(limits) <= NEAR else None
 
     looks = [(one, looked(one)) for one in begun if one]
@@ -207,11 +239,15 @@ def _changed(
     segments: tuple[Segment, ...], parts: Sequence[Segment], limits: MotionLimits, h: float,
     rng: np.random.Generator,
 ) -> tuple[Segment, ...]:  # fmt: skip
-    """A run in which one piece is another, larger, smaller, faster, slower, or elsewhere."""
+    """A run in which one piece is another, larger, smaller, faster, slower or elsewhere, or all
+    are larger or smaller."""
     out = list(segments)
     i = int(rng.integers(len(out)))
     way = rng.random()
-    if way < 0.35:
+    if way < 0.15:
+        factor = float(rng.choice(FACTORS))
+        out = [one.changed(factor, 1.0) for one in out]
+    elif way < 0.45:
         out[i] = parts[int(rng.integers(len(parts)))]
     elif way < 0.85:
         factors = [1.0, 1.0]

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.experiment.allocation import Allocation, t_optimal
-from design.experiment.precision import LOOSE, PER_LOOSE, Machine, looked_at
-from design.experiment.search import Criterion, Seen
+from design.experiment.allocation import t_optimal
+from design.experiment.precision import Machine, looked_at, stacked, told_by
+from design.experiment.search import Criterion, Joint, Seen
 from identification.arrays import Array
 from identification.experiment.information import Information
 from identification.experiment.structures import NO_EFFECT, told_apart
@@ -49,24 +49,24 @@ def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
             return None
         worst, told = found
         pairs = pairs_of(told[0], keys)
-        value = np.mean([value_of(one.matrix, pairs) for one in told])
-        luck = PER_LOOSE * max(max(one.loose for one in told) - LOOSE, 0.0)
-        return Seen(worst, float(value) - luck, told)
+        values = [
+            value_of(own.matrix, pairs) - one.luck(own)
+            for one, own in zip(machines, told, strict=True)
+        ]
+        return Seen(worst, min(values), told)
 
-    def shared(seen: Sequence[Seen], seconds: Array, room: float) -> Allocation:
-        first = _matrices(seen)[0]
-        return t_optimal(first, pairs_in(seen), seconds, room)
+    def joint(seen: Sequence[Seen]) -> Joint:
+        told = told_by(seen)
+        pairs, matrices = pairs_of(told[0][0], keys), stacked(told)
 
-    def pairs_in(seen: Sequence[Seen]) -> tuple[Pair, ...]:
-        told: list[Information] = seen[0].told  # type: ignore[assignment]
-        return pairs_of(told[0], keys)
+        def measure(times: Array) -> float:
+            return value_of(np.tensordot(times, matrices[0], 1), pairs)
 
-    def joined(seen: Sequence[Seen], times: Array) -> float:
-        pairs = pairs_in(seen)
-        return float(np.mean([value_of(np.tensordot(times, M, 1), pairs) for M in _matrices(seen)]))
+        def value(times: Array) -> float:
+            return min(value_of(np.tensordot(times, M, 1), pairs) for M in matrices)
 
-    def _matrices(seen: Sequence[Seen]) -> list[Array]:
-        each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
-        return [np.array([told[i].matrix for told in each]) for i in range(len(machines))]
+        return Joint(
+            lambda seconds, room: t_optimal(matrices[0], pairs, seconds, room), measure, value
+        )
 
-    return Criterion(look, look, shared, joined)
+    return Criterion(look, joint)

@@ -102,7 +102,8 @@ class Bench:
                 return structures(own, rivals, errors_of, self.drive)
             return information(own, errors_of, self.drive)
 
-        return Machine(plant, lambda r: self.run(plant, r), told)
+        whole = self.by_command and isinstance(plant.actuator, Actuator)
+        return Machine(plant, lambda r: self.run(plant, r), told, whole)
 
 
 def bench_of(model: Model, found: Design | None) -> Bench:

@@ -10,6 +10,7 @@ from design.experiment.search import best_run
 from design.experiment.separation import pairs_of, separation
 from identification.arrays import Array
 from identification.effects._base import Acting
+from identification.errors import NotIdentifiable
 from identification.experiment.information import Information, unknowns
 from identification.experiment.structures import looked_for, told_apart
 from identification.model.plant import Plant
@@ -36,7 +37,7 @@ EXPERIMENT_STAGES = {
     "safety": (0.8, 0.85),
     "what it promises": (0.85, 1.0),
 }
-SEARCHED = 2  # drawn plants beside the model's, on which a search looks at every run
+SEARCHED = 1  # drawn plants beside the model's, on which a search looks at every run
 CHECKED = 40  # drawn plants, on which no limit may be exceeded
 PROMISED = 2  # drawn plants beside the model's, whose logs are fitted
 SHOWN = 12  # drawn plants in the picture
@@ -67,6 +68,11 @@ def experiment(
     report("safety", 0.0)
     r, safety = made_safe(bench, plants, plan.r, limits, check)
     promises = promised(bench, plants[: 1 + PROMISED], r, promise, report)
+    if all(one.after is None for one in promises):
+        raise NotIdentifiable(
+            f"{model.card}: no run within the limits tells any parameter ({bench.controller} hardly"
+            " moves the machine within them); widen the limits, or give another --design"
+        )
     seen = looked_at(machines[:1], r)
     per = len(asked) if not rivals else 1
     return Experiment(
