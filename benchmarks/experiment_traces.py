@@ -5,8 +5,8 @@
 Every seed draws a machine and an effect of the library (of `blind_effects`, at 20 %), and logs a
 few moves of 5 s, under five times the usual noise. Where `trace` of that log ends "inseparable" or
 "unknown", the search makes a run of at most 30 s that tells its rivals apart, within limits of the
-machine's own; the true machine runs it, and both logs are traced together. Settled: the verdict is "effect",
-and the effect is the right one, alone or with others. Seeds below 700 served to choose.
+machine's own; the true machine runs it, and both logs are traced together. Settled: the verdict is
+"effect", and the effect is the right one, alone or with others. Seeds below 700 served to choose.
 """
 
 import argparse

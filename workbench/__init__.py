@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from workbench.interface.calls import simulate as simulate
     from workbench.interface.calls import trace as trace
     from workbench.interface.calls import validate as validate
+    from workbench.steps.experiment.planned import Wanted as Wanted
     from workbench.steps.identify_sources import Options as Options
     from workbench.steps.loop_figures import Limits as Limits
 
@@ -34,6 +35,7 @@ _HOMES = {
     "DriftSettings": "identification.drift.drift_test",
     "NotIdentifiable": "identification.errors",
     "UserError": "identification.errors",
+    "Wanted": "workbench.steps.experiment.planned",
     "Options": "workbench.steps.identify_sources",
     "Limits": "workbench.steps.loop_figures",
 }

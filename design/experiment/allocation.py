@@ -14,8 +14,10 @@ import numpy as np
 from identification.arrays import Array, IntArray
 
 MOST_REPEATS = 6.0  # of one segment
-RIDGE = 1e-9  # of the mean information, added to every parameter: what a run says nothing of
-IPOPT = {
+INFORMATION_RIDGE = (
+    1e-9  # of the mean information, added to every parameter: what a run says nothing of
+)
+IPOPT_OPTIONS = {
     "ipopt.print_level": 0,
     "ipopt.sb": "yes",
     "print_time": False,
@@ -79,7 +81,7 @@ def t_optimal(
     value: Any = 0.0
     for pair in pairs:
         at = list(pair.others)
-        R = ca.chol(M[at, at] + RIDGE * ca.SX.eye(len(at)))
+        R = ca.chol(M[at, at] + INFORMATION_RIDGE * ca.SX.eye(len(at)))
         half = ca.solve(R.T, M[at, pair.one])
         left = ca.fmax(M[pair.one, pair.one] - ca.dot(half, half), 0.0)
         value += ca.log(left * float(size[pair.one]) ** 2 + 1.0) / len(pairs)
@@ -95,7 +97,7 @@ def _log_det(ca: Any, w: Any, M: Array, asked: IntArray) -> Any:
     # The others first: the determinant of the whole is that of their block times the wanted one.
     order = every[::-1]
     mixed = ca.mtimes(ca.DM(scaled[:, order][:, :, order].reshape(k, d * d).T), w)
-    R = ca.chol(ca.reshape(mixed, d, d) + RIDGE * ca.SX.eye(d))
+    R = ca.chol(ca.reshape(mixed, d, d) + INFORMATION_RIDGE * ca.SX.eye(d))
     return 2.0 * ca.sum1(ca.log(ca.diag(R)[d - len(asked) :]))
 
 
@@ -104,7 +106,7 @@ def _solved(ca: Any, w: Any, value: Any, seconds: Array, total: float) -> Alloca
     k = len(seconds)
     begin = np.minimum(np.full(k, total / float(np.sum(seconds))), MOST_REPEATS)
     program = {"x": w, "f": -value, "g": ca.dot(ca.DM(seconds), w)}
-    solver = ca.nlpsol("allocation", "ipopt", program, IPOPT)
+    solver = ca.nlpsol("allocation", "ipopt", program, IPOPT_OPTIONS)
     found = solver(x0=begin, lbx=0.0, ubx=MOST_REPEATS, lbg=0.0, ubg=total)
     times = np.clip(np.array(found["x"]).ravel(), 0.0, MOST_REPEATS)
     return Allocation(times, -float(found["f"]))

@@ -11,14 +11,18 @@ from design.experiment.search import Criterion, Joint, Seen
 from design.loop import LoopRun
 from identification.arrays import Array, IntArray
 from identification.errors import UserError
+from identification.estimation.estimates import Events, events_of
 from identification.experiment.information import Information
 from identification.model.plant import Plant
+from identification.thresholds import EVENTS_NEEDED
 
 NO_IDEA = 1e3  # relative deviation of what a run says nothing of
-UNKNOWN = 1e-12  # of the information's scale, granted where a run says nothing
+UNKNOWN_RIDGE = 1e-12  # of the information's scale, granted where a run says nothing
 # Share of a run that may hang on luck: by the command of an actuator a fit follows it as a whole,
 # and loses its way there; where a force drives it, in windows, of which some may be lost.
 LOOSE_WHOLE, LOOSE_WINDOWS = 0.02, 0.3
+WANTED_EVENTS = 2 * EVENTS_NEEDED  # events of each kind, of which another machine may lose some
+PER_EVENT = 2.0  # log of a deviation, that each of them is worth
 PER_LOOSE = 300.0  # log of a deviation, that all of a run beyond it is taken to cost
 
 
@@ -37,21 +41,24 @@ class Machine:
         return PER_LOOSE * max(told.loose - (LOOSE_WHOLE if self.whole else LOOSE_WINDOWS), 0.0)
 
 
-def looked_at(machines: Sequence[Machine], r: Array) -> tuple[Peaks, list[Information]] | None:
-    """Extremes over all machines along r [m], (n,), and what each run tells; None where one cannot
-    be followed."""
+def looked_at(
+    machines: Sequence[Machine], r: Array
+) -> tuple[Peaks, list[Information], list[Events]] | None:
+    """Extremes over all machines along r [m], (n,), what each run tells, and what happens in it;
+    None where one cannot be followed."""
     worst: Peaks | None = None
-    told = []
+    told, events = [], []
     try:
         for one in machines:
             run = one.run(r)
             own = peaks(run)
             worst = own if worst is None else worst.or_more(own)
             told.append(one.told(run))
+            events.append(events_of([run.mode], [run.v]))
     except UserError:
         return None
     assert worst is not None
-    return worst, told
+    return worst, told, events
 
 
 def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
@@ -63,10 +70,11 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
         found = looked_at(machines, r)
         if found is None:
             return None
-        worst, told = found
+        worst, told, events = found
         places = _places(told[0], asked)
         values = [
-            worth(own, places) - one.luck(own) for one, own in zip(machines, told, strict=True)
+            worth(own, places) - one.luck(own) - PER_EVENT * missing(happens, asked)
+            for one, own, happens in zip(machines, told, events, strict=True)
         ]
         return Seen(worst, min(values), told)
 
@@ -90,6 +98,18 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
         )
 
     return Criterion(look, joint)
+
+
+def missing(happens: Events, asked: Sequence[str]) -> float:
+    """Breakaways and crossings of the band's limit that a fit would want beside those of a run."""
+    out = 0.0
+    for name in asked:
+        side = 1 if name.endswith("n") else 0
+        if name.startswith("F_s"):
+            out += max(WANTED_EVENTS - happens.breakaways[side], 0)
+        elif name.startswith("dv"):
+            out += max(WANTED_EVENTS - happens.crossings[side], 0)
+    return out
 
 
 def told_by(seen: Sequence[Seen]) -> list[list[Information]]:
@@ -118,7 +138,7 @@ def worth(told: Information, asked: IntArray) -> float:
 
 def log_det(matrix: Array, asked: IntArray) -> float:
     """Log-determinant of the information (d, d) of the asked parameters, all others unknown."""
-    ridged = matrix + UNKNOWN * np.eye(len(matrix))
+    ridged = matrix + UNKNOWN_RIDGE * np.eye(len(matrix))
     others = np.setdiff1d(np.arange(len(matrix)), asked)
     whole = np.linalg.slogdet(ridged)[1]
     beside = np.linalg.slogdet(ridged[np.ix_(others, others)])[1] if len(others) else 0.0

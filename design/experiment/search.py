@@ -16,18 +16,18 @@ import numpy as np
 
 from design.experiment.allocation import MOST_REPEATS, Allocation
 from design.experiment.limits import MotionLimits, Peaks
-from design.experiment.segments import DWELL, Segment, allowed, library, reference
+from design.experiment.segments import SEGMENT_DWELL, Segment, allowed, library, reference
 from identification.arrays import Array
 from identification.errors import NotIdentifiable
 from identification.progress import KeepGoing, Progress
 
-NEAR = 0.97  # share of a limit that a run of the search may use
-AT_LEAST = 24  # segments that are looked at, however little time there is
-ALIKE = ("steps", "multisine")  # of which a whole run may be made, repeated
-SWAPS = 1500  # exchanges tried among segments, as sums of what they tell
-STALE = 60  # changes in a row that do not help, after which the run is done
-AT_ONCE = 2  # runs
-FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
+OF_A_LIMIT = 0.97  # share of a limit that a run of the search may use
+FEWEST_SEGMENTS = 24  # segments that are looked at, however little time there is
+REPEATED_KINDS = ("steps", "multisine")  # of which a whole run may be made, repeated
+SWAPS_TRIED = 1500  # exchanges tried among segments, as sums of what they tell
+STALE_CHANGES = 60  # changes in a row that do not help, after which the run is done
+RUNS_AT_ONCE = 2  # runs
+CHANGE_FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +87,7 @@ def best_run(
     parts, seen = _looked_at(criterion.look, limits, h, report, keep_going)
     report("sharing the time", 0.0)
     seconds = np.array([one.seconds(h) for one in parts])
-    room = limits.seconds - DWELL
+    room = limits.seconds - SEGMENT_DWELL
     joint = criterion.joint(seen)
     shares = joint.shared(seconds, room)
     times = _rounded(joint, seconds, room, shares.times)
@@ -111,16 +111,16 @@ def _looked_at(
     begun = itertools.count()
 
     def seen_of(one: Segment) -> Seen | None:
-        if next(begun) >= AT_LEAST and not keep_going():
+        if next(begun) >= FEWEST_SEGMENTS and not keep_going():
             return None
-        r = np.concatenate([np.zeros(round(DWELL / h)), one.signal(h)])
+        r = np.concatenate([np.zeros(round(SEGMENT_DWELL / h)), one.signal(h)])
         return look(limits.home + r)
 
     parts, seen = [], []
-    with ThreadPoolExecutor(AT_ONCE) as pool:
+    with ThreadPoolExecutor(RUNS_AT_ONCE) as pool:
         for i, (one, found) in enumerate(zip(every, pool.map(seen_of, every), strict=True)):
             report("segments", (i + 1) / len(every))
-            if found is not None and found.peaks.share_of(limits) <= NEAR:
+            if found is not None and found.peaks.share_of(limits) <= OF_A_LIMIT:
                 parts.append(one)
                 seen.append(found)
     if not parts:
@@ -139,7 +139,7 @@ def _rounded(joint: Joint, seconds: Array, room: float, shares: Array) -> Array:
     near = near if len(near) else np.arange(len(seconds))
     while True:
         left = room - float(times @ seconds)
-        fits = [i for i in near if seconds[i] <= left and times[i] < MOST_REPEATS]
+        fits = [int(i) for i in near if seconds[i] <= left and times[i] < MOST_REPEATS]
         fits = fits or [i for i in range(len(times)) if seconds[i] <= left and times[i] < 1.0]
         if not fits:
             return times
@@ -160,7 +160,7 @@ def _swapped(
 ) -> Array:
     """Repeats (k,) in which segments were exchanged for others as long as that tells more."""
     best, value = times, joint.value(times)
-    for _ in range(SWAPS):
+    for _ in range(SWAPS_TRIED):
         trial = best.copy()
         trial[int(rng.choice(np.flatnonzero(trial > 0.0)))] -= 1.0
         while True:
@@ -191,7 +191,7 @@ def _repeated(
 ) -> list[tuple[Segment, ...]]:
     """Runs of one and the same segment, of each kind that is usual the most telling one."""
     out = []
-    for kind in ALIKE:
+    for kind in REPEATED_KINDS:
         of_kind = [i for i, one in enumerate(parts) if one.kind == kind]
         if of_kind:
             best = max(of_kind, key=lambda i: seen[i].value)
@@ -209,7 +209,7 @@ def _exchanged(
 
     def looked(segments: tuple[Segment, ...]) -> Seen | None:
         found = criterion.look(reference(segments, limits, h))
-        return found if found is not None and found.peaks.share_of(limits) <= NEAR else None
+        return found if found is not None and found.peaks.share_of(limits) <= OF_A_LIMIT else None
 
     looks = [(one, looked(one)) for one in begun if one]
     best = max(looks, key=lambda one: -np.inf if one[1] is None else one[1].value)
@@ -218,11 +218,11 @@ def _exchanged(
         chosen = tuple(one.changed(0.9, 1.0) for one in chosen)
         best = (chosen, looked(chosen))
         count += 1
-        if count > STALE:
+        if count > STALE_CHANGES:
             raise NotIdentifiable("no run within the limits was found; widen them")
-    with ThreadPoolExecutor(AT_ONCE) as pool:
-        while stale < STALE and keep_going():
-            trials = [_changed(best[0], parts, limits, h, rng) for _ in range(AT_ONCE)]
+    with ThreadPoolExecutor(RUNS_AT_ONCE) as pool:
+        while stale < STALE_CHANGES and keep_going():
+            trials = [_changed(best[0], parts, limits, h, rng) for _ in range(RUNS_AT_ONCE)]
             for segments, found in zip(trials, pool.map(looked, trials), strict=True):
                 count += 1
                 better = found is not None and best[1] is not None
@@ -230,7 +230,7 @@ def _exchanged(
                     best, stale = (segments, found), 0
                 else:
                     stale += 1
-            report("whole runs", stale / STALE)
+            report("whole runs", stale / STALE_CHANGES)
     assert best[1] is not None
     return (best[0], best[1]), count
 
@@ -245,22 +245,22 @@ def _changed(
     i = int(rng.integers(len(out)))
     way = rng.random()
     if way < 0.15:
-        factor = float(rng.choice(FACTORS))
+        factor = float(rng.choice(CHANGE_FACTORS))
         out = [one.changed(factor, 1.0) for one in out]
     elif way < 0.45:
         out[i] = parts[int(rng.integers(len(parts)))]
     elif way < 0.85:
         factors = [1.0, 1.0]
-        factors[int(rng.integers(2))] = float(rng.choice(FACTORS))
+        factors[int(rng.integers(2))] = float(rng.choice(CHANGE_FACTORS))
         out[i] = out[i].changed(*factors)
     else:
         k = int(rng.integers(len(out)))
         out[i], out[k] = out[k], out[i]
     if not all(allowed(one, limits, h) for one in out):
         return segments
-    while sum(one.seconds(h) for one in out) > limits.seconds - DWELL and len(out) > 1:
+    while sum(one.seconds(h) for one in out) > limits.seconds - SEGMENT_DWELL and len(out) > 1:
         del out[int(rng.integers(len(out)))]
-    left = limits.seconds - DWELL - sum(one.seconds(h) for one in out)
+    left = limits.seconds - SEGMENT_DWELL - sum(one.seconds(h) for one in out)
     fits = [one for one in parts if one.seconds(h) <= left]
     if fits:
         out.append(fits[int(rng.integers(len(fits)))])

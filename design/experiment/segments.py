@@ -16,21 +16,25 @@ from identification.arrays import Array
 from identification.signals.excitation import Multisine, reference_signal
 
 Kind = Literal["steps", "strokes", "creep", "sine", "sweep", "stairs", "multisine"]
-DWELL = 0.4  # s of rest after a segment
-HOLD = 0.5  # s, least time at a level of a step
-FADE = 0.3  # s in which a sine comes and goes
-SWEEP = 4.0  # ratio of a sweep's last frequency to its first
-STAIRS = 4  # steps up, and as many down
-LONGEST = 8.0  # s of a segment, at most
-RATES = 6  # speeds tried, evenly spaced on a logarithmic scale
-SLOWEST = 0.01  # of the speed limit
+SEGMENT_DWELL = 0.4  # s of rest after a segment
+STEP_HOLD = 0.5  # s, least time at a level of a step
+SINE_FADE = 0.3  # s in which a sine comes and goes
+SWEEP_RATIO = 4.0  # ratio of a sweep's last frequency to its first
+STAIR_STEPS = 4  # steps up, and as many down
+LONGEST_SEGMENT = 8.0  # s of a segment, at most
+RATE_COUNT = 6  # speeds tried, evenly spaced on a logarithmic scale
+SLOWEST_RATE = 0.01  # of the speed limit
 # Of the reach, levels of steps and strokes; of triangles; of sines.
-LEVELS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)
-CREEPS = (0.02, 0.05, 0.12, 0.3)
-AMPLITUDES = (0.1, 0.2, 0.4, 0.85)
-FREQUENCIES = (0.3, 0.6, 1.2, 2.4, 4.0)
-CYCLES = 3
-SINES, SINES_SECONDS, LOWEST = 12, 5.0, 0.2  # of a multisine: lines, length [s], first [Hz]
+STEP_LEVELS = (-0.9, -0.6, -0.3, 0.3, 0.6, 0.9)
+CREEP_SHARES = (0.02, 0.05, 0.12, 0.3)
+SINE_SHARES = (0.1, 0.2, 0.4, 0.85)
+SEGMENT_FREQUENCIES = (0.3, 0.6, 1.2, 2.4, 4.0)
+SEGMENT_CYCLES = 3
+SINE_LINES, SINES_SECONDS, LOWEST_LINE = (
+    12,
+    5.0,
+    0.2,
+)  # of a multisine: lines, length [s], first [Hz]
 
 
 @dataclass(frozen=True)
@@ -45,7 +49,7 @@ class Segment:
     def signal(self, h: float) -> Array:
         """Deviation from home [m], (n,), sampled every h [s]; it ends with a rest."""
         made = _SHAPES[self.kind](self.amplitude, self.rate, h)
-        return np.concatenate([made, np.zeros(round(DWELL / h))])
+        return np.concatenate([made, np.zeros(round(SEGMENT_DWELL / h))])
 
     def seconds(self, h: float) -> float:
         """How long it lasts."""
@@ -64,11 +68,13 @@ def _line(knots: Array, speed: float, h: float) -> Array:
 
 
 def _steps(amplitude: float, rate: float, h: float) -> Array:
-    return np.concatenate([np.full(round(1.0 / rate / h), amplitude), np.zeros(round(HOLD / h))])
+    return np.concatenate(
+        [np.full(round(1.0 / rate / h), amplitude), np.zeros(round(STEP_HOLD / h))]
+    )
 
 
 def _strokes(amplitude: float, rate: float, h: float) -> Array:
-    rest = np.zeros(round(0.5 * HOLD / h))
+    rest = np.zeros(round(0.5 * STEP_HOLD / h))
     out = _line(np.array([0.0, amplitude]), rate, h)
     back = _line(np.array([amplitude, 0.0]), rate, h)
     return np.concatenate([out, rest + amplitude, back])
@@ -81,33 +87,36 @@ def _creep(amplitude: float, rate: float, h: float) -> Array:
 def _faded(x: Array, h: float) -> Array:
     n = len(x)
     t = h * np.arange(n)
-    fade = np.clip(np.minimum(t, t[-1] - t) / FADE, 0.0, 1.0)
+    fade = np.clip(np.minimum(t, t[-1] - t) / SINE_FADE, 0.0, 1.0)
     return np.asarray(x * fade**2 * (3.0 - 2.0 * fade))
 
 
 def _sine(amplitude: float, rate: float, h: float) -> Array:
-    t = np.arange(0.0, CYCLES / rate, h)
+    t = np.arange(0.0, SEGMENT_CYCLES / rate, h)
     return _faded(amplitude * np.sin(2.0 * np.pi * rate * t), h)
 
 
 def _sweep(amplitude: float, rate: float, h: float) -> Array:
-    """From rate to SWEEP times it, the amplitude falling so that the speed is even."""
-    seconds = 2.0 * CYCLES / rate / np.sqrt(SWEEP)
+    """From rate to SWEEP_RATIO times it, the amplitude falling so that the speed is even."""
+    seconds = 2.0 * SEGMENT_CYCLES / rate / np.sqrt(SWEEP_RATIO)
     t = np.arange(0.0, seconds, h)
-    growth = np.log(SWEEP) / seconds
+    growth = np.log(SWEEP_RATIO) / seconds
     phase = 2.0 * np.pi * rate * np.expm1(growth * t) / growth
     return _faded(amplitude * np.exp(-growth * t) * np.sin(phase), h)
 
 
 def _stairs(amplitude: float, rate: float, h: float) -> Array:
-    levels = np.concatenate([np.arange(1, STAIRS + 1), np.arange(STAIRS - 1, -1, -1)]) / STAIRS
+    levels = (
+        np.concatenate([np.arange(1, STAIR_STEPS + 1), np.arange(STAIR_STEPS - 1, -1, -1)])
+        / STAIR_STEPS
+    )
     return np.repeat(amplitude * levels, max(1, round(1.0 / rate / h)))
 
 
 def _multisine(amplitude: float, rate: float, h: float) -> Array:
     """Sines up to the frequency `rate` [Hz], the largest deviation being the amplitude."""
     t = np.arange(0.0, SINES_SECONDS, h)
-    x = reference_signal(Multisine(1.0, LOWEST, rate, SINES), t, np.random.default_rng(0))
+    x = reference_signal(Multisine(1.0, LOWEST_LINE, rate, SINE_LINES), t, np.random.default_rng(0))
     return _faded(amplitude * x / float(np.max(np.abs(x))), h)
 
 
@@ -125,24 +134,24 @@ _SHAPES = {
 def library(limits: MotionLimits) -> Iterator[Segment]:
     """Segments over what the limits allow, by the speeds of the references alone."""
     reach, fastest = limits.reach, limits.speed
-    rates = fastest * np.geomspace(SLOWEST, 0.9, RATES)
-    for level in LEVELS:
+    rates = fastest * np.geomspace(SLOWEST_RATE, 0.9, RATE_COUNT)
+    for level in STEP_LEVELS:
         for hold in (0.5, 1.2):
             yield Segment("steps", level * reach, 1.0 / hold)
         for rate in rates[1:]:
             yield Segment("strokes", level * reach, float(rate))
         for hold in (0.25, 0.6):
             yield Segment("stairs", level * reach, 1.0 / hold)
-    for share in CREEPS:
+    for share in CREEP_SHARES:
         for rate in rates[:-1]:
             for sign in (1.0, -1.0):
                 yield Segment("creep", sign * share * reach, float(rate))
-    for share in AMPLITUDES:
-        for f in FREQUENCIES:
+    for share in SINE_SHARES:
+        for f in SEGMENT_FREQUENCIES:
             size = min(share * reach, 0.9 * fastest / (2.0 * np.pi * f))
             yield Segment("sine", float(size), f)
             yield Segment("sweep", float(size), f)
-        for f in FREQUENCIES[2:]:
+        for f in SEGMENT_FREQUENCIES[2:]:
             yield Segment("multisine", share * reach, f)
 
 
@@ -153,14 +162,14 @@ def allowed(one: Segment, limits: MotionLimits, h: float) -> bool:
     if one.kind in ("strokes", "creep"):
         if one.rate > limits.speed or 10.0 * abs(one.amplitude) / one.rate > 1e6 * h:
             return False
-    elif one.kind in ("sine", "sweep", "multisine") and one.rate * SWEEP > 0.1 / h:
+    elif one.kind in ("sine", "sweep", "multisine") and one.rate * SWEEP_RATIO > 0.1 / h:
         return False
-    return one.seconds(h) <= min(LONGEST, limits.seconds)
+    return one.seconds(h) <= min(LONGEST_SEGMENT, limits.seconds)
 
 
 def reference(parts: tuple[Segment, ...], limits: MotionLimits, h: float) -> Array:
     """r [m], (n,): a rest at home, then the segments; filled up with rest to the limit's time."""
     n = round(limits.seconds / h)
-    pieces = [np.zeros(round(DWELL / h)), *(one.signal(h) for one in parts)]
+    pieces = [np.zeros(round(SEGMENT_DWELL / h)), *(one.signal(h) for one in parts)]
     r = np.concatenate(pieces)[:n]
     return limits.home + np.pad(r, (0, n - len(r)))

@@ -12,7 +12,7 @@ from identification.arrays import Array
 from identification.experiment.information import Information
 from identification.experiment.structures import NO_EFFECT, told_apart
 
-NEGLIGIBLE = 1.0  # square in units of the noise, beside which a difference begins to tell
+NEGLIGIBLE_CHANGE = 1.0  # square in units of the noise, beside which a difference begins to tell
 
 
 @dataclass(frozen=True)
@@ -41,13 +41,13 @@ def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
 
     def value_of(matrix: Array, pairs: Sequence[Pair]) -> float:
         left = [told_apart(matrix, one.one, one.others) for one in pairs]
-        return float(np.mean(np.log(np.array(left) + NEGLIGIBLE)))
+        return float(np.mean(np.log(np.array(left) + NEGLIGIBLE_CHANGE)))
 
     def look(r: Array) -> Seen | None:
         found = looked_at(machines, r)
         if found is None:
             return None
-        worst, told = found
+        worst, told, _ = found
         pairs = pairs_of(told[0], keys)
         values = [
             value_of(own.matrix, pairs) - one.luck(own)

@@ -32,7 +32,7 @@ NO_SURER = {
     "k1": 0.002,
     "k2": 0.002,
 }
-LEAST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
+LEAST_SHARE_OF_FIRST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
 
 
 @dataclass(frozen=True)
@@ -71,7 +71,7 @@ def first_plant(recorded: RecordedLogs) -> Plant:
     """The plant that equations, breakaways and stops give, the median over the logs."""
     found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
     nine = np.median(found, axis=0)
-    least = LEAST * max(float(np.max(np.abs(nine))), 1e-300)
+    least = LEAST_SHARE_OF_FIRST * max(float(np.max(np.abs(nine))), 1e-300)
     signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
     nine = signs * np.maximum(signs * nine, least)
     actuator: Actuator | Motor | None = None
@@ -79,5 +79,5 @@ def first_plant(recorded: RecordedLogs) -> Plant:
         actuator = Motor(recorded.rig.force_per_command or 1.0)
     elif recorded.by_command:
         drive = fit_actuator(recorded.plain)
-        actuator = Actuator(max(drive.k1, LEAST), max(drive.k2, 0.0))
+        actuator = Actuator(max(drive.k1, LEAST_SHARE_OF_FIRST), max(drive.k2, 0.0))
     return Plant(Karnopp.from_array(nine), actuator)

@@ -31,12 +31,12 @@ from identification.model.plant import Motor, Plant
 from identification.simulation.free_run import free_run
 
 Errors = Callable[[Plant], Array]
-NOTHING = 1e-9  # of the largest, an eigenvalue of the information that is rounding
+NO_INFORMATION = 1e-9  # of the largest, an eigenvalue of the information that is rounding
 LEAST_NOISE = 1e-12  # N or m, of a signal that is taken to be exact
 LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to be counted on
-LASTING = 0.1  # of a sensitivity, by which it may differ to either side over that step
-UNSURE = 3.0  # in units of the noise, difference of both sides from which a run hangs on luck
-LOST = 6.0  # in units of the noise, error of the plant itself at which it is not followed
+LASTING_SHARE = 0.1  # of a sensitivity, by which it may differ to either side over that step
+BY_LUCK = 3.0  # in units of the noise, difference of both sides from which a run hangs on luck
+NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which it is not followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,10 +66,10 @@ class Information:
         silent = size <= 0.0
         scale = np.where(silent, 1.0, size)
         values, vectors = np.linalg.eigh(self.matrix / np.outer(scale, scale))
-        kept = values > NOTHING * max(float(values[-1]), 1e-300)
+        kept = values > NO_INFORMATION * max(float(values[-1]), 1e-300)
         inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
         # A direction without information makes every parameter in it unknown.
-        lost = silent | (np.sum(vectors[:, ~kept] ** 2, axis=1) > NOTHING)
+        lost = silent | (np.sum(vectors[:, ~kept] ** 2, axis=1) > NO_INFORMATION)
         out = inverse * np.outer(self.unit / scale, self.unit / scale)
         out[lost, lost] = np.inf
         return np.asarray(out)
@@ -81,7 +81,7 @@ class Information:
 
 
 def information(
-    plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = LOST
+    plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = NOT_FOLLOWED
 ) -> Information:
     """What the runs with these errors (n,), in units of the sensors' noise, tell of the plant, as
     far as it is to be counted on (`lasting_jacobian`).
@@ -104,7 +104,7 @@ def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]
 
 
 def lasting_jacobian(
-    fun: Callable[[Array], Array], x: Array, lost: float = LOST
+    fun: Callable[[Array], Array], x: Array, lost: float = NOT_FOLLOWED
 ) -> tuple[Array, float]:
     """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, else 0, and
     the share of `fun`'s values that hang on luck.
@@ -116,9 +116,9 @@ def lasting_jacobian(
     up = jacobian(fun, x, here, LASTING_STEP)
     down = -jacobian(lambda at: fun(2.0 * x - at), x, here, LASTING_STEP)
     apart = np.abs(up - down)
-    lasts = apart <= LASTING * np.maximum(np.abs(up), np.abs(down))
+    lasts = apart <= LASTING_SHARE * np.maximum(np.abs(up), np.abs(down))
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
-    luck = np.any(~lasts & ~(apart * LASTING_STEP < UNSURE), axis=1)
+    luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_LUCK), axis=1)
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
 
 

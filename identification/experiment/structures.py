@@ -18,10 +18,10 @@ from identification.model.estimates import Drive
 from identification.model.plant import Plant
 
 NO_EFFECT = "no effect"
-SIZE = 0.15  # of the Coulomb level, force of an effect that is looked for
-ENDS = {"y_p": 0.6, "y_n": -0.6}  # of half the stroke, places at which its ends begin
-FAR = 10.0  # in units of the noise, from which what an effect changes counts less
-RIDGE = 1e-9  # of the information's scale, below which a direction is rounding
+LOOKED_FOR_SIZE = 0.15  # of the Coulomb level, force of an effect that is looked for
+END_PLACES = {"y_p": 0.6, "y_n": -0.6}  # of half the stroke, places at which its ends begin
+FAR_CHANGE = 10.0  # in units of the noise, from which what an effect changes counts less
+DIRECTION_RIDGE = 1e-9  # of the information's scale, below which a direction is rounding
 
 
 def looked_for(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Acting:
@@ -33,15 +33,15 @@ def looked_for(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Act
     for p in effect.params:
         value = p.typical if p.default is None or p.linear else p.default
         if _is_force(p):
-            value *= SIZE * coulomb / largest
+            value *= LOOKED_FOR_SIZE * coulomb / largest
         elif p.role == "place":
             value = home + 0.4 * reach
         elif p.role == "width":
             value = 0.15 * reach
         elif p.role == "period":
             value = min(p.typical, 0.5 * reach)
-        elif p.name in ENDS:
-            value = home + ENDS[p.name] * reach
+        elif p.name in END_PLACES:
+            value = home + END_PLACES[p.name] * reach
         values[p.name] = float(np.clip(value, p.low, p.high))
     return effect.acting(values)
 
@@ -66,7 +66,7 @@ def structures(
     for one in rivals:
         changed = errors_of(replace(plant, effects=(*plant.effects, one))) - here
         changed = np.where(np.isfinite(changed), changed, 0.0)
-        columns.append(soft(changed, FAR)[:, np.newaxis])
+        columns.append(soft(changed, FAR_CHANGE)[:, np.newaxis])
     both = np.hstack(columns)
     keys = tuple(one.key for one in rivals)
     return Information(
@@ -80,5 +80,7 @@ def told_apart(matrix: Array, one: int, others: Sequence[int]) -> float:
     M, b = matrix[np.ix_(at, at)], matrix[at, one]
     size = np.sqrt(np.maximum(np.diag(M), 0.0))
     scale = np.where(size > 0.0, size, 1.0)
-    solved = np.linalg.solve(M / np.outer(scale, scale) + RIDGE * np.eye(len(at)), b / scale)
+    solved = np.linalg.solve(
+        M / np.outer(scale, scale) + DIRECTION_RIDGE * np.eye(len(at)), b / scale
+    )
     return max(float(matrix[one, one] - (b / scale) @ solved), 0.0)

@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -167,28 +168,25 @@ def validate(
 
 
 def experiment(
-    model: ModelLike, *, design: DesignLike | None = None, parameters: Sequence[str] = (),
-    stroke: tuple[float, float] | None = None, speed: float | None = None,
-    force: float | None = None, command: float | None = None, seconds: float = 20.0,
-    rivals: "TraceResult | PathLike | Sequence[str]" = (), budget: float = 30.0, seed: int = 0,
+    model: ModelLike, *, design: DesignLike | None = None, wanted: Wanted | None = None,
+    rivals: "TraceResult | PathLike | None" = None, budget: float = 30.0,
 ) -> ExperimentResult:  # fmt: skip
     """The run to make next on a machine, as `workbench experiment`.
 
-    design: whose controller moves the machine, by default the model's present one; parameters: to
-    be told, by default all; stroke, speed, force, command: limits [SI, unit of the command], by
-    default those of card and logs; rivals: a trace that leaves some open, or keys of effects, to
-    be told apart. budget [s]: end the search after so long. Raises NotIdentifiable where no run
-    within the limits tells anything.
+    design: whose controller moves the machine, by default the model's present one; wanted:
+    parameters, limits, seed, keys of effects that are to be told apart; rivals: a trace that leaves
+    such effects open. budget [s]: end the search after so long. Raises NotIdentifiable where no
+    run within the limits tells anything.
     """
     known = _model(model)
-    wanted = Wanted(
-        tuple(parameters), stroke, speed, force, command, seconds, seed, _rivals(rivals, known)
-    )
+    asked = wanted or Wanted()
+    if rivals is not None:
+        asked = replace(asked, rivals=_rivals(rivals, known))
     made = None if design is None else _design(design)
     with _bar("experiment", 1.0) as bar:
         course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
         with watched(course):
-            found = plan_experiment(known, wanted, made, course.report, course.keep_going)
+            found = plan_experiment(known, asked, made, course.report, course.keep_going)
     return ExperimentResult(found)
 
 
@@ -281,13 +279,11 @@ def _design(given: DesignLike) -> Design:
     return made.design if isinstance(made, DesignResult) else made
 
 
-def _rivals(given: "TraceResult | PathLike | Sequence[str]", model: Model) -> tuple[str, ...]:
-    """Keys of the effects that are to be told apart."""
+def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:
+    """Keys of the effects that a trace leaves open."""
     if isinstance(given, TraceResult):
         return rivals_of(given.document, model, model.library)
-    if isinstance(given, str | os.PathLike):
-        return read_rivals(Path(given), model, model.library)
-    return tuple(given)
+    return read_rivals(Path(given), model, model.library)
 
 
 def _machine(

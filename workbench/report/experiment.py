@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from rich.console import Group
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
-KINDS = {
+PIECE_NAMES = {
     "steps": "a step there and back",
     "strokes": "a stroke there and back",
     "creep": "a triangle with reversals",
@@ -39,7 +39,7 @@ KINDS = {
     "stairs": "stairs up and down",
     "multisine": "a multisine",
 }
-BAND_POINTS = 600
+EXPERIMENT_BAND_POINTS = 600
 
 
 def reference_text(found: Experiment) -> str:
@@ -138,7 +138,12 @@ def experiment_report(found: Experiment) -> str:
     )
     units = shown(found.motion == "rotary")
     pieces = [
-        (str(i + 1), KINDS[one.kind], f"{one.amplitude:.4g} {units.position}", _rate(found, i))
+        (
+            str(i + 1),
+            PIECE_NAMES[one.kind],
+            f"{one.amplitude:.4g} {units.position}",
+            _rate(found, i),
+        )
         for i, one in enumerate(found.segments)
     ]
     sections = [
@@ -198,8 +203,8 @@ def experiment_figure(found: Experiment) -> "Figure":
 
 def _band(axes: "Axes", t: Array, values: Array) -> None:
     low, high = np.min(values, axis=0), np.max(values, axis=0)
-    at, low = thinned(t, low, BAND_POINTS)
-    on, high = thinned(t, high, BAND_POINTS)
+    at, low = thinned(t, low, EXPERIMENT_BAND_POINTS)
+    on, high = thinned(t, high, EXPERIMENT_BAND_POINTS)
     both = np.union1d(at, on)
     axes.fill_between(both, np.interp(both, at, low), np.interp(both, on, high), color=BAND,
                       alpha=0.45, lw=0, label="machines that it may be")  # fmt: skip

@@ -24,7 +24,7 @@ def pulses(signs: tuple[float, ...], size: float = 0.9) -> tuple[Log, Array]:
     """The motor's run along pulses of its command with rests between, and its velocity."""
     on, off = np.ones(200), np.zeros(250)
     u = np.concatenate([off, *(np.concatenate([s * size * on, off]) for s in signs)])
-    t = H * np.arange(len(u))
+    t = H * np.arange(len(u), dtype=np.float64)
     blank = Log("pulses", {"t": t, "y": np.zeros(len(u)), "F": 35.0 * u, "u": u})
     run = free_run(MOTOR, blank, (0.0, 0.0, 0.0), "command")
     return blank.with_signals(y=run.y), run.v

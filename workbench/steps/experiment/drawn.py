@@ -11,8 +11,11 @@ from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import in_the_loop
 from workbench.steps.drift import model_in_force
 
-LEAST_BAND, USUAL_BAND = 1e-3, 0.03  # of the logs' speed: a band that none has, and a usual one
-UNTOLD = 0.3  # log of a value that no log tells, one sigma
+NO_BAND_SHARE, USUAL_BAND_SHARE = (
+    1e-3,
+    0.03,
+)  # of the logs' speed: a band that none has, and a usual one
+UNTOLD_SPREAD = 0.3  # log of a value that no log tells, one sigma
 
 
 def in_loop(model: Model) -> Plant:
@@ -28,9 +31,9 @@ def lost_bands(model: Model) -> dict[str, float]:
     speed, nine = model.speed or 0.0, model.karnopp
     ways = {"dv_p": (nine.dv_p, 1.0), "dv_n": (nine.dv_n, -1.0)}
     return {
-        name: sign * USUAL_BAND * speed
+        name: sign * USUAL_BAND_SHARE * speed
         for name, (band, sign) in ways.items()
-        if abs(band) < LEAST_BAND * speed
+        if abs(band) < NO_BAND_SHARE * speed
     }
 
 
@@ -44,7 +47,7 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     )
     lost = lost_bands(model)
     assumed = {**_assumed(model, known.untold), **lost}
-    free = np.exp(UNTOLD * rng.standard_normal((count, len(assumed))))
+    free = np.exp(UNTOLD_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
     sets = np.hstack([told, free * np.array(list(assumed.values()))])
     last = {name: i for i, name in enumerate(names)}  # what is assumed stands in for what was lost

@@ -37,10 +37,10 @@ EXPERIMENT_STAGES = {
     "safety": (0.8, 0.85),
     "what it promises": (0.85, 1.0),
 }
-SEARCHED = 1  # drawn plants beside the model's, on which a search looks at every run
-CHECKED = 40  # drawn plants, on which no limit may be exceeded
-PROMISED = 2  # drawn plants beside the model's, whose logs are fitted
-SHOWN = 12  # drawn plants in the picture
+SEARCHED_PLANTS = 1  # drawn plants beside the model's, on which a search looks at every run
+CHECKED_PLANTS = 40  # drawn plants, on which no limit may be exceeded
+PROMISED_PLANTS = 2  # drawn plants beside the model's, whose logs are fitted
+SHOWN_PLANTS = 12  # drawn plants in the picture
 
 
 def experiment(
@@ -56,18 +56,18 @@ def experiment(
     bench = bench_of(model, design)
     search, draw, check, promise = np.random.default_rng(wanted.seed).spawn(4)
     plant = in_loop(model)
-    plants = (plant, *drawn_plants(model, draw, CHECKED))
+    plants = (plant, *drawn_plants(model, draw, CHECKED_PLANTS))
     rivals = _rivals(model, wanted)
     if rivals:
         plants = tuple(_without(one, wanted.rivals) for one in plants)
-    machines = [bench.machine(one, rivals) for one in plants[: 1 + SEARCHED]]
+    machines = [bench.machine(one, rivals) for one in plants[: 1 + SEARCHED_PLANTS]]
     keys = tuple(one.key for one in rivals)
     asked = asked_of(wanted.parameters, unknowns(bench.fitted(plants[0]), bench.drive)[0])
     criterion = separation(machines, keys) if rivals else precision(machines, asked)
     plan = best_run(criterion, limits, bench.loop.h, search, report, keep_going)
     report("safety", 0.0)
     r, safety = made_safe(bench, plants, plan.r, limits, check)
-    promises = promised(bench, plants[: 1 + PROMISED], r, promise, report)
+    promises = promised(bench, plants[: 1 + PROMISED_PLANTS], r, promise, report)
     if all(one.after is None for one in promises):
         raise NotIdentifiable(
             f"{model.card}: no run within the limits tells any parameter ({bench.controller} hardly"
@@ -95,7 +95,7 @@ def experiment(
         remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
         versions=versions(),
         r=_at_rate(r, bench),
-        traces=_traces(bench, plants[: 1 + SHOWN], r),
+        traces=_traces(bench, plants[: 1 + SHOWN_PLANTS], r),
     )
 
 

@@ -13,9 +13,11 @@ from identification.model.estimates import Estimate
 from workbench.documents.model import Model
 
 Criterion = Literal["D", "T"]
-FASTER = 1.5  # times the speed of the logs, that an experiment goes where no limit is given
-STRONGER = 1.2  # the same of the force
-SECONDS = 20.0
+FASTER_THAN_LOGS = (
+    1.5  # times the speed of the logs, that an experiment goes where no limit is given
+)
+STRONGER_THAN_LOGS = 1.2  # the same of the force
+USUAL_SECONDS = 20.0
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class Wanted:
     speed: float | None = None
     force: float | None = None
     command: float | None = None
-    seconds: float = SECONDS
+    seconds: float = USUAL_SECONDS
     seed: int = 0
     rivals: tuple[str, ...] = ()
 
@@ -116,14 +118,14 @@ def limits_of(model: Model, wanted: Wanted) -> MotionLimits:
 
     Raises BadModel where neither says how fast the machine may go.
     """
-    speed = wanted.speed or (FASTER * model.speed if model.speed else None)
+    speed = wanted.speed or (FASTER_THAN_LOGS * model.speed if model.speed else None)
     if speed is None:
         raise BadModel("the model's file does not hold the speed of its logs; give --speed")
     return MotionLimits(
         stroke=wanted.stroke or model.rig.stroke or model.travel,
         speed=speed,
         seconds=wanted.seconds,
-        force=wanted.force or STRONGER * model.force_peak,
+        force=wanted.force or STRONGER_THAN_LOGS * model.force_peak,
         command=wanted.command or math.inf,
     )
 

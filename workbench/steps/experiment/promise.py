@@ -16,8 +16,8 @@ from workbench.documents.model import Model
 from workbench.steps.experiment.machines import Bench
 from workbench.steps.experiment.planned import Promised, Safety, half_width
 
-PASSES = 8  # in which a reference is made smaller until no limit is exceeded
-SMALLER = 0.93  # in each
+SAFETY_PASSES = 8  # in which a reference is made smaller until no limit is exceeded
+SMALLER_SCALE = 0.93  # in each
 
 
 def promised(
@@ -72,14 +72,14 @@ def made_safe(
     """The reference, made smaller about home until none of these plants exceeds a limit."""
     scale = 1.0
     seeds = rng.spawn(len(plants))
-    for _ in range(PASSES):
+    for _ in range(SAFETY_PASSES):
         smaller = limits.home + scale * (r - limits.home)
         worst, exceeding = _extremes(bench, plants, smaller, limits, seeds)
         if worst is not None and exceeding == 0:
             return smaller, Safety(len(plants), worst, 0, scale)
-        scale *= SMALLER
+        scale *= SMALLER_SCALE
     assert worst is not None
-    return smaller, Safety(len(plants), worst, exceeding, scale / SMALLER)
+    return smaller, Safety(len(plants), worst, exceeding, scale / SMALLER_SCALE)
 
 
 def _extremes(

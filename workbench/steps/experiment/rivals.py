@@ -10,7 +10,7 @@ from identification.effects._library import Library
 from identification.errors import BadModel
 from workbench.documents.model import Model
 
-EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
+SAID_EQUAL = re.compile(r"explains as much as (\w+) on these logs")  # as a trace says it of a rival
 
 
 def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
@@ -40,7 +40,7 @@ def rivals_of(found: Mapping[str, Any], model: Model, library: Library) -> tuple
         return tuple(key for key in usable if key not in model.effects)
     keys = [str(one["key"]) for one in found["effects"]]
     for one in found["rivals"]:
-        equal = EQUAL.match(str(one["why_not"]))
+        equal = SAID_EQUAL.match(str(one["why_not"]))
         if equal:
             keys += [equal[1], str(one["key"])]
     return tuple(key for key in dict.fromkeys(keys) if key in library)
