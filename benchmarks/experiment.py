@@ -73,6 +73,7 @@ class Judged:
     seed: int
     kind: str
     seconds: float
+    processor: float
     kept: float
     covered: float
     worst: float
@@ -200,12 +201,13 @@ def judged(seed: int, seconds: float, budget: float) -> Judged:
     """One machine, from its poor log to the figures."""
     one = random_machine(seed)
     model = model_of(one, poor_log(one, seed), seed)
-    begin = time.perf_counter()
+    begin, spent_before = time.perf_counter(), time.process_time()
     end = begin + budget
     plan = experiment(
         model, limits_of(one, seconds), None, quiet, lambda: time.perf_counter() < end
     )
     spent = time.perf_counter() - begin
+    processor = time.process_time() - spent_before
     fit, used = fitted(one, plan.r, seed)
     truth = Plant(one.friction, None if one.kind == "force" else one.drive)
     kept, covered = kept_of(plan, fit, truth)
@@ -213,7 +215,8 @@ def judged(seed: int, seconds: float, budget: float) -> Judged:
     others = [least_certain(fitted(one, r, seed)[0]) for r in rivals(one, plan.limits)]
     exceeded = used.exceeded(plan.limits) if used else ()
     return Judged(
-        seed, one.kind, spent, kept, covered, worst, (worst / others[0], worst / others[1]),
+        seed, one.kind, spent, processor, kept, covered, worst,
+        (worst / others[0], worst / others[1]),
         exceeded, plan.safety.exceeding,
     )  # fmt: skip
 
@@ -234,7 +237,8 @@ def main() -> None:
             continue
         found.append(one)
         print(
-            f"{seed:5d} {one.kind:17s} {one.seconds:5.1f} s  kept {one.kept:4.0%}  covered"
+            f"{seed:5d} {one.kind:17s} {one.seconds:5.1f} s ({one.processor:5.1f} s of a"
+            f" processor)  kept {one.kept:4.0%}  covered"
             f" {one.covered:4.0%}  worst {one.worst:8.2%}  ratio {one.ratios[0]:6.3f} (multisine)"
             f" {one.ratios[1]:6.3f} (steps)  {' '.join(one.exceeded)}",
             flush=True,

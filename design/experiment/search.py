@@ -7,7 +7,6 @@
    whole, as long as it tells more and somebody waits.
 """
 
-import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -108,17 +107,19 @@ def _looked_at(
     every = [one for one in library(limits) if allowed(one, limits, h)]
     # Mixed, so that where the time is short some of each kind have been seen.
     every = [every[i] for i in np.random.default_rng(0).permutation(len(every))]
-    begun = itertools.count()
 
-    def seen_of(one: Segment) -> Seen | None:
-        if next(begun) >= FEWEST_SEGMENTS and not keep_going():
+    def seen_of(i: int) -> Seen | None:
+        if i >= FEWEST_SEGMENTS and not keep_going():
             return None
+        one = every[i]
         r = np.concatenate([np.zeros(round(SEGMENT_DWELL / h)), one.signal(h)])
         return look(limits.home + r)
 
     parts, seen = [], []
     with ThreadPoolExecutor(RUNS_AT_ONCE) as pool:
-        for i, (one, found) in enumerate(zip(every, pool.map(seen_of, every), strict=True)):
+        for i, (one, found) in enumerate(
+            zip(every, pool.map(seen_of, range(len(every))), strict=True)
+        ):
             report("segments", (i + 1) / len(every))
             if found is not None and found.peaks.share_of(limits) <= OF_A_LIMIT:
                 parts.append(one)
