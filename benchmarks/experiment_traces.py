@@ -82,9 +82,9 @@ def judged(seed: int, seconds: float, budget: float) -> bool | None:
     rivals = rivals_of(open_question(first), model, built_in())
     limits = limits_of(case.machine, seconds)
     wanted = Wanted((), limits.stroke, limits.speed, limits.force, None, seconds, seed, rivals)
-    begin = time.perf_counter()
-    plan = experiment(model, wanted, None, quiet, lambda: time.perf_counter() < begin + budget)
-    spent = time.perf_counter() - begin
+    begin = time.process_time()
+    plan = experiment(model, wanted, None, quiet, lambda: time.process_time() < begin + budget)
+    spent = time.process_time() - begin
     rng = stream(seed, "settles")
     run, used = logged(case.machine, plan.r, rng, effects=effects)
     after = traced(case, [before, run])
@@ -92,7 +92,8 @@ def judged(seed: int, seconds: float, budget: float) -> bool | None:
     settled = after.verdict == "effect" and key in found
     print(
         f"{said} -> {after.verdict:11s} {' '.join(found):30s} {'settled' if settled else 'OPEN'}"
-        f"  {spent:5.1f} s, {len(rivals)} rivals {' '.join(used.exceeded(plan.limits))}",
+        f"  {spent:5.1f} s of a processor, {len(rivals)} rivals"
+        f" {' '.join(used.exceeded(plan.limits))}",
         flush=True,
     )
     return settled

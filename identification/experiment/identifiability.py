@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.effects._library import Library
 from identification.errors import UserError
 from identification.estimation.estimates import NORMAL_95
 from identification.estimation.plain_search.actuator_fit import fit_actuator
@@ -17,6 +18,7 @@ from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.run_errors import judge
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.experiment.information import information
+from identification.experiment.structures import looked_for, structures, told_apart
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import GATE_MARGIN, WIDEST_SD
@@ -81,3 +83,23 @@ def first_plant(recorded: RecordedLogs) -> Plant:
         drive = fit_actuator(recorded.plain)
         actuator = Actuator(max(drive.k1, LEAST_SHARE_OF_FIRST), max(drive.k2, 0.0))
     return Plant(Karnopp.from_array(nine), actuator)
+
+
+def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, float]:
+    """By how many deviations of the noise each effect, at a size that matters, would show in the
+    logs' runs beyond what the parameters make up for; those that act by other signals left out.
+
+    Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
+    """
+    plant = first_plant(recorded)
+    y = np.concatenate([log["y"] for log in recorded.plain])
+    stroke = (float(np.min(y)), float(np.max(y)))
+    rivals = [looked_for(one, plant, stroke) for one in library.values() if not one.signals]
+    try:
+        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
+        told = structures(plant, rivals, errors_of, recorded.drive, lost=np.inf)
+    except UserError:
+        return {}
+    own = range(len(told.names) - len(rivals))
+    place = {one.key: len(own) + i for i, one in enumerate(rivals)}
+    return {key: float(np.sqrt(told_apart(told.matrix, at, own))) for key, at in place.items()}

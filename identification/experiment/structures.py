@@ -13,7 +13,13 @@ from identification.arrays import Array
 from identification.effects._base import Acting, Effect, Param
 from identification.estimation.windowed_run.parameters import plant_with
 from identification.estimation.windowed_run.run_errors import soft
-from identification.experiment.information import Errors, Information, lasting_jacobian, unknowns
+from identification.experiment.information import (
+    NOT_FOLLOWED,
+    Errors,
+    Information,
+    lasting_jacobian,
+    unknowns,
+)
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 
@@ -52,15 +58,16 @@ def _is_force(p: Param) -> bool:
 
 
 def structures(
-    plant: Plant, rivals: Sequence[Acting], errors_of: Errors, drive: Drive
-) -> Information:
+    plant: Plant, rivals: Sequence[Acting], errors_of: Errors, drive: Drive,
+    *, lost: float = NOT_FOLLOWED,
+) -> Information:  # fmt: skip
     """What runs tell of the plant's parameters and, behind them, of each rival at its size.
 
-    plant: without the rivals. names: its parameters, then the rivals' keys; one that changes
+    plant: without the rivals; lost: as of `information`. names: its parameters, then the rivals' keys; one that changes
     nothing has zeros.
     """
     names, x, unit = unknowns(plant, drive)
-    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
+    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
     here = errors_of(plant)
     columns = [J]
     for one in rivals:

@@ -2,9 +2,10 @@
 
 import numpy as np
 
+from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
 from identification.estimation.recorded_logs import recorded_logs
-from identification.experiment.identifiability import identifiability
+from identification.experiment.identifiability import identifiability, tellable_effects
 from identification.log import Log, Rig
 from tests.identification.motor_logs import K_A, made
 
@@ -41,3 +42,15 @@ def test_a_short_piece_of_one_way_cannot_tell_the_other() -> None:
     told = identifiability(recorded_logs([one_way], RIG))
     assert not told["F_cn"].can
     assert not told["F_sn"].can
+
+
+def test_an_effect_shows_where_the_motion_calls_for_it() -> None:
+    library = {key: built_in()[key] for key in ("stribeck", "spring", "rising_stiction")}
+    log = made(3)
+    shown = tellable_effects(recorded_logs([log], RIG), library)
+    assert set(shown) == set(library)
+    assert shown["spring"] > 10.0
+    rng = np.random.default_rng(2)
+    noisy = log.with_signals(y=log["y"] + 3e-4 * rng.standard_normal(len(log)))
+    dim = tellable_effects(recorded_logs([noisy], RIG), library)
+    assert dim["spring"] < 0.5 * shown["spring"]

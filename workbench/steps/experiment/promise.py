@@ -6,7 +6,7 @@ import numpy as np
 
 from design.experiment.limits import MotionLimits, Peaks, peaks
 from identification.arrays import Array
-from identification.errors import UserError
+from identification.errors import BadModel, UserError
 from identification.estimation.settling import settled
 from identification.estimation.windowed_run.parameters import names_of, values_of
 from identification.model.estimates import Estimate
@@ -69,17 +69,21 @@ def _estimate(model: Model, name: str) -> Estimate | None:
 def made_safe(
     bench: Bench, plants: Sequence[Plant], r: Array, limits: MotionLimits, rng: np.random.Generator
 ) -> tuple[Array, Safety]:
-    """The reference, made smaller about home until none of these plants exceeds a limit."""
-    scale = 1.0
-    seeds = rng.spawn(len(plants))
+    """The reference, made smaller about home until none of these plants exceeds a limit.
+
+    Raises BadModel where none of them can be followed.
+    """
+    seeds, scale = rng.spawn(len(plants)), 1.0
+    smaller, (worst, exceeding) = r, _extremes(bench, plants, r, limits, seeds)
     for _ in range(SAFETY_PASSES):
+        if exceeding == 0:
+            break
+        scale *= SMALLER_SCALE
         smaller = limits.home + scale * (r - limits.home)
         worst, exceeding = _extremes(bench, plants, smaller, limits, seeds)
-        if worst is not None and exceeding == 0:
-            return smaller, Safety(len(plants), worst, 0, scale)
-        scale *= SMALLER_SCALE
-    assert worst is not None
-    return smaller, Safety(len(plants), worst, exceeding, scale / SMALLER_SCALE)
+    if worst is None:
+        raise BadModel("none of the drawn machines can be simulated in this loop; check the model")
+    return smaller, Safety(len(plants), worst, exceeding, scale)
 
 
 def _extremes(
