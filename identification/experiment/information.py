@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.errors import BadModel
-from identification.estimation.gauss_newton import jacobian, smooth_jacobian
+from identification.estimation.gauss_newton import jacobian
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.windowed_run.parameters import (
     even,
@@ -120,19 +120,6 @@ def lasting_jacobian(
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
     luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_LUCK), axis=1)
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
-
-
-def of_logs(plant: Plant, recorded: RecordedLogs) -> Information:
-    """What recorded logs tell of the plant, as a fit of them would see it.
-
-    Less what the windows' states are unsure of and what the noise of a driving force makes of a
-    run.
-    """
-    errors_of = log_errors(plant, recorded)
-    names, x, unit = unknowns(plant, recorded.drive)
-    J = smooth_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x)
-    J = np.where(np.isfinite(J), J, 0.0)
-    return Information(names, unit, J.T @ J)
 
 
 def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:

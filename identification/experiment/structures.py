@@ -63,8 +63,8 @@ def structures(
 ) -> Information:  # fmt: skip
     """What runs tell of the plant's parameters and, behind them, of each rival at its size.
 
-    plant: without the rivals; lost: as of `information`. names: its parameters, then the rivals' keys; one that changes
-    nothing has zeros.
+    plant: without the rivals; lost: as of `information`. names: the plant's parameters, then the
+    rivals' keys; one that changes nothing has zeros.
     """
     names, x, unit = unknowns(plant, drive)
     J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)

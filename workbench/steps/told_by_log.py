@@ -22,6 +22,8 @@ from identification.model.karnopp import NAMES
 from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
+# Starts and stops with which a fit surely has EVENTS_NEEDED (benchmarks/gate.py, seeds below 1500)
+SURE_CROSSINGS = 4 * EVENTS_NEEDED
 MEND = {
     "m": "add faster reversals, in which inertia matters",
     "F_c": "add slow strokes both ways",
@@ -171,6 +173,11 @@ def _of_nine(name: str, recorded: RecordedLogs, ways: Ways, spread: Mapping[str,
         count = ways.events.breakaways[side]
         return Told(name, True, f"{count} breakaways ({EVENTS_NEEDED} needed)")
     count = ways.events.crossings[side]
+    if count < SURE_CROSSINGS:
+        why = (
+            f"{count} starts and stops, of which a fit may lose some ({SURE_CROSSINGS} to be sure)"
+        )
+        return Told(name, False, why, MEND["dv_"])
     return Told(name, True, f"{count} starts and stops ({EVENTS_NEEDED} needed)")
 
 

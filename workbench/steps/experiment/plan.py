@@ -1,5 +1,6 @@
 """Model and limits -> the run to make next: searched, made safe, and promised."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -66,7 +67,7 @@ def experiment(
     criterion = separation(machines, keys) if rivals else precision(machines, asked)
     plan = best_run(criterion, limits, bench.loop.h, search, report, keep_going)
     report("safety", 0.0)
-    r, safety = made_safe(bench, plants, plan.r, limits, check)
+    r, safety = made_safe(bench, _with_one_each(plants, rivals), plan.r, limits, check)
     promises = promised(bench, plants[: 1 + PROMISED_PLANTS], r, promise, report)
     if all(one.after is None for one in promises):
         raise NotIdentifiable(
@@ -111,6 +112,14 @@ def _rivals(model: Model, wanted: Wanted) -> tuple[Acting, ...]:
 
 def _without(plant: Plant, keys: Sequence[str]) -> Plant:
     return replace(plant, effects=tuple(one for one in plant.effects if one.key not in keys))
+
+
+def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[Plant, ...]:
+    """The plants, each with one of the rivals in turn."""
+    if not rivals:
+        return tuple(plants)
+    turns = itertools.cycle(rivals)
+    return tuple(replace(one, effects=(*one.effects, next(turns))) for one in plants)
 
 
 def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
