@@ -17,7 +17,8 @@ from identification.signals.excitation import Multisine, reference_signal
 
 Kind = Literal["steps", "strokes", "creep", "sine", "sweep", "stairs", "multisine"]
 SEGMENT_DWELL = 0.4  # s of rest after a segment
-STEP_HOLD = 0.5  # s, least time at a level of a step
+STROKE_REST = 0.25  # s at a stroke's end
+STEP_HOLDS = (0.5, 1.2, 2.5)  # s at a level: in the longer ones an integrator begins to hunt
 SINE_FADE = 0.3  # s in which a sine comes and goes
 SWEEP_RATIO = 4.0  # ratio of a sweep's last frequency to its first
 STAIR_STEPS = 4  # steps up, and as many down
@@ -68,13 +69,12 @@ def _line(knots: Array, speed: float, h: float) -> Array:
 
 
 def _steps(amplitude: float, rate: float, h: float) -> Array:
-    return np.concatenate(
-        [np.full(round(1.0 / rate / h), amplitude), np.zeros(round(STEP_HOLD / h))]
-    )
+    held = max(1, round(1.0 / rate / h))
+    return np.concatenate([np.full(held, amplitude), np.zeros(held)])
 
 
 def _strokes(amplitude: float, rate: float, h: float) -> Array:
-    rest = np.zeros(round(0.5 * STEP_HOLD / h))
+    rest = np.zeros(round(STROKE_REST / h))
     out = _line(np.array([0.0, amplitude]), rate, h)
     back = _line(np.array([amplitude, 0.0]), rate, h)
     return np.concatenate([out, rest + amplitude, back])
@@ -136,7 +136,7 @@ def library(limits: MotionLimits) -> Iterator[Segment]:
     reach, fastest = limits.reach, limits.speed
     rates = fastest * np.geomspace(SLOWEST_RATE, 0.9, RATE_COUNT)
     for level in STEP_LEVELS:
-        for hold in (0.5, 1.2):
+        for hold in STEP_HOLDS:
             yield Segment("steps", level * reach, 1.0 / hold)
         for rate in rates[1:]:
             yield Segment("strokes", level * reach, float(rate))
