@@ -726,7 +726,7 @@ def test_gate_margin(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(identifiability, "information", lambda *_a, **_k: told)
         recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
         found = identifiability.identifiability(recorded)
-        assert found["F_cp"].within == pytest.approx(0.005)
+        assert found["F_cp"].within == pytest.approx(0.03)
         return found["m"].can
 
     limit = 0.255 / 3.0
