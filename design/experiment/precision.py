@@ -13,7 +13,6 @@ from identification.arrays import Array, IntArray
 from identification.errors import UserError
 from identification.estimation.estimates import Events, events_of
 from identification.experiment.information import Information
-from identification.model.plant import Plant
 from identification.thresholds import EVENTS_NEEDED
 
 NO_IDEA = 1e3  # relative deviation of what a run says nothing of
@@ -31,7 +30,6 @@ class Machine:
     """A machine in question: what it does along a reference, and what that run tells of it; whole:
     a fit follows its runs as a whole."""
 
-    plant: Plant
     run: Callable[[Array], LoopRun]
     told: Callable[[LoopRun], Information]
     whole: bool

@@ -103,7 +103,7 @@ class Bench:
             return information(own, errors_of, self.drive)
 
         whole = self.by_command and isinstance(plant.actuator, Actuator)
-        return Machine(plant, lambda r: self.run(plant, r), told, whole)
+        return Machine(lambda r: self.run(plant, r), told, whole)
 
 
 def bench_of(model: Model, found: Design | None) -> Bench:
