@@ -73,6 +73,7 @@ VANISHED = 0.99  # of its value, that a mass or friction parameter loses where i
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
+GATE_MARGIN = 3.0  # times the information's deviation, that a log is said to tell a parameter by
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 SURE_OF_SHARE = 6.0  # deviations from 0 of a command's change between the samples of a slow log

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from identification.errors import UserError as UserError
     from workbench.interface.calls import design as design
     from workbench.interface.calls import drift as drift
+    from workbench.interface.calls import experiment as experiment
     from workbench.interface.calls import identify as identify
     from workbench.interface.calls import load_model as load_model
     from workbench.interface.calls import predict as predict
@@ -25,18 +26,20 @@ if TYPE_CHECKING:
     from workbench.interface.calls import validate as validate
     from workbench.interface.effects import check_effects as check_effects
     from workbench.interface.effects import effects as effects
+    from workbench.steps.experiment.planned import Wanted as Wanted
     from workbench.steps.identify_sources import Options as Options
     from workbench.steps.loop_figures import Limits as Limits
 
 _CALLS = "workbench.interface.calls"
 _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
-    **{name: _CALLS for name in ("simulate", "load_model", "read_logs")},
+    **{name: _CALLS for name in ("simulate", "experiment", "load_model", "read_logs")},
     **{name: "workbench.interface.effects" for name in ("effects", "check_effects")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",
     "NotIdentifiable": "identification.errors",
     "UserError": "identification.errors",
+    "Wanted": "workbench.steps.experiment.planned",
     "Options": "workbench.steps.identify_sources",
     "Limits": "workbench.steps.loop_figures",
 }

@@ -35,6 +35,7 @@ COMMANDS = {
     "drift": "Test whether a machine has changed since its model.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
+    "experiment": "Find the run to make next: the reference that tells most.",
     "validate": "Check a design on a plant in simulation.",
     "export": "Write a design as code for its machine: C, PLC, FMU.",
     "simulate": "Make the log of a recipe, its truth beside it.",

@@ -27,7 +27,7 @@ from identification.estimation import contradicted
 from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import is_no_run, leaves_much
 from identification.estimation.gauss_newton import Minimum
-from identification.estimation.recorded_logs import chosen_drive
+from identification.estimation.recorded_logs import chosen_drive, recorded_logs
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -44,6 +44,8 @@ from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
 from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.windows import Freed, Starts
+from identification.experiment import identifiability
+from identification.experiment.information import Information
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
@@ -89,7 +91,7 @@ from identification.tracing.remaining_structure import in_pieces, is_slight, too
 from identification.tracing.result import Dependence, Errors
 from identification.tracing.structure_search import useless
 from identification.tracing.verdict import is_headline, other_law
-from tests.identification.motor_logs import K_A, NOISE, H, plant, seen
+from tests.identification.motor_logs import K_A, NOISE, H, made, plant, seen
 
 N = 100  # rows
 NONE = np.zeros(1)
@@ -719,6 +721,24 @@ def test_frozen_run() -> None:
 
     assert not found(6)
     assert found(10)
+
+
+def test_gate_margin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So many times the information's deviation is what a log is said to tell a parameter by."""
+
+    def can(relative: float) -> bool:
+        names, unit = ("m", "F_cp"), np.array([2.0, 10.0])
+        told = Information(names, unit, np.diag(1.0 / np.array([relative, 1e-6]) ** 2))
+        monkeypatch.setattr(identifiability, "judge", lambda *_a: None)
+        monkeypatch.setattr(identifiability, "information", lambda *_a, **_k: told)
+        recorded = recorded_logs([made(3)], Rig("motor", force_per_command=K_A))
+        found = identifiability.identifiability(recorded)
+        assert found["F_cp"].within == pytest.approx(0.03)
+        return found["m"].can
+
+    limit = 0.255 / 3.0
+    assert can(0.8 * limit)
+    assert not can(1.25 * limit)
 
 
 def test_every_threshold_has_a_test() -> None:

@@ -34,10 +34,15 @@ if TYPE_CHECKING:
     metavar="FILE|URL",
     help="Registry to be asked, without LOG.  [default: WORKBENCH_REGISTRY, if set]",
 )
+@click.option(
+    "--effects-shown", is_flag=True,
+    help="Also which effects of the library the log could show (takes longer).",
+)  # fmt: skip
 @output_options
 def command(
-    log: str | None, card: str | None, where: str | None, as_json: bool, out: Path | None
-) -> int:
+    log: str | None, card: str | None, where: str | None, effects_shown: bool, as_json: bool,
+    out: Path | None,
+) -> int:  # fmt: skip
     """Look a log over before any fit: clock, sensors, bad samples, motion, and what it can tell.
 
     With LOG and --card: which of the nine parameters it can tell and which not, and what run to
@@ -52,10 +57,10 @@ def command(
         raise click.UsageError(
             f"--card is missing: give the card of {log}; 'workbench init {log}' proposes one."
         )
-    return _log(log, card, as_json, out)
+    return _log(log, card, effects_shown, as_json, out)
 
 
-def _log(name: str, card_name: str, as_json: bool, out: Path | None) -> int:
+def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | None) -> int:
     from workbench.cards.card import load_card
     from workbench.logs.fetch import card_path, find_data
     from workbench.report.doctor import doctor_picture, doctor_view
@@ -65,7 +70,7 @@ def _log(name: str, card_name: str, as_json: bool, out: Path | None) -> int:
     card = load_card(card_path(card_name), with_recipe=False)
     path = find_data(name, card)
     with progress("looking", as_json=as_json):
-        found: Examined = examine(path, card)
+        found: Examined = examine(path, card, effects=effects)
     document = doctor_document(found, card.name)
     if out is not None:
         with OutputFolder("doctor", out, now=datetime.now()) as folder:

@@ -21,6 +21,7 @@ import sys
 import time
 from collections.abc import Iterable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -44,13 +45,17 @@ from workbench.interface.inputs import (
     sources,
 )
 from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
-from workbench.interface.loops import DesignResult, ValidateResult
+from workbench.interface.loops import DesignResult, ExperimentResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
 from workbench.output import Bar, progress
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
+from workbench.steps.experiment.plan import EXPERIMENT_STAGES
+from workbench.steps.experiment.plan import experiment as plan_experiment
+from workbench.steps.experiment.planned import Wanted
+from workbench.steps.experiment.rivals import read_rivals, rivals_of
 from workbench.steps.identify_sources import Options, identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
@@ -157,13 +162,35 @@ def validate(
     plant: another machine on which it has to work too; limits: what the judged controller keeps.
     """
     known = _model(model)
-    made = read_design(Path(design)) if isinstance(design, str | os.PathLike) else design
-    made = made.design if isinstance(made, DesignResult) else made
+    made = _design(design)
     other = None if plant is None else _model(plant)
     with _bar("simulating the loop"):
         rng = np.random.default_rng(seed)
         found, traces = validate_design(known, made, rng, plant=other, limits=limits)
     return ValidateResult(found, traces, known.rotary)
+
+
+def experiment(
+    model: ModelLike, *, design: DesignLike | None = None, wanted: Wanted | None = None,
+    rivals: "TraceResult | PathLike | None" = None, budget: float = 30.0,
+) -> ExperimentResult:  # fmt: skip
+    """The run to make next on a machine, as `workbench experiment`.
+
+    design: whose controller moves the machine, by default the model's present one; wanted:
+    parameters, limits, seed, keys of effects that are to be told apart; rivals: a trace that leaves
+    such effects open. budget [s]: end the search after so long. Raises NotIdentifiable where no
+    run within the limits tells anything.
+    """
+    known = _model(model)
+    asked = wanted or Wanted()
+    if rivals is not None:
+        asked = replace(asked, rivals=_rivals(rivals, known))
+    made = None if design is None else _design(design)
+    with _bar("experiment", 1.0) as bar:
+        course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
+        with watched(course):
+            found = plan_experiment(known, asked, made, course.report, course.keep_going)
+    return ExperimentResult(found)
 
 
 def predict(
@@ -267,6 +294,18 @@ def _model(given: ModelLike) -> Model:
         f"{type(given).__name__} found, a model needed: the path of a model.json, or what identify"
         " or trace gave"
     )
+
+
+def _design(given: DesignLike) -> Design:
+    made = read_design(Path(given)) if isinstance(given, str | os.PathLike) else given
+    return made.design if isinstance(made, DesignResult) else made
+
+
+def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:
+    """Keys of the effects that a trace leaves open."""
+    if isinstance(given, TraceResult):
+        return rivals_of(given.document, model, model.library)
+    return read_rivals(Path(given), model, model.library)
 
 
 def _machine(

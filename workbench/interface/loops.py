@@ -1,17 +1,21 @@
-"""Results of `design` and `validate`: controllers, and what they do in the simulated loop."""
+"""Results of `design`, `validate` and `experiment`: controllers, and what a simulated loop does."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
+
 from identification.errors import BadModel
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.interface.result import Part, Result
+from workbench.steps.experiment.planned import Experiment
 from workbench.steps.loop_figures import Traces
 from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
+    import pandas as pd
     from matplotlib.figure import Figure
 
 
@@ -148,3 +152,61 @@ class ValidateResult(Result):
     @property
     def _command(self) -> str:
         return "validate"
+
+
+@dataclass(frozen=True, repr=False)
+class ExperimentResult(Result):
+    """The run to make next, and what it promises."""
+
+    found: Experiment
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.experiment.planned import experiment_document
+
+        return experiment_document(self.found)
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """The reference: t [s] and r, a row a sample of the controller."""
+        import pandas as pd
+
+        r = self.found.r
+        return pd.DataFrame({"t": self.found.h * np.arange(len(r)), "r": r})
+
+    def report(self) -> str:
+        from workbench.report.experiment import experiment_report
+
+        return experiment_report(self.found)
+
+    def plot(self) -> "Figure":
+        from workbench.report.experiment import experiment_figure
+
+        return experiment_figure(self.found)
+
+    def _view(self) -> object:
+        from workbench.report.experiment import experiment_view
+
+        return experiment_view(self.found, None)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.experiment import (
+            PROMISE_HEAD,
+            experiment_lead,
+            experiment_lines,
+            promise_rows,
+        )
+
+        rows, lines = promise_rows(self.found), experiment_lines(self.found)
+        return experiment_lead(self.found), [Part(PROMISE_HEAD, rows, lines)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        from workbench.report.experiment import reference_text
+
+        yield "reference.csv", reference_text(self.found)
+        yield "experiment.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "experiment"

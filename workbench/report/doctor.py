@@ -29,6 +29,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 SCREEN_WIDTH, LABEL_WIDTH = 100, 9
+SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 
@@ -47,9 +48,14 @@ def doctor_view(found: Examined, out: Path | None) -> str:
         lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
                                       f" {ways.rested:.3g} s"])  # fmt: skip
     if found.told:
-        can = ", ".join(one.name for one in found.told if one.can)
+        can = ", ".join(_within(one) for one in found.told if one.can)
         lines += _labelled("told", [can or "nothing"])
     lines += _labelled("not told", _not_told(found.told), 6)
+    if found.effects is not None:
+        shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
+        hidden = [key for key in found.effects if key not in shown]
+        lines += _labelled("effects", [f"would show: {', '.join(shown) or 'none'}",
+                                       f"would not: {', '.join(hidden) or 'none'}"])  # fmt: skip
     lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
     lines += _labelled("note", [_plain(found, one) for one in found.remarks])
     if found.refused:
@@ -57,6 +63,11 @@ def doctor_view(found: Examined, out: Path | None) -> str:
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
     return "\n".join(lines)
+
+
+def _within(one: Told) -> str:
+    """A parameter, and within what share of its value it can be told."""
+    return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
 
 def _verdict(found: Examined) -> str:

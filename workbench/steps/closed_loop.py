@@ -113,6 +113,13 @@ def run_driven(
     nothing for it to drive, or the other way round.
     """
     plant = replace(machine.simulated, effects=in_the_loop(machine))
+    return run_plant(machine, plant, loop, r, _noise(machine, len(r), rng))
+
+
+def run_plant(
+    machine: Model, plant: Plant, loop: DrivenLoop, r: Array, noise: LoopNoise | None
+) -> ServoRun:
+    """`run_driven` of a plant in place of the machine's own, on the same rig."""
     direct = isinstance(plant.actuator, Actuator) and loop.direct
     if isinstance(plant.actuator, Actuator):
         if loop.force is None and not direct:
@@ -124,8 +131,8 @@ def run_driven(
         replace(loop, direct=direct),
         limit_on(machine, loop),
         r,
-        _noise(machine, len(r), rng),
-        _chambers(machine.rig),
+        noise,
+        chambers(machine.rig),
     )
 
 
@@ -169,7 +176,7 @@ def _noise(machine: Model, n: int, rng: np.random.Generator | None) -> LoopNoise
 
 def in_the_loop(machine: Model) -> tuple[Acting, ...]:
     """The machine's effects that its simulated loop has: those whose signals it makes."""
-    made = _chambers(machine.rig)
+    made = chambers(machine.rig)
     return tuple(one for one in machine.acting if set(one.effect.signals) <= set(made))
 
 
@@ -182,7 +189,7 @@ def effects_left_out(machine: Model) -> str | None:
     return f"simulated without the model's effects {', '.join(missing)}"
 
 
-def _chambers(rig: Rig) -> dict[str, OfForce]:
+def chambers(rig: Rig) -> dict[str, OfForce]:
     """Chamber pressures of an electro-pneumatic rig, their mean half the supply's."""
     if rig.kind != "electro-pneumatic" or not (rig.area_p and rig.area_n and rig.supply_pressure):
         return {}

@@ -5,7 +5,7 @@ whether a parameter can be told is asked of the same thresholds, with the events
 motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
+from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.recorded_logs import (
     RecordedLogs,
@@ -23,6 +24,7 @@ from identification.estimation.recorded_logs import (
 )
 from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
 from identification.estimation.regression.three_step import first_estimate
+from identification.experiment.identifiability import tellable_effects
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.model.plant import units_of
@@ -93,8 +95,9 @@ class Examined:
     """What a log shows before any fit.
 
     told: what each parameter of the model can be known by, by name; add: runs that would tell the
-    rest; refused: why `identify` would not take the log, empty where it would. log and motion:
-    the first run, for the picture; None where the log is refused before.
+    rest; effects: by how many deviations of the noise each would show at a size that matters, None
+    where that was not asked; refused: why `identify` would not take the log, empty where it would.
+    log and motion: the first run, for the picture; None where the log is refused before.
     """
 
     file: str
@@ -112,6 +115,7 @@ class Examined:
     times: Array = field(repr=False)
     log: Log | None = field(default=None, repr=False)
     motion: Motion | None = field(default=None, repr=False)
+    effects: Mapping[str, float] | None = None
 
     @property
     def verdict(self) -> str:
@@ -122,8 +126,8 @@ class Examined:
         return "ready" if all(can) else "in part" if any(can) else "nothing"
 
 
-def examine(path: Path, card: Card) -> Examined:
-    """What the log in the file shows, read by its card.
+def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
+    """What the log in the file shows, read by its card; effects: also which effects it could show.
 
     A log that `identify` would refuse is looked at as far as it goes. Raises BadLog or BadCard
     where the file cannot be read at all.
@@ -145,7 +149,7 @@ def examine(path: Path, card: Card) -> Examined:
         runs = _as_far_as_it_goes(raw, path, card)
     log = max(runs, key=len) if runs else None
     bad += [one for name in LIMITED if name in raw for one in limits(raw, name)]
-    found = _moved(runs, rig) if runs and not refused else _Moved(reason=refused)
+    found = _moved(runs, rig, effects) if runs and not refused else _Moved(reason=refused)
     if log is not None and not refused:
         remarks += log_remarks(runs, rig, card.signals)
     return Examined(
@@ -164,6 +168,7 @@ def examine(path: Path, card: Card) -> Examined:
         times=raw["t"],
         log=log,
         motion=found.motion,
+        effects=found.effects,
     )
 
 
@@ -184,9 +189,10 @@ class _Moved:
     told: tuple[Told, ...] = ()
     reason: str = ""
     remarks: tuple[str, ...] = ()
+    effects: Mapping[str, float] | None = None
 
 
-def _moved(runs: Sequence[Log], rig: Rig) -> _Moved:
+def _moved(runs: Sequence[Log], rig: Rig, effects: bool) -> _Moved:
     """Motion, directions and what they tell of each parameter."""
     log = max(runs, key=len)
     motion = differentiate(log["y"], log.h)
@@ -209,7 +215,10 @@ def _moved(runs: Sequence[Log], rig: Rig) -> _Moved:
     always = constant_force(recorded.plain, held=recorded.held)
     unit = units_of(rig.motion)["F_cp"]
     said = () if always is None else (constant_remark(always, unit),)
-    return _Moved(motion, ways, told, remarks=said)
+    shown = None
+    if effects and not led_by_rig(recorded):
+        shown = tellable_effects(recorded, built_in())
+    return _Moved(motion, ways, told, remarks=said, effects=shown)
 
 
 def _actuator_follows(recorded: RecordedLogs) -> bool | None:
@@ -288,8 +297,9 @@ def doctor_document(found: Examined, card: str) -> dict[str, Any]:
         "bad_samples": [one.as_json() for one in found.bad],
         "delays": [asdict(one) for one in found.delays],
         "motion": None if found.ways is None else asdict(found.ways),
-        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None}
-                 for one in found.told},
+        "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None,
+                            "within": one.within} for one in found.told},
+        "effects": found.effects,
         "add": found.add,
         "remarks": found.remarks,
     }  # fmt: skip

@@ -1,7 +1,7 @@
 """What the motion in a log can tell of each parameter, by the thresholds of the estimates."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,14 +17,19 @@ from identification.estimation.regression.equation_rows import (
     stacked,
 )
 from identification.estimation.regression.standstill import Breakaways
+from identification.experiment.identifiability import Tellable, identifiability
 from identification.model.karnopp import NAMES
 from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
+# Starts and stops with which a fit surely has EVENTS_NEEDED (benchmarks/gate.py, seeds below 1500)
+SURE_CROSSINGS = 4 * EVENTS_NEEDED
 MEND = {
     "m": "add faster reversals, in which inertia matters",
     "F_c": "add slow strokes both ways",
     "F_v": "add strokes at other speeds, at least four times apart",
+    "dv_": "add starts and stops, and log them faster",
+    "F_s": "add slow reversals, each after a rest",
     "k": "log the command while it moves the body",
 }
 
@@ -56,12 +61,16 @@ class Ways:
 
 @dataclass(frozen=True)
 class Told:
-    """Whether a parameter can be told, why (not), and what to add where it cannot."""
+    """Whether a parameter can be told, why (not), and what to add where it cannot.
+
+    within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
+    """
 
     name: str
     can: bool
     why: str
     add: str = ""
+    within: float | None = None
 
 
 def ways_of(
@@ -121,8 +130,8 @@ def told_by(
     if imposed:
         out = _along_a_path(recorded)
     else:
-        spread = _spreads(recorded)
-        out = [_of_nine(name, recorded, ways, spread) for name in NAMES]
+        spread, run = _spreads(recorded), identifiability(recorded)
+        out = [_by_run(_of_nine(n, recorded, ways, spread), run.get(n)) for n in NAMES]
     if actuator is not None:
         why = (
             "the force follows the command as a linear actuator's"
@@ -133,6 +142,18 @@ def told_by(
     elif not recorded.held:
         out += [Told(name, False, "no command is logged", MEND["k"]) for name in ("k1", "k2")]
     return tuple(out)
+
+
+def _by_run(one: Told, run: Tellable | None) -> Told:
+    """What the counts say, and how well the free run would tell it."""
+    if run is None or not one.can:
+        return one
+    if not run.can:
+        key = one.name if one.name in MEND else one.name[:3]
+        size = "by more than its size" if not run.within < 1.0 else f"by {run.within:.0%}"
+        return Told(one.name, False, f"its free run leaves it unsure {size}", MEND[key])
+    return replace(one, why=f"{one.why}; within {run.within:.1%} of it by the free run",
+                   within=run.within)  # fmt: skip
 
 
 def _of_nine(name: str, recorded: RecordedLogs, ways: Ways, spread: Mapping[str, float]) -> Told:
@@ -152,6 +173,11 @@ def _of_nine(name: str, recorded: RecordedLogs, ways: Ways, spread: Mapping[str,
         count = ways.events.breakaways[side]
         return Told(name, True, f"{count} breakaways ({EVENTS_NEEDED} needed)")
     count = ways.events.crossings[side]
+    if count < SURE_CROSSINGS:
+        why = (
+            f"{count} starts and stops, of which a fit may lose some ({SURE_CROSSINGS} to be sure)"
+        )
+        return Told(name, False, why, MEND["dv_"])
     return Told(name, True, f"{count} starts and stops ({EVENTS_NEEDED} needed)")
 
 

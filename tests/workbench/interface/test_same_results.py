@@ -150,6 +150,19 @@ def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:
     assert not strict.passed
 
 
+def test_experiment(bench: Bench, model: Any, tmp_path: Path) -> None:
+    design = bench.path("design/design.json")
+    arguments = (bench.path("model/model.json"), "--design", design, "--time", "6")
+    folder = bench.ran("next", "experiment", *arguments, "--budget", "0.001", "--seed", "3")
+    wanted = wb.Wanted(seconds=6.0, seed=3)
+    found = wb.experiment(bench.path("model/model.json"), design=design, wanted=wanted, budget=1e-3)
+    out = found.save(tmp_path / "saved")
+    for name in ("reference.csv", "experiment.json", "report.html"):
+        assert (out / name).read_text("utf-8") == (folder / name).read_text("utf-8"), name
+    assert found.frame["r"].to_numpy() == pytest.approx(found.found.r)
+    shown_well(found, "parameters told by a run of")
+
+
 def test_predict(bench: Bench, model: Any, tmp_path: Path) -> None:
     arguments = ("predict", bench.path("model/model.json"), bench.path("day2.csv"))
     card = ("--card", bench.path("card.toml"), "--window", "1")

@@ -1,0 +1,72 @@
+"""The run that tells apart the effects of which a machine may have one: T-optimal."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from design.experiment.allocation import t_optimal
+from design.experiment.precision import Machine, looked_at, stacked, told_by
+from design.experiment.search import Criterion, Joint, Seen
+from identification.arrays import Array
+from identification.experiment.information import Information
+from identification.experiment.structures import NO_EFFECT, told_apart
+
+NEGLIGIBLE_CHANGE = 1.0  # square in units of the noise, beside which a difference begins to tell
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Places, in the information, of an effect, of all that its rival can change instead, and both
+    names."""
+
+    one: int
+    others: tuple[int, ...]
+    names: tuple[str, str]
+
+
+def pairs_of(told: Information, keys: Sequence[str]) -> tuple[Pair, ...]:
+    """Each effect against none, and against each other one, the plant's parameters being free."""
+    own = tuple(i for i, name in enumerate(told.names) if name not in keys)
+    place = {name: told.names.index(name) for name in keys}
+    out = []
+    for one in keys:
+        out.append(Pair(place[one], own, (one, NO_EFFECT)))
+        out += [Pair(place[one], (*own, place[k]), (one, k)) for k in keys if k != one]
+    return tuple(out)
+
+
+def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
+    """The criterion: the mean, over pairs and machines, of the log of what tells them apart."""
+
+    def value_of(matrix: Array, pairs: Sequence[Pair]) -> float:
+        left = [told_apart(matrix, one.one, one.others) for one in pairs]
+        return float(np.mean(np.log(np.array(left) + NEGLIGIBLE_CHANGE)))
+
+    def look(r: Array) -> Seen | None:
+        found = looked_at(machines, r)
+        if found is None:
+            return None
+        worst, told, _ = found
+        pairs = pairs_of(told[0], keys)
+        values = [
+            value_of(own.matrix, pairs) - one.luck(own)
+            for one, own in zip(machines, told, strict=True)
+        ]
+        return Seen(worst, min(values), told)
+
+    def joint(seen: Sequence[Seen]) -> Joint:
+        told = told_by(seen)
+        pairs, matrices = pairs_of(told[0][0], keys), stacked(told)
+
+        def measure(times: Array) -> float:
+            return value_of(np.tensordot(times, matrices[0], 1), pairs)
+
+        def value(times: Array) -> float:
+            return min(value_of(np.tensordot(times, M, 1), pairs) for M in matrices)
+
+        return Joint(
+            lambda seconds, room: t_optimal(matrices[0], pairs, seconds, room), measure, value
+        )
+
+    return Criterion(look, joint)

@@ -1,0 +1,102 @@
+"""The gate before a fit: how well a log can tell each parameter, by its run at a first estimate.
+
+No fit is made. The equations and the breakaways give a first plant; the sensitivities of its run,
+in windows from measured states, are the information that the log holds. Bands and stick limits of
+a first plant may be far off, so what is promised is wider than the information alone would have it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.effects._library import Library
+from identification.errors import UserError
+from identification.estimation.estimates import NORMAL_95
+from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.windowed_run.run_errors import judge
+from identification.estimation.windowed_run.windows import RUN_WINDOW
+from identification.experiment.information import information
+from identification.experiment.structures import looked_for, structures, told_apart
+from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
+from identification.model.plant import Actuator, Motor, Plant
+from identification.thresholds import GATE_MARGIN, WIDEST_SD
+
+# Half intervals over the value, below which nothing is promised: what a fit gives that loses a
+# stop, where an actuator's command brings the run back to the log, and where nothing does
+# (benchmarks/gate.py, seeds below 1500).
+NO_SURER = {
+    "m": 0.01, "F_c": 0.005, "F_v": 0.005, "dv_": 0.05, "F_s": 0.01, "k1": 0.002, "k2": 0.002,
+}  # fmt: skip
+NO_SURER_LOOSE = {"m": 0.1, "F_c": 0.03, "F_v": 0.04, "dv_": 0.12, "F_s": 0.01}
+LEAST_SHARE_OF_FIRST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
+
+
+@dataclass(frozen=True)
+class Tellable:
+    """Half the 95 % interval, over the value, that a fit should give at most; infinite where the
+    run says nothing. can: whether that is narrow enough to be told at all."""
+
+    name: str
+    within: float
+
+    @property
+    def can(self) -> bool:
+        """Whether an estimate of it would be given."""
+        return self.within <= NORMAL_95 * WIDEST_SD
+
+
+def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
+    """How well logs can tell each of the nine, and k1 and k2 where a command drives their runs.
+
+    Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
+    """
+    plant = first_plant(recorded)
+    try:
+        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
+        told = information(plant, errors_of, recorded.drive, lost=np.inf)
+    except UserError:
+        return {}
+    relative = np.sqrt(np.diag(told.covariance)) / told.unit
+    least = NO_SURER if recorded.by_command else NO_SURER_LOOSE
+    return {
+        name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]]))
+        for name, sd in zip(told.names, relative, strict=True)
+    }
+
+
+def first_plant(recorded: RecordedLogs) -> Plant:
+    """The plant that equations, breakaways and stops give, the median over the logs."""
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = np.median(found, axis=0)
+    least = LEAST_SHARE_OF_FIRST * max(float(np.max(np.abs(nine))), 1e-300)
+    signs = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])
+    nine = signs * np.maximum(signs * nine, least)
+    actuator: Actuator | Motor | None = None
+    if recorded.held:
+        actuator = Motor(recorded.rig.force_per_command or 1.0)
+    elif recorded.by_command:
+        drive = fit_actuator(recorded.plain)
+        actuator = Actuator(max(drive.k1, LEAST_SHARE_OF_FIRST), max(drive.k2, 0.0))
+    return Plant(Karnopp.from_array(nine), actuator)
+
+
+def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, float]:
+    """By how many deviations of the noise each effect, at a size that matters, would show in the
+    logs' runs beyond what the parameters make up for; those that act by other signals left out.
+
+    Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
+    """
+    plant = first_plant(recorded)
+    y = np.concatenate([log["y"] for log in recorded.plain])
+    stroke = (float(np.min(y)), float(np.max(y)))
+    rivals = [looked_for(one, plant, stroke) for one in library.values() if not one.signals]
+    try:
+        errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
+        told = structures(plant, rivals, errors_of, recorded.drive, lost=np.inf)
+    except UserError:
+        return {}
+    own = range(len(told.names) - len(rivals))
+    place = {one.key: len(own) + i for i, one in enumerate(rivals)}
+    return {key: float(np.sqrt(told_apart(told.matrix, at, own))) for key, at in place.items()}

@@ -1,0 +1,169 @@
+"""Fisher information of a plant's parameters in a run, by the exact simulation.
+
+Residuals in units of the sensors' noise have the sensitivities J with the parameters, these in
+units of their own values; J'J is then the information, and its inverse the covariance that no
+unbiased estimator beats (Cramer, Rao). Stops and breakaways are in it as the exact run has them: a
+stick limit shows in nothing but when the body leaves.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.errors import BadModel
+from identification.estimation.gauss_newton import jacobian
+from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.windowed_run.parameters import (
+    even,
+    names_of,
+    plant_with,
+    units_in,
+    values_of,
+)
+from identification.estimation.windowed_run.refinement import MOTOR_WINDOW
+from identification.estimation.windowed_run.run_errors import CANNOT_BE_FOLLOWED, judge
+from identification.estimation.windowed_run.windows import RUN_WINDOW, WHOLE, walks
+from identification.log import Log
+from identification.model.estimates import Drive
+from identification.model.plant import Motor, Plant
+from identification.simulation.free_run import free_run
+
+Errors = Callable[[Plant], Array]
+NO_INFORMATION = 1e-9  # of the largest, an eigenvalue of the information that is rounding
+LEAST_NOISE = 1e-12  # N or m, of a signal that is taken to be exact
+LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to be counted on
+LASTING_SHARE = 0.1  # of a sensitivity, by which it may differ to either side over that step
+BY_LUCK = 3.0  # in units of the noise, difference of both sides from which a run hangs on luck
+NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which it is not followed
+
+
+@dataclass(frozen=True, eq=False)
+class Information:
+    """What runs tell of a plant's parameters `names` (d,).
+
+    unit (d,): sizes in which the parameters are counted; matrix (d, d): J'J in these units; loose:
+    share of the samples in which the run hangs on luck. Runs of their own add up.
+    """
+
+    names: tuple[str, ...]
+    unit: Array
+    matrix: Array
+    loose: float = 0.0
+
+    def __add__(self, other: "Information") -> "Information":
+        """Of both runs together, in the units of this one; they have the same names."""
+        ratio = self.unit / other.unit
+        both = self.matrix + other.matrix * np.outer(ratio, ratio)
+        return Information(self.names, self.unit, both, max(self.loose, other.loose))
+
+    @property
+    def covariance(self) -> Array:
+        """Least covariance (d, d) of the parameters' errors, in their units squared; infinite on
+        the diagonal where the runs say nothing."""
+        size = np.sqrt(np.maximum(np.diag(self.matrix), 0.0))
+        silent = size <= 0.0
+        scale = np.where(silent, 1.0, size)
+        values, vectors = np.linalg.eigh(self.matrix / np.outer(scale, scale))
+        kept = values > NO_INFORMATION * max(float(values[-1]), 1e-300)
+        inverse = (vectors[:, kept] / values[kept]) @ vectors[:, kept].T
+        # A direction without information makes every parameter in it unknown.
+        lost = silent | (np.sum(vectors[:, ~kept] ** 2, axis=1) > NO_INFORMATION)
+        out = inverse * np.outer(self.unit / scale, self.unit / scale)
+        out[lost, lost] = np.inf
+        return np.asarray(out)
+
+    @property
+    def sd(self) -> dict[str, float]:
+        """Least standard deviations by name, infinite where the runs say nothing."""
+        return dict(zip(self.names, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
+
+
+def information(
+    plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = NOT_FOLLOWED
+) -> Information:
+    """What the runs with these errors (n,), in units of the sensors' noise, tell of the plant, as
+    far as it is to be counted on (`lasting_jacobian`).
+
+    lost: error of the plant itself from which a sample says nothing. A shape of an effect that is
+    at its default is not asked for, as in a fit.
+    """
+    names, x, unit = unknowns(plant, drive)
+    J, loose = lasting_jacobian(lambda at: errors_of(plant_with(plant, names, at * unit)), x, lost)
+    return Information(names, unit, J.T @ J, loose)
+
+
+def unknowns(plant: Plant, drive: Drive) -> tuple[tuple[str, ...], Array, Array]:
+    """Names (d,) of what a fit would look for, their values in units of their sizes, and these."""
+    held = even(plant)
+    names = tuple(name for name in names_of(plant, drive) if name not in held)
+    values = values_of(plant, names)
+    unit = units_in(plant, names, values)
+    return names, values / unit, unit
+
+
+def lasting_jacobian(
+    fun: Callable[[Array], Array], x: Array, lost: float = NOT_FOLLOWED
+) -> tuple[Array, float]:
+    """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, else 0, and
+    the share of `fun`'s values that hang on luck.
+
+    Where a stop turns on next to nothing, a run depends on a parameter beyond all measure, but only
+    within next to nothing: no fit finds the parameter by that, and many find a wrong one.
+    """
+    here = fun(x)
+    up = jacobian(fun, x, here, LASTING_STEP)
+    down = -jacobian(lambda at: fun(2.0 * x - at), x, here, LASTING_STEP)
+    apart = np.abs(up - down)
+    lasts = apart <= LASTING_SHARE * np.maximum(np.abs(up), np.abs(down))
+    lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
+    luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_LUCK), axis=1)
+    return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
+
+
+def log_errors(plant: Plant, recorded: RecordedLogs) -> Errors:
+    """Errors of plants like this one along recorded logs, in the windows in which a fit would
+    follow them: whole runs where the command alone drives them."""
+    steady = recorded.drive == "command" and not any(
+        walks(one, recorded.drive) for one in recorded.logs
+    )
+    longest = MOTOR_WINDOW if isinstance(plant.actuator, Motor) else WHOLE
+    seconds = longest if steady else RUN_WINDOW
+    return judge(plant, recorded.logs, recorded.drive, seconds)
+
+
+def run_errors(log: Log, body: Array, rests: IntArray, noise_y: float, noise_F: float) -> Errors:
+    """Errors of runs by the command, begun anew at rests, in units of the noise [m], [N].
+
+    log: without noise; body (n,): its position [m], of which y is what the transducer shows; rests
+    (k,): samples at which it surely rests, the first among them. F counts where an actuator makes
+    it.
+    """
+    sd_y, sd_F = max(noise_y, LEAST_NOISE), max(noise_F, LEAST_NOISE)
+    y, F = np.asarray(log["y"]), np.asarray(log["F"])
+    start = (float(body[0]), 0.0, float(F[0]))
+    again = (rests, body[rests], np.zeros(len(rests)), F[rests])
+
+    def errors_of(plant: Plant) -> Array:
+        with_force = not isinstance(plant.actuator, Motor)
+        try:
+            run = free_run(plant, log, start, "command", restarts=again)
+        except BadModel:
+            return np.full(len(log) * (2 if with_force else 1), CANNOT_BE_FOLLOWED)
+        position = (run.shown - y) / sd_y
+        return np.concatenate([position, (run.F - F) / sd_F]) if with_force else position
+
+    return errors_of
+
+
+def rests_of(v: Array, h: float, seconds: float = RUN_WINDOW) -> IntArray:
+    """Samples (k,) at rest, about so many seconds apart or more, of a run of velocity v [m/s], (n,)
+    that begins at rest."""
+    still = np.flatnonzero(v == 0.0)
+    out, step = [0], round(seconds / h)
+    while True:
+        after = still[still >= out[-1] + step]
+        if not len(after):
+            return np.array(out, dtype=np.int64)
+        out.append(int(after[0]))

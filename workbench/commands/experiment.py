@@ -1,0 +1,108 @@
+"""`workbench experiment`: a model -> the run to make next, as CSV, JSON and a page."""
+
+import time
+from datetime import datetime
+from pathlib import Path
+
+import click
+
+from workbench.course import Course, watched
+from workbench.options import POSITIVE, Finite, effects_option, present_card_option
+from workbench.output import OutputFolder, emit, output_options, progress
+
+SEARCH_SECONDS = 30.0
+
+
+@click.command(
+    epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20"
+)
+@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
+@click.option(
+    "--design", "design_file", type=click.Path(path_type=Path), metavar="DESIGN",
+    help="A design whose recommended controller moves the machine.  [default: its present one]",
+)  # fmt: skip
+@click.option(
+    "--parameters", metavar="NAME,...",
+    help="Parameters that are to be told, as m,F_cp,dv_p.  [default: all]",
+)  # fmt: skip
+@click.option(
+    "--stroke", type=(Finite(), Finite()), metavar="LOW HIGH",
+    help="Positions between which it may move [m, rad].  [default: the card's, or the logs']",
+)  # fmt: skip
+@click.option(
+    "--speed", type=POSITIVE, help="Largest speed [m/s, rad/s].  [default: 1.5 times the logs']"
+)
+@click.option(
+    "--force", type=POSITIVE, help="Largest force [N, N m].  [default: 1.2 times the logs']"
+)
+@click.option("--command", "limit", type=POSITIVE, help="Largest command.  [default: any]")
+@click.option(
+    "--time", "seconds", type=Finite(min=2, max=600), default=20.0, show_default=True,
+    help="How long the run lasts [s].",
+)  # fmt: skip
+@click.option(
+    "--rivals", "trace_file", type=click.Path(path_type=Path), metavar="TRACE",
+    help="trace.json whose rivals (or, of an unknown effect, all of the library) the run is to tell"
+    " apart.",
+)  # fmt: skip
+@click.option(
+    "--budget", type=POSITIVE, default=SEARCH_SECONDS, show_default=True, metavar="SECONDS",
+    help="End the search after so long with the best so far; the first Ctrl-C does the same.",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@present_card_option
+@effects_option
+@output_options
+def command(
+    model_file: Path,
+    design_file: Path | None,
+    parameters: str | None,
+    stroke: tuple[float, float] | None,
+    speed: float | None,
+    force: float | None,
+    limit: float | None,
+    seconds: float,
+    trace_file: Path | None,
+    budget: float,
+    seed: int,
+    card: str | None,
+    effects: tuple[Path, ...],
+    as_json: bool,
+    out: Path | None,
+) -> int:
+    """Find the run to make next: the reference, within the machine's limits, that tells most.
+
+    Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
+    report.html. The run begins with the machine at rest at the first r. Exit status 1: a simulated
+    machine, drawn from what is not sure of the model, exceeds a limit.
+    """
+    from workbench.cards.own_effects import library
+    from workbench.documents.design import read_design
+    from workbench.documents.model import read_model
+    from workbench.report.experiment import experiment_report, experiment_view, reference_text
+    from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment
+    from workbench.steps.experiment.planned import Wanted, experiment_document
+    from workbench.steps.experiment.rivals import read_rivals
+    from workbench.steps.present import with_card
+
+    known = library(effects)
+    model = with_card(read_model(model_file, known), card)
+    design = read_design(design_file) if design_file else None
+    names = tuple(name.strip() for name in (parameters or "").split(",") if name.strip())
+    rivals = read_rivals(trace_file, model, known) if trace_file else ()
+    wanted = Wanted(names, stroke, speed, force, limit, seconds, seed, rivals)
+    with OutputFolder("experiment", out, now=datetime.now()) as folder:
+        with progress("experiment", 1.0, as_json=as_json) as bar:
+            course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
+            with watched(course):
+                found = experiment(model, wanted, design, course.report, course.keep_going)
+        document = experiment_document(found)
+        folder.write_json("experiment.json", document)
+        folder.write_text("reference.csv", reference_text(found))
+        folder.write_text("report.html", experiment_report(found))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: experiment_view(found, folder.final),
+    )
+    return 1 if found.safety.exceeding else 0

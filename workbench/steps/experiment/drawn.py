@@ -1,0 +1,70 @@
+"""A model's machine as it is thought to be, and as it may be: plants drawn by what is not sure."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from identification.estimation.windowed_run.parameters import plant_with
+from identification.model.plant import Plant
+from workbench.documents.model import Model, used
+from workbench.steps.closed_loop import in_the_loop
+from workbench.steps.drift import model_in_force
+
+NO_BAND_SHARE, USUAL_BAND_SHARE = (
+    1e-3,
+    0.03,
+)  # of the logs' speed: a band that none has, and a usual one
+UNTOLD_SPREAD = 0.3  # log of a value that no log tells, one sigma
+
+
+def in_loop(model: Model) -> Plant:
+    """The plant as its simulated loop has it; a band that is next to none is taken for one that no
+    log told, whatever its interval."""
+    plant = replace(model.simulated, effects=in_the_loop(model))
+    lost = lost_bands(model)
+    return plant_with(plant, tuple(lost), np.array(list(lost.values()))) if lost else plant
+
+
+def lost_bands(model: Model) -> dict[str, float]:
+    """Bands narrower than a thousandth of the logs' speed, with what is assumed in their place."""
+    speed, nine = model.speed or 0.0, model.karnopp
+    ways = {"dv_p": (nine.dv_p, 1.0), "dv_n": (nine.dv_n, -1.0)}
+    return {
+        name: sign * USUAL_BAND_SHARE * speed
+        for name, (band, sign) in ways.items()
+        if abs(band) < NO_BAND_SHARE * speed
+    }
+
+
+def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Plant, ...]:
+    """Plants drawn from the errors of the model's parameters; those that no log tells within a
+    third of what is assumed."""
+    known = model_in_force(model, "")
+    plant = in_loop(model)
+    told = rng.multivariate_normal(
+        known.values, known.covariance, count, check_valid="ignore", method="svd"
+    )
+    lost = lost_bands(model)
+    assumed = {**_assumed(model, known.untold), **lost}
+    free = np.exp(UNTOLD_SPREAD * rng.standard_normal((count, len(assumed))))
+    names = (*known.names, *assumed)
+    sets = np.hstack([told, free * np.array(list(assumed.values()))])
+    last = {name: i for i, name in enumerate(names)}  # what is assumed stands in for what was lost
+    kept = [i for name, i in last.items() if _is_of(plant, name)]
+    return tuple(plant_with(plant, [names[i] for i in kept], row[kept]) for row in sets)
+
+
+def _is_of(plant: Plant, name: str) -> bool:
+    """Whether a parameter is of a plant: of its friction, actuator or of an effect that it has."""
+    return "." not in name or name.split(".")[0] in {one.key for one in plant.effects}
+
+
+def _assumed(model: Model, untold: Mapping[str, str]) -> dict[str, float]:
+    """Values that simulations use of the friction and actuator parameters that no log tells."""
+    every = {**model.friction, **(model.actuator or {})}
+    return {
+        name: used(one)
+        for name, one in every.items()
+        if name in untold and name != "k_a" and used(one) != 0.0
+    }

@@ -1,0 +1,169 @@
+"""Model and limits -> the run to make next: searched, made safe, and promised."""
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from design.experiment.precision import looked_at, precision
+from design.experiment.search import best_run
+from design.experiment.separation import pairs_of, separation
+from identification.arrays import Array
+from identification.effects._base import Acting
+from identification.errors import NotIdentifiable
+from identification.experiment.information import Information, unknowns
+from identification.experiment.structures import looked_for, told_apart
+from identification.model.plant import Plant
+from identification.progress import KeepGoing, Progress
+from workbench.cards.effect_values import known_effect
+from workbench.documents.design import Design
+from workbench.documents.model import Model, versions
+from workbench.steps.closed_loop import effects_left_out
+from workbench.steps.experiment.drawn import drawn_plants, in_loop
+from workbench.steps.experiment.machines import Bench, asked_of, bench_of
+from workbench.steps.experiment.planned import (
+    Experiment,
+    Separation,
+    Traces,
+    Wanted,
+    limits_of,
+)
+from workbench.steps.experiment.promise import made_safe, promised
+
+EXPERIMENT_STAGES = {
+    "segments": (0.0, 0.35),
+    "sharing the time": (0.35, 0.4),
+    "whole runs": (0.4, 0.8),
+    "safety": (0.8, 0.85),
+    "what it promises": (0.85, 1.0),
+}
+SEARCHED_PLANTS = 1  # drawn plants beside the model's, on which a search looks at every run
+CHECKED_PLANTS = 40  # drawn plants, on which no limit may be exceeded
+PROMISED_PLANTS = 2  # drawn plants beside the model's, whose logs are fitted
+SHOWN_PLANTS = 12  # drawn plants in the picture
+
+
+def experiment(
+    model: Model, wanted: Wanted, design: Design | None, report: Progress, keep_going: KeepGoing
+) -> Experiment:
+    """The run that tells most of the parameters asked for, within the limits.
+
+    design: whose recommended controller moves the machine; None: its present one. Raises BadModel
+    where nothing would follow a reference, NotIdentifiable where no run within the limits tells
+    anything.
+    """
+    limits = limits_of(model, wanted)
+    bench = bench_of(model, design)
+    search, draw, check, promise = np.random.default_rng(wanted.seed).spawn(4)
+    plant = in_loop(model)
+    plants = (plant, *drawn_plants(model, draw, CHECKED_PLANTS))
+    rivals = _rivals(model, wanted)
+    if rivals:
+        plants = tuple(_without(one, wanted.rivals) for one in plants)
+    machines = [bench.machine(one, rivals) for one in plants[: 1 + SEARCHED_PLANTS]]
+    keys = tuple(one.key for one in rivals)
+    asked = asked_of(wanted.parameters, unknowns(bench.fitted(plants[0]), bench.drive)[0])
+    criterion = separation(machines, keys) if rivals else precision(machines, asked)
+    plan = best_run(criterion, limits, bench.loop.h, search, report, keep_going)
+    report("safety", 0.0)
+    r, safety = made_safe(bench, _with_one_each(plants, rivals), plan.r, limits, check)
+    promises = promised(bench, plants[: 1 + PROMISED_PLANTS], r, promise, report)
+    if all(one.after is None for one in promises):
+        raise NotIdentifiable(
+            f"{model.card}: no run within the limits tells any parameter ({bench.controller} hardly"
+            " moves the machine within them); widen the limits, or give another --design"
+        )
+    seen = looked_at(machines[:1], r)
+    per = len(asked) if not rivals else 1
+    return Experiment(
+        card=model.card,
+        motion=model.rig.motion,
+        command_unit=model.rig.command_unit,
+        criterion="T" if rivals else "D",
+        parameters=asked,
+        limits=limits,
+        h=bench.loop.law.h,
+        controller=bench.controller,
+        segments=plan.segments,
+        promise=promises,
+        separation=_apart(seen[1][0], keys) if seen and rivals else (),
+        safety=safety,
+        efficiency=float(np.exp((plan.joined - plan.bound) / per)),
+        loose=seen[1][0].loose if seen else 1.0,
+        tried=plan.tried,
+        seed=wanted.seed,
+        remarks=tuple(_remarks(model, safety.exceeding, safety.scale)),
+        versions=versions(),
+        r=_at_rate(r, bench),
+        traces=_traces(bench, plants[: 1 + SHOWN_PLANTS], r),
+    )
+
+
+def _rivals(model: Model, wanted: Wanted) -> tuple[Acting, ...]:
+    """The rivals as the model has them, else at a size that matters."""
+    limits, plant = limits_of(model, wanted), in_loop(model)
+    own = {one.key: one for one in plant.effects}
+    return tuple(
+        own.get(key) or looked_for(known_effect(key, model.library), plant, limits.stroke)
+        for key in wanted.rivals
+    )
+
+
+def _without(plant: Plant, keys: Sequence[str]) -> Plant:
+    return replace(plant, effects=tuple(one for one in plant.effects if one.key not in keys))
+
+
+def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[Plant, ...]:
+    """The plants, each with one of the rivals in turn."""
+    if not rivals:
+        return tuple(plants)
+    turns = itertools.cycle(rivals)
+    return tuple(replace(one, effects=(*one.effects, next(turns))) for one in plants)
+
+
+def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
+    """How far the run tells each pair apart, the hardest first."""
+    found = [
+        Separation(*pair.names, float(np.sqrt(told_apart(told.matrix, pair.one, pair.others))))
+        for pair in pairs_of(told, keys)
+    ]
+    return tuple(sorted(found, key=lambda one: one.deviations))
+
+
+def _at_rate(r: Array, bench: Bench) -> Array:
+    """The reference at the samples of the position controller."""
+    return r[:: max(1, round(bench.loop.law.h / bench.loop.h))]
+
+
+def _traces(bench: Bench, plants: Sequence[Plant], r: Array) -> Traces:
+    runs = [bench.run(one, r) for one in plants]
+    return Traces(
+        t=runs[0].t,
+        r=r,
+        y=np.array([one.y for one in runs]),
+        v=np.array([one.v for one in runs]),
+        F=np.array([one.F for one in runs]),
+        u=np.array([one.u for one in runs]),
+    )
+
+
+def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
+    out = list(model.read)
+    left_out = effects_left_out(model)
+    if left_out:
+        out.append(left_out)
+    if model.assumed:
+        names = ", ".join(model.assumed)
+        out.append(f"no log tells {names}: values within a third of the assumed ones were tried")
+    if not model.fit.adequate:
+        out.append(
+            "the model leaves more than noise of its logs: what is promised holds for a machine"
+            " like the model; run 'workbench trace' for what is missing"
+        )
+    if scale < 1.0:
+        out.append(f"made smaller, to {scale:.0%}, so that no drawn machine exceeds a limit")
+    if exceeding:
+        out.append(f"{exceeding} drawn machines still exceed a limit: do not run it; widen the"
+                   " limits or identify a better model")  # fmt: skip
+    return out

@@ -1,0 +1,176 @@
+"""What an experiment is: the document `experiment/1`, and what is asked of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from design.experiment.limits import MotionLimits, Peaks
+from design.experiment.segments import Segment
+from identification.arrays import Array
+from identification.errors import BadModel
+from identification.model.estimates import Estimate
+from workbench.documents.model import Model
+
+Criterion = Literal["D", "T"]
+FASTER_THAN_LOGS = (
+    1.5  # times the speed of the logs, that an experiment goes where no limit is given
+)
+STRONGER_THAN_LOGS = 1.2  # the same of the force
+USUAL_SECONDS = 20.0
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """What is asked: parameters to be told (none: all), limits where they are not those of card and
+    logs, seed. rivals: keys of effects of which one is at work, which the run is to tell apart."""
+
+    parameters: tuple[str, ...] = ()
+    stroke: tuple[float, float] | None = None
+    speed: float | None = None
+    force: float | None = None
+    command: float | None = None
+    seconds: float = USUAL_SECONDS
+    seed: int = 0
+    rivals: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Promised:
+    """A parameter: half its 95 % interval now (None: no log tells it) and after the run, its unit,
+    and how often of the simulated runs it is told."""
+
+    name: str
+    unit: str
+    value: float
+    before: float | None
+    after: float | None
+    told: float
+
+
+@dataclass(frozen=True)
+class Separation:
+    """Two plants that the run is to tell apart, and by how many deviations of the noise it does."""
+
+    one: str
+    other: str
+    deviations: float
+
+
+@dataclass(frozen=True)
+class Safety:
+    """Extremes over so many simulated machines drawn from what is not sure of the model, and how
+    many of them exceed a limit; scale: by which the reference was made smaller for it."""
+
+    machines: int
+    peaks: Peaks
+    exceeding: int
+    scale: float
+
+
+@dataclass(frozen=True, eq=False)
+class Traces:
+    """What the picture shows, every h: time [s], reference and positions [m] (machines, n), forces
+    [N] and speeds [m/s] likewise; the first machine is the model's."""
+
+    t: Array
+    r: Array
+    y: Array
+    v: Array
+    F: Array
+    u: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Experiment:
+    """The run to make next.
+
+    h [s]: period of the reference r [m], (n,); criterion: "D" (surest parameters) or "T" (rivals
+    told apart); efficiency: of the best shares of the time, a parameter, that the run's whole
+    pieces reach as their sum; loose: share of the run that hangs on luck.
+    """
+
+    card: str
+    motion: str
+    command_unit: str
+    criterion: Criterion
+    parameters: tuple[str, ...]
+    limits: MotionLimits
+    h: float
+    controller: str
+    segments: tuple[Segment, ...]
+    promise: tuple[Promised, ...]
+    separation: tuple[Separation, ...]
+    safety: Safety
+    efficiency: float | None
+    loose: float
+    tried: tuple[int, int]
+    seed: int
+    remarks: tuple[str, ...]
+    versions: Mapping[str, str]
+    r: Array
+    traces: Traces
+    schema: Literal["experiment/1"] = field(default="experiment/1")
+
+
+def limits_of(model: Model, wanted: Wanted) -> MotionLimits:
+    """The limits asked for; those not given by the card, or by what the logs have shown.
+
+    Raises BadModel where neither says how fast the machine may go.
+    """
+    speed = wanted.speed or (FASTER_THAN_LOGS * model.speed if model.speed else None)
+    if speed is None:
+        raise BadModel("the model's file does not hold the speed of its logs; give --speed")
+    return MotionLimits(
+        stroke=wanted.stroke or model.rig.stroke or model.travel,
+        speed=speed,
+        seconds=wanted.seconds,
+        force=wanted.force or STRONGER_THAN_LOGS * model.force_peak,
+        command=wanted.command or math.inf,
+    )
+
+
+def half_width(estimate: Estimate) -> float | None:
+    """Half of a parameter's 95 % interval; None where there is none."""
+    if estimate.value is None or estimate.low is None or estimate.high is None:
+        return None
+    return 0.5 * (estimate.high - estimate.low)
+
+
+def experiment_document(found: Experiment) -> dict[str, Any]:
+    """The experiment as experiment.json writes it; infinite limits are null."""
+    limits = found.limits
+    return {
+        "schema": found.schema,
+        "card": found.card,
+        "motion": found.motion,
+        "criterion": found.criterion,
+        "parameters": found.parameters,
+        "limits": {
+            "stroke": limits.stroke,
+            "speed": limits.speed,
+            "force": limits.force,
+            "command": limits.command,
+            "seconds": limits.seconds,
+        },
+        "h": found.h,
+        "samples": len(found.r),
+        "controller": found.controller,
+        "segments": [vars(one) for one in found.segments],
+        "promise": {
+            one.name: {k: v for k, v in vars(one).items() if k != "name"} for one in found.promise
+        },
+        "separation": [vars(one) for one in found.separation],
+        "safety": {
+            "machines": found.safety.machines,
+            "exceeding": found.safety.exceeding,
+            "scale": found.safety.scale,
+            "peaks": vars(found.safety.peaks),
+        },
+        "efficiency": found.efficiency,
+        "loose": found.loose,
+        "tried": {"segments": found.tried[0], "runs": found.tried[1]},
+        "seed": found.seed,
+        "remarks": found.remarks,
+        "versions": found.versions,
+    }
