@@ -17,7 +17,7 @@ from workbench.registry.page_tables import AccessTokenEndRow, AccessTokenRow, Au
 from workbench.registry.rows import storable_text
 
 Role = Literal["read", "change"]
-PREFIX = "wb_"  # by which a token is known as one where it should not be
+TOKEN_PREFIX = "wb_"  # by which a token is known as one where it should not be
 RANDOM_BYTES = 32
 _PERSON = re.compile(r"[\w.@+-]{1,64}")
 
@@ -59,7 +59,7 @@ class Access:
             raise BadRegistry(
                 f"token {name!r}: letters, digits and . _ @ + - needed, at most 64, as anna"
             )
-        secret = PREFIX + secrets.token_urlsafe(RANDOM_BYTES)
+        secret = TOKEN_PREFIX + secrets.token_urlsafe(RANDOM_BYTES)
         with self._database.writing() as session:
             if session.scalar(select(AccessTokenRow.id).where(AccessTokenRow.name == name)):
                 raise BadRegistry(

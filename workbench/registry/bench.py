@@ -21,7 +21,7 @@ from workbench.registry.rows import storable_text
 
 TaskKind = Literal["identify", "trace"]
 TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
-OPEN = ("waiting", "running")
+UNDER_WAY = ("waiting", "running")
 MOST_BEGUN = 3  # times that a task is begun; one that kills its workers is given up
 SHOWN_UPLOADS = 50
 
@@ -92,7 +92,7 @@ class Bench:
 
     def ask(self, upload: str, kind: TaskKind, *, by: str, now: datetime) -> WorkItem:
         """A task that waits from now on; the one there is where the same is under way."""
-        same = and_(TaskRow.upload_id == upload, TaskRow.kind == kind, TaskRow.state.in_(OPEN))
+        same = and_(TaskRow.upload_id == upload, TaskRow.kind == kind, TaskRow.state.in_(UNDER_WAY))
         with self._database.writing() as session:
             # The upload's row is the lock of its tasks.
             found = session.scalar(
@@ -115,7 +115,7 @@ class Bench:
             row = session.scalar(select(TaskRow).where(TaskRow.id == task).with_for_update())
             if row is None:
                 raise BadRegistry(f"no task {task}")
-            if row.state in OPEN:
+            if row.state in UNDER_WAY:
                 row.state, row.ended_at, row.said = "cancelled", now, f"cancelled by {by}"
                 note(session, f"{row.kind}_cancelled", row.upload_id, "", by=by, now=now)
             return _task(row)

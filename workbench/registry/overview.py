@@ -15,9 +15,9 @@ from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
 from workbench.registry.tables import DecisionRow, InForceRow, VersionRow
 
 FleetOrder = Literal["machine", "state", "heard", "moved"]
-ORDERS: tuple[FleetOrder, ...] = get_args(FleetOrder)
+FLEET_ORDERS: tuple[FleetOrder, ...] = get_args(FleetOrder)
 WORST_FIRST = ("structure", "drifting", "log_bad", "silent", "not_judged", "no_log", "in_tune")
-QUIET = ("in_tune", "not_judged")  # states that a machine loses that is not heard from
+MAY_FALL_SILENT = ("in_tune", "not_judged")  # states that a machine loses that is not heard from
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def fleet_page(database: Database, asked: FleetAsked) -> FleetPage:
 
 
 def _state(silent_since: datetime) -> ColumnElement[str]:
-    silent = and_(MachineNowRow.state.in_(QUIET), MachineNowRow.heard_at < silent_since)
+    silent = and_(MachineNowRow.state.in_(MAY_FALL_SILENT), MachineNowRow.heard_at < silent_since)
     return case((silent, "silent"), else_=MachineNowRow.state)
 
 
@@ -133,3 +133,9 @@ def _line(row: MachineNowRow, state: Any, beside: Sequence[Any]) -> FleetLine:
     return FleetLine(
         row.machine, state, row.heard_at, row.logs, row.moved, row.moved_by, told, version, since
     )
+
+
+def any_machine(database: Database) -> bool:
+    """Whether the registry holds a machine; raises RegistryAway where it does not answer."""
+    with database.reading() as session:
+        return session.scalar(select(MachineNowRow.machine).limit(1)) is not None
