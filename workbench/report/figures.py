@@ -20,7 +20,19 @@ if TYPE_CHECKING:
 MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
 GREY = "#7a7a7a"
+BEFORE = "#8a8a8a"
 CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL, "present": GREY}
+# The colours of the pages' style in place of the figures'.
+SCHEME = {
+    "#000000": "var(--measured)",
+    MODEL: "var(--model)",
+    REFERENCE: "var(--reference)",
+    OTHER: "var(--other)",
+    BAND: "var(--band)",
+    GREY: "var(--before)",
+    "#ffffff": "var(--paper)",
+    "#dddddd": "var(--grid)",
+}
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
 STYLE: dict[Any, Any] = {
@@ -78,6 +90,8 @@ def inline(drawn: "Figure", name: str, description: str) -> Any:
     # Group ids repeat from figure to figure and nothing refers to them.
     svg = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
     svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")', r"<svg \1", svg, count=1)
+    # Colours follow the page's scheme, light or dark.
+    svg = re.sub("|".join(SCHEME), lambda found: SCHEME[found[0]], svg)
     return safe(svg.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1))
 
 

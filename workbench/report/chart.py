@@ -1,0 +1,249 @@
+"""Charts that zoom: lines, dots, shaded stretches in panels, as data for `assets/chart/chart.js`.
+
+A `Chart` is a value; `chart_html` gives its place in a page, `chart_assets` what the page needs
+once: uPlot, the script that draws, and their style, to be inlined or served as files.
+"""
+
+import base64
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cache
+from importlib.resources import files
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from workbench.report.page import render, safe
+
+Colour = Literal["measured", "model", "reference", "other", "before", "band", "quiet"]
+Look = Literal["line", "bold", "dashed", "dotted", "dots"]
+
+FIRST_VIEW = 4000  # points of a line at least: two on each pixel of a wide screen
+FINEST = 40_000  # points of a line at most
+ALL_POINTS = 160_000  # of a chart's lines together; 0.9 MB in the page
+EVEN = 1e-6  # of a step, within which a clock counts as even
+SPREAD = 1e-6  # of the range, by which dots at the same place are set apart
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """Values over x, both (n,), x ascending (of dots: any order); NaN parts a line.
+
+    Lines of a panel that share one array `x` stay together sample by sample.
+    """
+
+    name: str
+    x: Array
+    y: Array
+    colour: Colour = "model"
+    look: Look = "line"
+
+
+@dataclass(frozen=True, eq=False)
+class Area:
+    """What lies between `low` and `high` over x, all (n,)."""
+
+    name: str
+    x: Array
+    low: Array
+    high: Array
+    colour: Colour = "band"
+
+
+class Band(NamedTuple):
+    """A shaded stretch of an axis."""
+
+    name: str
+    low: float
+    high: float
+    axis: Literal["x", "y"] = "y"
+    colour: Colour = "reference"
+
+
+class Mark(NamedTuple):
+    """A broken line across the panel."""
+
+    at: float
+    axis: Literal["x", "y"] = "y"
+
+
+class Part(NamedTuple):
+    """A named stretch of x that a reader may want to go to."""
+
+    name: str
+    low: float
+    high: float
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes: `x` and `y` are their labels with unit.
+
+    y_range: what the whole view holds (default: all lines); x_range likewise.
+    """
+
+    x: str
+    y: str
+    lines: Sequence[Line]
+    title: str = ""
+    areas: Sequence[Area] = ()
+    bands: Sequence[Band] = ()
+    marks: Sequence[Mark] = ()
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    log_x: bool = False
+    height: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Panels below each other, or two a row; `name` is its own on a page.
+
+    description: what it shows, for those who do not see it. shared_x: all panels zoom together.
+    """
+
+    name: str
+    description: str
+    panels: Sequence[Panel]
+    columns: Literal[1, 2] = 1
+    shared_x: bool = True
+    parts: Sequence[Part] = field(default=())
+
+
+def chart_html(chart: Chart, caption: str = "") -> Any:
+    """The figure of a chart: its data as JSON, which the script of `chart_assets` draws."""
+    # "<" could end the element that holds the data.
+    data = json.dumps(chart_data(chart), allow_nan=False).replace("<", "\\u003c")
+    return safe(render("chart", chart=chart, data=safe(data), caption=caption))
+
+
+def chart_data(chart: Chart) -> dict[str, Any]:
+    """A chart as plain values of JSON.
+
+    `name, shared_x, parts` and `panels`, each with labels, ranges, `bands`, `marks`; `tables`: for
+    each x of its own `x` and the columns `y`, coded (`start, step, count`, or `type` and `base64`
+    of little-endian numbers); `lines`: name, colour and look of every column in that order.
+    """
+    lines = [line for panel in chart.panels for line in _columns(panel)]
+    points = int(np.clip(ALL_POINTS // max(len(lines), 1), FIRST_VIEW, FINEST))
+    return {
+        "name": chart.name,
+        "shared_x": chart.shared_x,
+        "parts": [part._asdict() for part in chart.parts],
+        "panels": [_panel(panel, points) for panel in chart.panels],
+    }
+
+
+@cache
+def chart_assets() -> dict[str, str]:
+    """Files that a page with charts needs, in this order, by name: two styles, two scripts."""
+    folder = files("workbench") / "assets"
+    names = ("uplot/uPlot.min.css", "chart/chart.css", "uplot/uPlot.iife.min.js", "chart/chart.js")
+    return {name.split("/")[1]: (folder / name).read_text("utf-8") for name in names}
+
+
+class _Column(NamedTuple):
+    """A column of numbers to draw; edges of an area come in pairs, the lower first."""
+
+    line: Line
+    edge: Literal["", "lower", "upper"] = ""
+
+
+def _columns(panel: Panel) -> list[_Column]:
+    out = []
+    for area in panel.areas:
+        low = Line("", area.x, area.low, area.colour)
+        out += [_Column(low, "lower"), _Column(replace(low, name=area.name, y=area.high), "upper")]
+    return out + [_Column(line) for line in panel.lines]
+
+
+def _panel(panel: Panel, points: int) -> dict[str, Any]:
+    groups: list[list[_Column]] = []
+    for column in _columns(panel):
+        same = [g for g in groups if g[0].line.x is column.line.x and not _dots(g[0], column)]
+        if same:
+            same[0].append(column)
+        else:
+            groups.append([column])
+    groups.sort(key=lambda group: not _dots(*group))  # lines are drawn over dots
+    tables = [_table(group, points) for group in groups]
+    return {
+        **{key: getattr(panel, key) for key in ("x", "y", "title", "x_range", "y_range", "log_x")},
+        "height": panel.height,
+        "bands": [band._asdict() for band in panel.bands],
+        "marks": [mark._asdict() for mark in panel.marks],
+        "tables": tables,
+        "lines": [_look(column) for group in groups for column in group],
+    }
+
+
+def _dots(*columns: _Column) -> bool:
+    return any(column.line.look == "dots" for column in columns)
+
+
+def _look(column: _Column) -> dict[str, Any]:
+    line = column.line
+    look = "edge" if column.edge else line.look
+    out = {"name": line.name, "colour": line.colour, "look": look}
+    return {**out, "upper": column.edge == "upper"} if column.edge else out
+
+
+def _table(group: list[_Column], points: int) -> dict[str, Any]:
+    x, values = np.asarray(group[0].line.x, dtype=np.float64), [c.line.y for c in group]
+    if _dots(*group):
+        order = np.argsort(x, kind="stable")
+        x, values = x[order], [np.asarray(y)[order] for y in values]
+        # Those at the same place would be drawn as one.
+        x = x + SPREAD * np.ptp(x) * np.arange(len(x)) / max(len(x), 1) if len(x) else x
+    else:
+        x, values = thinned_together(x, values, points)
+    return {"x": coded_x(x), "y": [coded(y, "f4") for y in values]}
+
+
+def thinned_together(x: Array, values: Iterable[Array], points: int) -> tuple[Array, list[Array]]:
+    """At most `points` places of x, shared by all lines, each of which keeps every peak.
+
+    Every block of samples becomes two places, at which a line has its lowest and highest value in
+    the order in which it takes them.
+    """
+    values, n = [np.asarray(y, dtype=np.float64) for y in values], len(x)
+    if n <= points:
+        return x, values
+    size = -(-2 * n // points)
+    starts = np.arange(0, n, size)
+    # Spread from the first sample to the last, so that an even clock stays even.
+    places = np.interp(np.linspace(0, n - 1, 2 * len(starts)), np.arange(n), x)
+    return places, [_low_and_high(y, starts, size) for y in values]
+
+
+def _low_and_high(y: Array, starts: Any, size: int) -> Array:
+    blocks = np.full(len(starts) * size, np.nan)
+    blocks[: len(y)] = y
+    blocks = blocks.reshape(len(starts), size)
+    known = np.isfinite(blocks)
+    low = np.where(known, blocks, np.inf)
+    high = np.where(known, blocks, -np.inf)
+    at = np.sort(np.stack([low.argmin(axis=1), high.argmax(axis=1)]), axis=0).T
+    # A block that holds a gap shows one: a line across it would join what is apart.
+    whole = known.all(axis=1) | (np.arange(len(starts)) == len(starts) - 1)
+    out = np.take_along_axis(blocks, at, axis=1)
+    out[~whole, 1] = np.nan
+    return np.asarray(out.ravel())
+
+
+def coded_x(x: Array) -> dict[str, Any]:
+    """Places on an axis: start, step and count where they are even."""
+    if len(x) > 2:
+        step = (x[-1] - x[0]) / (len(x) - 1)
+        even = x[0] + step * np.arange(len(x))
+        if step > 0 and np.max(np.abs(x - even)) <= EVEN * step * len(x):
+            return {"start": float(x[0]), "step": float(step), "count": len(x)}
+    return coded(x, "f8")
+
+
+def coded(values: Array, kind: Literal["f4", "f8"]) -> dict[str, Any]:
+    """Numbers as base64; NaN where there is none."""
+    plain = np.asarray(values, dtype=f"<{kind}")
+    return {"type": kind, "base64": base64.b64encode(plain.tobytes()).decode("ascii")}
