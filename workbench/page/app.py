@@ -4,12 +4,13 @@ from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
+from markupsafe import escape
 from starlette.applications import Starlette
 from starlette.concurrency import run_in_threadpool
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import JSONResponse, PlainTextResponse, Response
-from starlette.routing import Mount, Route
+from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp
 
@@ -56,7 +57,8 @@ def application(settings: PageSettings) -> ASGIApp:
 
     app = Starlette(
         routes=[
-            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *deeds.DEED_ROUTES, *drops.DROP_ROUTES, *work.WORK_ROUTES,
+            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *deeds.DEED_ROUTES,
+            *drops.DROP_ROUTES, *work.WORK_ROUTES,
             *sign_in.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
             Mount("/static/assets", StaticFiles(directory=ASSETS)),
             Mount("/static", StaticFiles(directory=HERE / "static")),
@@ -101,7 +103,7 @@ async def _said(
     if "application/json" in request.headers.get("accept", ""):
         return JSONResponse({"error": said}, status, headers)
     if request.headers.get("hx-request"):
-        return PlainTextResponse(said, status, headers)
+        return HTMLResponse(str(escape(said)), status, headers)
     visitor = await run_in_threadpool(_known, request)
     title = TITLES.get(status, "Something is wrong")
     page = show(request, visitor, "error", status=status, title=title, said=said)

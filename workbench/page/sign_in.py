@@ -24,9 +24,7 @@ async def enter(request: Request) -> Response:
     check_site(request)
     form = await request.form(max_files=0, max_fields=5)
     secret = str(form.get("token", "")).strip()
-    found = await run_in_threadpool(
-        request.app.state.doorkeeper.known, secret, address(request)
-    )
+    found = await run_in_threadpool(request.app.state.doorkeeper.known, secret, address(request))
     if found is None:
         wrong = "This token is none, or was revoked."
         return show(request, Visitor(), "sign_in", status=401, wrong=wrong, title="Sign in")

@@ -97,8 +97,8 @@ class Access:
             .where(AccessTokenRow.sha256 == hashed(secret))
         )
         with self._database.reading() as session:
-            found = session.execute(query).first()
-        return None if found is None or found[1] is not None else _token(found[0], None)
+            found = session.execute(query.where(AccessTokenEndRow.token_id.is_(None))).first()
+        return None if found is None else _token(found[0], None)
 
     def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[Audited]:
         """The last changes, of one subject or all; the newest first."""
@@ -121,6 +121,14 @@ def note(session: Session, kind: str, subject: str, detail: str, *, by: str, now
     """Write a change into the audit, within the transaction that makes it."""
     texts = {"kind": kind, "subject": storable_text(subject), "detail": storable_text(detail)}
     session.add(AuditRow(at=now, made_by=by, **texts))
+
+
+def audit(
+    database: Database, kind: str, subject: str, detail: str, *, by: str, now: datetime
+) -> None:
+    """Write a change of files, which no transaction holds, into the audit."""
+    with database.writing() as session:
+        note(session, kind, subject, detail, by=by, now=now)
 
 
 def _token(row: AccessTokenRow, ended: datetime | None) -> AccessToken:

@@ -21,6 +21,7 @@ from workbench.registry.rows import storable_text
 
 TaskKind = Literal["identify", "trace"]
 TaskState = Literal["waiting", "running", "done", "failed", "cancelled"]
+EndState = Literal["done", "failed"]
 UNDER_WAY = ("waiting", "running")
 MOST_BEGUN = 3  # times that a task is begun; one that kills its workers is given up
 SHOWN_UPLOADS = 50
@@ -173,9 +174,7 @@ class Bench:
         """How far the task is; lengthens the lease. Raises LostClaim where it is cancelled."""
         self._write(claim, stage=stage, share=share, until=now + lease)
 
-    def finish(
-        self, claim: WorkClaim, state: Literal["done", "failed"], said: str, *, now: datetime
-    ) -> None:
+    def finish(self, claim: WorkClaim, state: EndState, said: str, *, now: datetime) -> None:
         """The task is over; raises LostClaim where it is cancelled or another's by now."""
         share = {"share": 1.0} if state == "done" else {}
         self._write(claim, state=state, said=storable_text(said), ended_at=now, **share)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal, get_args
 
-from sqlalchemy import ColumnElement, and_, case, func, select
+from sqlalchemy import ColumnElement, SQLColumnExpression, and_, case, func, select
 from sqlalchemy.orm import Session
 
 from workbench.registry.at_a_glance import MachineCondition
@@ -67,13 +67,12 @@ def fleet_page(database: Database, asked: FleetAsked) -> FleetPage:
     where = _where(asked, state)
     with database.reading() as session:
         counted = session.execute(select(state, func.count()).group_by(state))
-        counts = {one: count for one, count in counted}
-        if not asked.text and asked.state is None:
-            found = sum(counts.values())
-        elif not asked.text:
-            found = counts.get(asked.state, 0)
-        else:
+        counts: dict[str, int] = {one: count for one, count in counted}
+        found: int | None
+        if asked.text:
             found = session.scalar(select(func.count()).select_from(MachineNowRow).where(*where))
+        else:
+            found = counts.get(asked.state, 0) if asked.state else sum(counts.values())
         rows = session.execute(_lines(asked, state, where)).all()
         beside = _beside(session, [row.machine for row, _ in rows])
         lines = [_line(row, shown, beside[row.machine]) for row, shown in rows]
@@ -98,7 +97,7 @@ def _lines(
     asked: FleetAsked, state: ColumnElement[str], where: Sequence[ColumnElement[bool]]
 ) -> Any:
     """The page's machines with their states."""
-    keys: Mapping[FleetOrder, ColumnElement[Any]] = {
+    keys: Mapping[FleetOrder, SQLColumnExpression[Any]] = {
         "machine": MachineNowRow.machine,
         "state": case({name: k for k, name in enumerate(WORST_FIRST)}, value=state, else_=9),
         "heard": MachineNowRow.heard_at,

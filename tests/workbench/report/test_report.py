@@ -105,7 +105,13 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
 
 def test_design_report() -> None:
     html = checked(design_report(design(identified().model)), 2)
-    for text in ("frequency [rad/s]", "|S_yp| [dB]", "modulus margin", "RST</abbr> S:", "compensator"):
+    for text in (
+        "frequency [rad/s]",
+        "|S_yp| [dB]",
+        "modulus margin",
+        "RST</abbr> S:",
+        "compensator",
+    ):
         assert text in html
 
 

@@ -5,7 +5,7 @@ import json
 import sqlalchemy as sa
 from alembic import op
 
-from workbench.registry.at_a_glance import glance, state_of, with_log
+from workbench.registry.at_a_glance import Trend, glance, state_of, with_log
 from workbench.registry.tables import UtcTime
 
 revision = "0004"
@@ -171,7 +171,8 @@ def _fill() -> None:
     )
     for machine in connection.execute(sa.text("SELECT name FROM machine")).scalars().all():
         count, heard = connection.execute(logs, {"m": machine}).one()
-        state, trend, moved, by = "no_log", {}, None, None
+        trend: Trend = {}
+        state, moved, by = "no_log", None, None
         for verdict, text in connection.execute(results, {"m": machine}):
             evidence = json.loads(text)
             state, trend = state_of(verdict, evidence), with_log(trend, evidence)
