@@ -31,7 +31,7 @@ def command(as_json: bool, **given: Any) -> int:
     registry is away, or the webhook has not taken an alarm. Such an alarm is tried again by later
     passes, less and less often, and given up after a day.
     """
-    from workbench.jobs.alarms import ALARMING
+    from workbench.registry.values import ALARMING
 
     with worker(JobOptions(**given)) as found:
         done = found.once()

@@ -14,7 +14,6 @@ from typing import BinaryIO
 
 from identification.errors import BadLog
 from workbench.files import CARD_FILE
-from workbench.logs.formats import find_format, head_of
 from workbench.registry.errors import BadRegistry
 
 DROPS = ".drops"  # no machine's name begins so, and no pass looks into it
@@ -58,7 +57,7 @@ def file_name(given: str) -> str:
 def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
     """Write the log, whole or not at all: its size [bytes] and fingerprint.
 
-    Raises BadLog where it is empty, or by its first bytes something else than its name says.
+    Raises BadLog where it is empty.
     """
     folder = folder_of(root, upload)
     part = folder.with_name(f"{folder.name}.part")
@@ -67,13 +66,15 @@ def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, st
         size, digest = _written(part / name, content)
         if size == 0:
             raise BadLog(f"{name}: is empty")
-        find_format(part / name, head_of(part / name))
         part.rename(folder)
-    except BadLog as error:
-        raise BadLog(str(error).replace(f"{part}/", "")) from None
     finally:
         shutil.rmtree(part, ignore_errors=True)
     return size, digest
+
+
+def drop_again(root: Path, upload: str) -> None:
+    """Remove an upload that is no log."""
+    shutil.rmtree(folder_of(root, upload), ignore_errors=True)
 
 
 def _written(path: Path, content: BinaryIO) -> tuple[int, str]:

@@ -24,6 +24,7 @@ from workbench.page.card_form import (
 from workbench.page.dropped import (
     ENDINGS,
     card_of,
+    drop_again,
     file_name,
     folder_of,
     keep,
@@ -56,7 +57,13 @@ def drop(request: Request, visitor: Visitor) -> Response:
     if (given.size or 0) > request.app.state.settings.most_bytes:
         raise HTTPException(413, "The file is too large; cut the log.")
     upload, name = new_id(), file_name(given.filename)
-    size, digest = keep(request.app.state.settings.root, upload, name, given.file)
+    root = request.app.state.settings.root
+    size, digest = keep(root, upload, name, given.file)
+    try:
+        request.app.state.helpers(looks.refuse_no_log, log_of(root, upload))
+    except UserError:
+        drop_again(root, upload)
+        raise
     shown = "".join(c if c.isprintable() else "\N{REPLACEMENT CHARACTER}" for c in given.filename)
     now = datetime.now(UTC)
     _bench(request).add(Upload(upload, shown[:LONGEST_SHOWN], size, digest, visitor.name, now))

@@ -4,8 +4,7 @@ import secrets
 import shutil
 from pathlib import Path
 
-from workbench.files import CARD_FILE
-from workbench.jobs.scan import LOGS
+from workbench.files import CARD_FILE, LOGS
 from workbench.output import write_whole
 from workbench.registry.errors import BadRegistry
 

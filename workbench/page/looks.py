@@ -47,6 +47,16 @@ def warm() -> None:
     import workbench.steps.first_card.proposal  # noqa: F401
 
 
+def refuse_no_log(path: Path) -> None:
+    """Raises BadLook where the file's first bytes are of something else than its name says."""
+    from workbench.logs.formats import find_format, head_of
+
+    try:
+        find_format(path, head_of(path))
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path])) from None
+
+
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
     """Every column of the file over its clock, as HTML, and how many rows it has."""
     from workbench.report.chart import Chart, Line, Panel, chart_html

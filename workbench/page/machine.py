@@ -10,7 +10,6 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from identification.errors import UserError
-from workbench.jobs.alarms import ALARMING
 from workbench.page import version_looks
 from workbench.page.machine_charts import parameter_charts
 from workbench.page.pages import show
@@ -20,7 +19,7 @@ from workbench.page.work import report_response
 from workbench.registry.difference import difference
 from workbench.registry.results import condition, last_logs, log_count
 from workbench.registry.store import Registry
-from workbench.registry.values import Kind, Version
+from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import chart_html
 
 LAST_LOGS, MORE_LOGS = 60, 1000

@@ -7,20 +7,23 @@ import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 import uvicorn
 
-from workbench.jobs.passes import Report
 from workbench.page.settings import PageSettings, hand_over
 from workbench.registry.database import REGISTRY_VARIABLE
 from workbench.registry.store import Registry
+
+if TYPE_CHECKING:
+    from workbench.jobs.passes import Report
 
 AGAIN_AFTER = 2.0  # s before a worker that has died is started again
 ENDS_WITHIN = 20.0  # s that a worker may take to give its task back
 APPLICATION = "workbench.page.app:served"
 
 
-def serve(settings: PageSettings, report: Report) -> int:
+def serve(settings: PageSettings, report: "Report") -> int:
     """Serve until Ctrl-C or SIGTERM; the exit status. Raises BadRegistry and RegistryAway first."""
     with Registry(settings.where):
         pass  # its layout is brought up to date once, and what is wrong is told before all else
@@ -39,7 +42,7 @@ def serve(settings: PageSettings, report: Report) -> int:
 
 
 @contextmanager
-def _workers(settings: PageSettings, report: Report) -> Iterator[None]:
+def _workers(settings: PageSettings, report: "Report") -> Iterator[None]:
     """Within the block the workers run, each started again should it die."""
     over = threading.Event()
     keepers = [
@@ -56,7 +59,7 @@ def _workers(settings: PageSettings, report: Report) -> Iterator[None]:
             one.join()
 
 
-def _keep(settings: PageSettings, report: Report, over: threading.Event) -> None:
+def _keep(settings: PageSettings, report: "Report", over: threading.Event) -> None:
     """One worker after the other; the registry's address is not on its command line."""
     command = [sys.executable, "-m", "workbench", "work", "--machines", settings.machines]
     environment = {**os.environ, REGISTRY_VARIABLE: settings.where}
