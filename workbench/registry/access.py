@@ -98,7 +98,7 @@ class Access:
         )
         with self._database.reading() as session:
             found = session.execute(query.where(AccessTokenEndRow.token_id.is_(None))).first()
-        return None if found is None else _token(found[0], None)
+            return None if found is None else _token(found[0], None)
 
     def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[Audited]:
         """The last changes, of one subject or all; the newest first."""

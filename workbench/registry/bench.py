@@ -81,9 +81,9 @@ class Bench:
         """The upload; raises BadRegistry where there is none."""
         with self._database.reading() as session:
             row = session.get(UploadRow, upload)
-        if row is None:
-            raise BadRegistry(f"no upload {upload!r}")
-        return _upload(row)
+            if row is None:
+                raise BadRegistry(f"no upload {upload!r}")
+            return _upload(row)
 
     def uploads(self) -> Sequence[Upload]:
         """The last uploads, the newest first."""
@@ -125,9 +125,9 @@ class Bench:
         """The task; raises BadRegistry where there is none."""
         with self._database.reading() as session:
             row = session.get(TaskRow, task)
-        if row is None:
-            raise BadRegistry(f"no task {task}")
-        return _task(row)
+            if row is None:
+                raise BadRegistry(f"no task {task}")
+            return _task(row)
 
     def tasks(self, upload: str) -> Sequence[WorkItem]:
         """The upload's tasks in the order in which they were asked for."""
