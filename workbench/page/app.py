@@ -12,7 +12,6 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, JSONResponse, Response
 from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
-from starlette.types import ASGIApp
 
 from identification.errors import UserError
 from workbench.page import deeds, drops, fleet, health, machine, sign_in, work
@@ -39,15 +38,18 @@ TITLES = {
 }
 
 
-def served() -> ASGIApp:
+def served() -> Guard:
     """The application by the settings that were handed over to this process."""
     return application(handed_over())
 
 
-def application(settings: PageSettings) -> ASGIApp:
-    """The application on its registry; raises BadRegistry and RegistryAway."""
+def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard:
+    """The application on its registry; raises BadRegistry and RegistryAway.
+
+    helpers: processes for heavy looks, by default of its own.
+    """
     registry = Registry(settings.where)
-    helpers = Helpers()
+    helpers = helpers or Helpers()
 
     @asynccontextmanager
     async def life(_app: Starlette) -> AsyncIterator[None]:
@@ -113,6 +115,9 @@ async def _said(
 
 def _known(request: Request) -> Visitor:
     """Who asks, for the head of an error's page; whatever goes wrong with that is nobody."""
+    asked: Visitor | None = getattr(request.state, "visitor", None)
+    if asked is not None:  # a token is not tried twice
+        return asked
     try:
         keeper: Doorkeeper = request.app.state.doorkeeper
         return keeper.visitor(request, to_change=False)

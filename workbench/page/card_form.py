@@ -139,7 +139,7 @@ def form_of(of: "Proposal", file: str) -> CardForm:
         fields[f"gain_{name}"] = "" if signal.gain is None else _written(signal.gain)
         fields[f"bits_{name}"] = "" if signal.bits is None else str(signal.bits)
         why[f"column_{name}"] = (signal.sure, signal.why)
-    columns = [(json.dumps(one.key), one.shown) for one in of.columns]
+    columns = [(json.dumps(one.key), one.header or one.shown) for one in of.columns]
     unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
     layout = of.spec.model_dump(exclude_defaults=True)
     return CardForm(fields, columns, why, [*of.remarks, *unused], layout)

@@ -47,8 +47,8 @@ def file_name(given: str) -> str:
     """
     last = re.split(r"[/\\]", given)[-1]
     plain = _ODD.sub("_", last).strip("._-") or "log"
-    stem, dot, last = plain.rpartition(".")
-    ending = f"{dot}{last}"
+    stem, dot, end = plain.rpartition(".")
+    ending = dot + end
     if ending.lower() not in ENDINGS:
         raise BadLog(f"{plain[:LONGEST_NAME]}: no log by its ending; one of {' '.join(ENDINGS)}")
     return (stem[: LONGEST_NAME - len(ending)].strip("._-") or "log") + ending.lower()

@@ -5,6 +5,7 @@ from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
+from starlette.exceptions import HTTPException
 from starlette.responses import PlainTextResponse
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -25,10 +26,6 @@ SAFE_HEADERS = {
 FORM_BYTES = 100_000  # of a form without a file
 UPLOAD_PATH = "/drop"
 Answer = Callable[[Scope, Receive, Send], Awaitable[None]]
-
-
-class TooLarge(Exception):
-    """A body beyond the limit; its sender has not said how long it is."""
 
 
 class Guard:
@@ -57,31 +54,26 @@ class Guard:
         await self._limited(below, receive, _with_headers(send, below), most + FORM_BYTES)
 
     async def _limited(self, scope: Scope, receive: Receive, send: Send, most: int) -> None:
-        seen, begun = 0, False
+        """The answer to a body that may be longer than its sender has said."""
+        seen = 0
 
         async def counted() -> Message:
             nonlocal seen
             message = await receive()
             seen += len(message.get("body", b""))
             if seen > most:
-                raise TooLarge
+                raise HTTPException(413, _too_large_text(most))
             return message
 
-        async def noted(message: Message) -> None:
-            nonlocal begun
-            begun = True
-            await send(message)
-
-        try:
-            await self._app(scope, counted, noted)
-        except TooLarge:
-            if not begun:
-                await _too_large(most)(scope, receive, send)
+        await self._app(scope, counted, send)
 
 
 def _too_large(most: int) -> PlainTextResponse:
-    said = f"More than {most / 1e6:.4g} MB; cut the log, or raise --most-megabytes.\n"
-    return PlainTextResponse(said, 413, {"Connection": "close"})
+    return PlainTextResponse(_too_large_text(most), 413, {"Connection": "close"})
+
+
+def _too_large_text(most: int) -> str:
+    return f"More than {most / 1e6:.4g} MB; cut the log, or raise --most-megabytes.\n"
 
 
 def _host(text: str) -> str:

@@ -49,10 +49,11 @@ def warm() -> None:
 
 def refuse_no_log(path: Path) -> None:
     """Raises BadLook where the file's first bytes are of something else than its name says."""
-    from workbench.logs.formats import find_format, head_of
+    from workbench.cards.card import FileSpec
+    from workbench.logs.formats import checked_format
 
     try:
-        find_format(path, head_of(path))
+        checked_format(path, FileSpec())
     except UserError as error:
         raise BadLook(without_path(str(error), [path])) from None
 
@@ -67,7 +68,7 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
     shown = [one for k, one in enumerate(found.columns) if k != at and not one.unusable]
     panels = [
         Panel(label if k == len(shown[:MOST_COLUMNS]) - 1 else "", _label(one),
-              [Line("", x, one.values, "measured")], height=150)
+              [Line(_label(one), x, one.values, "measured")], height=150)
         for k, one in enumerate(shown[:MOST_COLUMNS])
     ]  # fmt: skip
     chart = Chart("columns", f"the columns of {file} over time", panels)

@@ -88,6 +88,12 @@ class Doorkeeper:
 
     def visitor(self, request: Request, *, to_change: bool) -> Visitor:
         """Who asks; raises HTTPException where the token is none, or too many were tried."""
+        request.state.visitor = Visitor()  # until more is known, also for an error's page
+        request.state.visitor = self._visitor(request, to_change)
+        found: Visitor = request.state.visitor
+        return found
+
+    def _visitor(self, request: Request, to_change: bool) -> Visitor:
         secret = bearer(request) or request.cookies.get(TOKEN_COOKIE, "")
         if not secret:
             return Visitor(role="read" if self._open else None)

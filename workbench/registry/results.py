@@ -40,6 +40,7 @@ def last_logs(database: Database, machine: str, last: int) -> Sequence[JudgedLog
     queued = and_(OutboxRow.log_id == OutcomeRow.log_id, OutboxRow.turn == OutcomeRow.turn)
     query = (
         select(LogRow, OutcomeRow, VersionRow.number, NoticeRow.at, OutboxRow)
+        .select_from(LogRow)
         .outerjoin(OutcomeRow, judged_now())
         .outerjoin(VersionRow, VersionRow.id == OutcomeRow.version_id)
         .outerjoin(NoticeRow, sent)

@@ -1,6 +1,6 @@
 /* What the pages need beside htmx: charts that come with a part of a page, and the drop zone. */
 "use strict";
-document.addEventListener("htmx:load", (event) => servoCharts.draw(event.detail.elt));
+document.addEventListener("htmx:load", () => servoCharts.draw());
 
 (() => {
   const zone = document.getElementById("zone");
