@@ -41,7 +41,9 @@ def warm() -> None:
     import pandas  # noqa: F401
     import pyarrow.parquet  # noqa: F401
 
+    import workbench.export.targets
     import workbench.report.chart
+    import workbench.report.controllers
     import workbench.report.doctor
     import workbench.steps.doctor
     import workbench.steps.first_card.proposal  # noqa: F401

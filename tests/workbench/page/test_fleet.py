@@ -144,8 +144,17 @@ def test_the_table_and_the_machine_show_it(page: Page) -> None:
     assert page.client.get("/machine/x%26y/version/1/model.json").json() == {"m": 1.0}
 
 
-@pytest.mark.parametrize("query", [{"page": "-1"}, {"page": "9" * 30}, {"page": "²"},
-                                   {"order": "x; drop"}, {"state": "x"}, {"text": "a" * 10_000}])  # fmt: skip
+@pytest.mark.parametrize(
+    "query",
+    [
+        {"page": "-1"},
+        {"page": "9" * 30},
+        {"page": "²"},
+        {"order": "x; drop"},
+        {"state": "x"},
+        {"text": "a" * 10_000},
+    ],
+)
 def test_an_odd_question_is_answered(page: Page, query: dict[str, str]) -> None:
     assert page.client.get("/", params=query).status_code == 200
     assert len(asked_for(query, 7.0).text) <= 100
