@@ -55,7 +55,7 @@ def simulated(folder: Path) -> str:
 
     card = CARD.replace("duration_s = 6.0", "duration_s = 5.0").replace("2e-3", "2.5e-3")
     path = folder / "recipe.toml"
-    path.write_text(f'{card}[recipe.effects.spring]\nk = 150.0\n', encoding="utf-8")
+    path.write_text(f"{card}[recipe.effects.spring]\nk = 150.0\n", encoding="utf-8")
     frame = wb.simulate(path).frame.drop(columns=["r"])
     frame["y"] = 1e3 * frame["y"]
     names = {"t": "time [s]", "y": "position [mm]", "F": "force [N]", "u": "valve [V]"}
