@@ -8,7 +8,7 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import BinaryIO
 
@@ -16,6 +16,7 @@ from identification.errors import BadLog
 from workbench.files import CARD_FILE
 from workbench.registry.errors import BadRegistry
 
+LOG_FOLDER = "log"  # of an upload, in which nothing else lies
 DROPS = ".drops"  # no machine's name begins so, and no pass looks into it
 ENDINGS = (
     ".csv", ".txt", ".tsv", ".dat", ".log", ".parquet", ".mat", ".h5", ".hdf5", ".json", ".tdms",
@@ -61,9 +62,9 @@ def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, st
     """
     folder = folder_of(root, upload)
     part = folder.with_name(f"{folder.name}.part")
-    part.mkdir(parents=True)
+    (part / LOG_FOLDER).mkdir(parents=True)
     try:
-        size, digest = _written(part / name, content)
+        size, digest = _written(part / LOG_FOLDER / name, content)
         if size == 0:
             raise BadLog(f"{name}: is empty")
         part.rename(folder)
@@ -91,10 +92,8 @@ def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
 
 def log_of(root: Path, upload: str) -> Path:
     """The log's file; raises BadRegistry where it is gone."""
-    folder = folder_of(root, upload)
-    for path in sorted(_files(folder)):
-        if path.suffix in ENDINGS:
-            return path
+    for path in (folder_of(root, upload) / LOG_FOLDER).glob("*"):
+        return path
     raise BadRegistry("this upload's file is gone")
 
 
@@ -113,7 +112,3 @@ def without_path(said: str, paths: Iterable[Path]) -> str:
     for path in paths:
         said = said.replace(f"{path.parent}/", "")
     return said
-
-
-def _files(folder: Path) -> Iterator[Path]:
-    return (path for path in folder.glob("*") if path.is_file())

@@ -21,13 +21,14 @@ def quick(work: Work, course: Course) -> str:
     text = work.log.read_text(encoding="utf-8")
     if "bad" in text:
         raise BadLog(f"{work.log}: is bad")
-    note = work.log.with_name(f"notes-{time.monotonic_ns()}")
+    folder = work.card.parent
+    note = folder / f"notes-{time.monotonic_ns()}"
     end = time.monotonic() + float(text)
     while time.monotonic() < end:
         course.report("refining", 0.5)
         note.write_text(f"{time.monotonic()}")
         time.sleep(0.01)
-    (work.log.with_name("done")).write_text("done")
+    (folder / "done").write_text("done")
     return "made"
 
 
@@ -42,7 +43,7 @@ def work(where: str, root: str, *, once: bool = False) -> None:
 def put(bench: Bench, root: Path, upload: Any, text: str) -> None:
     """An upload as the page keeps it, with a card."""
     folder = root / ".drops" / upload.id
-    folder.mkdir(parents=True)
-    (folder / "a.csv").write_text(text, encoding="utf-8")
+    (folder / "log").mkdir(parents=True)
+    (folder / "log" / "a.csv").write_text(text, encoding="utf-8")
     (folder / "card.toml").write_text("", encoding="utf-8")
     bench.add(upload)

@@ -146,7 +146,7 @@ def test_killed_servers_are_started_again_and_nothing_is_lost(
             os.kill(pid, signal.SIGKILL)
     with Registry(where) as registry:
         assert Bench(registry.database).upload(place.rpartition("/")[2]).file == "a.csv"
-    assert (root / ".drops" / place.rpartition("/")[2] / "a.csv").read_text() == ROWS
+    assert (root / ".drops" / place.rpartition("/")[2] / "log" / "a.csv").read_text() == ROWS
 
 
 def _serves(pid: int) -> bool:
