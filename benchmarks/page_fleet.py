@@ -73,7 +73,8 @@ def _block(session: Session, numbers: range, rng: np.random.Generator, now: date
                                      "evidence": _evidence(trend, n)})  # fmt: skip
         rows[MachineNowRow].append({"machine": name, "state": state, "heard_at": heard,
                                     "logs": LOGS_EACH, "moved": moved,
-                                    "moved_by": trend[moved][-1] / 10.0 - 1.0})  # fmt: skip
+                                    "moved_by": trend[moved][-1] / 10.0 - 1.0,
+                                    "moved_trend": json.dumps(trend[moved])})  # fmt: skip
         rows[MachineTrendRow].append({"machine": name, "trend": json.dumps(trend)})
     for table, values in rows.items():
         session.execute(insert(table), values)

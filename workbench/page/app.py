@@ -15,6 +15,7 @@ from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
 from workbench.page import deeds, drops, fleet, health, machine, sign_in, work
+from workbench.page.brief import Moment
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
 from workbench.page.pages import show
@@ -74,6 +75,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
         lifespan=life,
     )  # fmt: skip
     app.state.settings, app.state.registry, app.state.helpers = settings, registry, helpers
+    app.state.moment = Moment()
     access = Access(registry.database)
     app.state.access = access
     app.state.doorkeeper = Doorkeeper(access, open_reading=settings.open_reading)

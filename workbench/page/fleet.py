@@ -8,6 +8,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from workbench.page.brief import briefly
 from workbench.page.pages import STATE_WORDS, show
 from workbench.page.visitors import Visitor, reading
 from workbench.registry.overview import FLEET_ORDERS, FleetAsked, fleet_page
@@ -52,4 +53,4 @@ def asked_for(query: Mapping[str, Any], silent_days: float) -> FleetAsked:
     )
 
 
-FLEET_ROUTES = [Route("/", reading(fleet))]
+FLEET_ROUTES = [Route("/", reading(briefly(fleet)))]

@@ -1,6 +1,7 @@
 """A machine: parameters over time, what was decided and why, alarms, logs, versions, reports."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,13 +12,14 @@ from starlette.routing import Route
 
 from identification.errors import UserError
 from workbench.page import version_looks
+from workbench.page.brief import briefly
 from workbench.page.machine_charts import parameter_charts
 from workbench.page.pages import show
 from workbench.page.version_looks import EXPORTS
 from workbench.page.visitors import Visitor, reading
 from workbench.page.work import report_response
 from workbench.registry.difference import difference
-from workbench.registry.results import condition, last_logs, log_count
+from workbench.registry.results import JudgedLog, condition, last_logs, log_count
 from workbench.registry.store import Registry
 from workbench.registry.values import ALARMING, Kind, Version
 from workbench.report.chart import chart_html
@@ -41,7 +43,7 @@ def machine(request: Request, visitor: Visitor) -> Response:
         decisions=list(reversed(registry.decisions(name))), logs=logs, other=other,
         alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
         condition=condition(registry.database, name), total=log_count(registry.database, name),
-        reports=[path.name for path in _reports(request)], charts=_charts(registry, name),
+        reports=[path.name for path in _reports(request)], charts=_charts(logs),
     )  # fmt: skip
 
 
@@ -101,9 +103,9 @@ def changes(request: Request, visitor: Visitor) -> Response:
     return show(request, visitor, "changes", title="Changes", changes=found)
 
 
-def _charts(registry: Registry, name: str) -> str:
-    logs = last_logs(registry.database, name, LAST_LOGS)
-    return "".join(str(chart_html(one)) for one in parameter_charts(list(reversed(logs))))
+def _charts(logs: Sequence[JudgedLog]) -> str:
+    shown = list(reversed(logs[:LAST_LOGS]))
+    return "".join(str(chart_html(one)) for one in parameter_charts(shown))
 
 
 def _documents(registry: Registry, version: Version) -> dict[str, dict[str, Any] | None]:
@@ -128,7 +130,7 @@ def _registry(request: Request) -> Registry:
 
 MACHINE_ROUTES = [
     Route("/audit", reading(changes)),
-    Route("/machine/{machine}", reading(machine)),
+    Route("/machine/{machine}", reading(briefly(machine))),
     Route("/machine/{machine}/compare", reading(compare)),
     Route("/machine/{machine}/report/{file}", reading(kept_report)),
     Route("/machine/{machine}/version/{number:int}/report", reading(report)),

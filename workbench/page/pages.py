@@ -122,10 +122,9 @@ def spark(values: list[float], said: str) -> Markup:
         (SPARK_EDGE + k * step, SPARK_EDGE + room * (1.0 - (value - low) / span))
         for k, value in enumerate(values)
     ]
-    points = " ".join(f"{x:.1f},{y:.1f}" for x, y in at)
+    points = " ".join([f"{x:.1f},{y:.1f}" for x, y in at])
     return Markup(
-        '<svg class="spark" viewBox="0 0 {w:g} {h:g}" role="img" aria-label="{said}">'
-        '<polyline points="{points}"/><circle cx="{x:.1f}" cy="{y:.1f}" r="2"/></svg>'
-    ).format(
-        w=SPARK_WIDTH, h=SPARK_HEIGHT, said=escape(said), points=points, x=at[-1][0], y=at[-1][1]
+        f'<svg class="spark" viewBox="0 0 {SPARK_WIDTH:g} {SPARK_HEIGHT:g}" role="img"'
+        f' aria-label="{escape(said)}"><polyline points="{points}"/>'
+        f'<circle cx="{at[-1][0]:.1f}" cy="{at[-1][1]:.1f}" r="2"/></svg>'
     )

@@ -37,12 +37,14 @@ def glance_judged(
     row.state = state_of(verdict, evidence)
     name, change = glance(evidence)
     if name is not None:
-        row.moved, row.moved_by = name, change
-        trend = session.get_one(MachineTrendRow, machine)
-        trend.trend = dumps(with_log(json.loads(trend.trend), evidence))
+        kept = session.get_one(MachineTrendRow, machine)
+        trend = with_log(json.loads(kept.trend), evidence)
+        kept.trend = dumps(trend)
+        row.moved, row.moved_by, row.moved_trend = name, change, dumps(trend.get(name, []))
 
 
 def glance_moved(session: Session, machine: str) -> None:
     """Somebody has put another version in force: the next log tells how that fits."""
-    values = {"state": "not_judged", "moved": None, "moved_by": None}
+    nothing = dict.fromkeys(("moved", "moved_by", "moved_trend"))
+    values = {"state": "not_judged", **nothing}
     session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(values))

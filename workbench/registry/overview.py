@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from workbench.registry.at_a_glance import MachineCondition
 from workbench.registry.database import Database
-from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
+from workbench.registry.page_tables import MachineNowRow
 from workbench.registry.tables import DecisionRow, InForceRow, VersionRow
 
 FleetOrder = Literal["machine", "state", "heard", "moved"]
@@ -74,8 +74,8 @@ def fleet_page(database: Database, asked: FleetAsked) -> FleetPage:
         else:
             found = counts.get(asked.state, 0) if asked.state else sum(counts.values())
         rows = session.execute(_lines(asked, state, where)).all()
-        beside = _beside(session, [row.machine for row, _ in rows])
-        lines = [_line(row, shown, beside[row.machine]) for row, shown in rows]
+        forces = _beside(session, [row.machine for row in rows])
+        lines = [_line(row, forces.get(row.machine)) for row in rows]
     return FleetPage(lines, found or 0, counts)
 
 
@@ -106,7 +106,15 @@ def _lines(
     key = keys[asked.order]
     order = key.desc().nulls_last() if asked.down else key.asc().nulls_last()
     return (
-        select(MachineNowRow, state)
+        select(
+            MachineNowRow.machine,
+            MachineNowRow.heard_at,
+            MachineNowRow.logs,
+            MachineNowRow.moved,
+            MachineNowRow.moved_by,
+            MachineNowRow.moved_trend,
+            state,
+        )
         .where(*where)
         .order_by(order, MachineNowRow.machine)
         .limit(asked.per_page)
@@ -114,23 +122,22 @@ def _lines(
     )
 
 
-def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, Any]:
-    """Trend, version in force and since when, looked up for the page's machines alone."""
+def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int, datetime]]:
+    """Versions in force and since when, looked up for the page's machines alone."""
     query = (
-        select(MachineTrendRow.machine, MachineTrendRow.trend, VersionRow.number, DecisionRow.at)
-        .outerjoin(InForceRow, InForceRow.machine == MachineTrendRow.machine)
-        .outerjoin(VersionRow, VersionRow.id == InForceRow.version_id)
-        .outerjoin(DecisionRow, DecisionRow.id == InForceRow.decision_id)
-        .where(MachineTrendRow.machine.in_(machines))
+        select(InForceRow.machine, VersionRow.number, DecisionRow.at)
+        .join(VersionRow, VersionRow.id == InForceRow.version_id)
+        .join(DecisionRow, DecisionRow.id == InForceRow.decision_id)
+        .where(InForceRow.machine.in_(machines))
     )
-    return {machine: rest for machine, *rest in session.execute(query)}
+    return {machine: (number, at) for machine, number, at in session.execute(query)}
 
 
-def _line(row: MachineNowRow, state: Any, beside: Sequence[Any]) -> FleetLine:
-    trend, version, since = beside
-    told = json.loads(trend).get(row.moved, []) if row.moved else []
+def _line(row: Any, force: tuple[int, datetime] | None) -> FleetLine:
+    machine, heard_at, logs, moved, moved_by, trend, state = row
+    told = json.loads(trend) if trend else []
     return FleetLine(
-        row.machine, state, row.heard_at, row.logs, row.moved, row.moved_by, told, version, since
+        machine, state, heard_at, logs, moved, moved_by, told, *(force or (None, None))
     )
 
 

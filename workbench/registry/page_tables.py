@@ -100,7 +100,8 @@ class AuditRow(Base):
 class MachineNowRow(Base):
     """What is known of a machine now: state by its last log, when one came, what moved most.
 
-    moved_by: relative change of that parameter against the version in force.
+    moved_by: relative change of that parameter against the version in force; moved_trend: its
+    values over the last logs, as JSON.
     """
 
     __tablename__ = "machine_now"
@@ -110,6 +111,7 @@ class MachineNowRow(Base):
     logs: Mapped[int]
     moved: Mapped[str | None]
     moved_by: Mapped[float | None]
+    moved_trend: Mapped[str | None]
     __table_args__ = (
         Index(None, "state", "machine"),
         Index(None, "heard_at", "machine"),

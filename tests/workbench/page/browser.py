@@ -11,7 +11,7 @@ CHROMIUM = next(
 DRIVER = shutil.which("chromedriver")
 NO_BROWSER = "no Chromium with chromedriver on PATH: the page is not clicked through"
 WIDE, NARROW = 1400, 420
-PATIENCE = 120.0  # s that a person waits for a computation on a busy machine
+PATIENCE = 300.0  # s that a person waits for a computation on a busy machine
 AXE = Path(__file__).parent / "axe" / "axe.min.js"
 SERIOUS = ("serious", "critical")
 

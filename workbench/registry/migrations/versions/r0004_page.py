@@ -127,6 +127,7 @@ def _glances() -> None:
         sa.Column("logs", sa.Integer(), nullable=False),
         sa.Column("moved", sa.Text(), nullable=True),
         sa.Column("moved_by", sa.Double(), nullable=True),
+        sa.Column("moved_trend", sa.Text(), nullable=True),
         sa.PrimaryKeyConstraint("machine", name="pk_machine_now"),
         sa.ForeignKeyConstraint(["machine"], ["machine.name"], name="fk_machine_now_machine"),
     )
@@ -159,8 +160,8 @@ def _sqlite_triggers() -> None:
 def _fill() -> None:
     """What the results so far say of each machine, machine by machine."""
     connection = op.get_bind()
-    now = sa.table("machine_now", *map(sa.column, ("machine", "state", "heard_at", "logs")),
-                   *map(sa.column, ("moved", "moved_by")))  # fmt: skip
+    columns = ("machine", "state", "heard_at", "logs", "moved", "moved_by", "moved_trend")
+    now = sa.table("machine_now", *map(sa.column, columns))
     trends = sa.table("machine_trend", sa.column("machine"), sa.column("trend"))
     logs = sa.text("SELECT count(*), max(seen_at) FROM log WHERE machine = :m").columns(
         sa.column("count", sa.Integer()), sa.column("heard", UtcTime())
@@ -177,9 +178,13 @@ def _fill() -> None:
             evidence = json.loads(text)
             state, trend = state_of(verdict, evidence), with_log(trend, evidence)
             moved, by = glance(evidence)
+        last = json.dumps(trend[moved]) if moved in trend else None
         values = {"machine": machine, "state": state, "logs": count, "moved": moved}
         insert = sa.insert(now).values(
-            **values, moved_by=by, heard_at=sa.bindparam("heard", heard, UtcTime())
+            **values,
+            moved_by=by,
+            moved_trend=last,
+            heard_at=sa.bindparam("heard", heard, UtcTime()),
         )
         connection.execute(insert)
         connection.execute(sa.insert(trends).values(machine=machine, trend=json.dumps(trend)))
