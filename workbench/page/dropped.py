@@ -23,8 +23,8 @@ ENDINGS = (
     ".mdf", ".mf4", ".mcap", ".ulg", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods",
 )  # fmt: skip
 RESULT_FILE, CHARTS_FILE, REPORT_FILE = "result.json", "charts.html", "report.html"
-BLOCK = 1 << 20
-LONGEST_NAME = 80
+COPIED_AT_ONCE = 1 << 20
+LONGEST_FILE_NAME = 80
 _ID = re.compile(r"[0-9a-f]{16}")
 _ODD = re.compile(r"[^A-Za-z0-9_.-]+")
 
@@ -51,8 +51,10 @@ def file_name(given: str) -> str:
     stem, dot, end = plain.rpartition(".")
     ending = dot + end
     if ending.lower() not in ENDINGS:
-        raise BadLog(f"{plain[:LONGEST_NAME]}: no log by its ending; one of {' '.join(ENDINGS)}")
-    return (stem[: LONGEST_NAME - len(ending)].strip("._-") or "log") + ending.lower()
+        raise BadLog(
+            f"{plain[:LONGEST_FILE_NAME]}: no log by its ending; one of {' '.join(ENDINGS)}"
+        )
+    return (stem[: LONGEST_FILE_NAME - len(ending)].strip("._-") or "log") + ending.lower()
 
 
 def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
@@ -81,7 +83,7 @@ def drop_again(root: Path, upload: str) -> None:
 def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
     digest, size = hashlib.sha256(), 0
     with path.open("wb") as file:
-        while block := content.read(BLOCK):
+        while block := content.read(COPIED_AT_ONCE):
             digest.update(block)
             file.write(block)
             size += len(block)

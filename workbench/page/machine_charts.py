@@ -11,7 +11,7 @@ from workbench.report.chart import Area, Chart, Line, Panel
 
 MOST_PARAMETERS = 8
 FEWEST_LOGS = 2
-PANEL_HEIGHT = 190
+PARAMETER_HEIGHT = 190
 SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 
@@ -46,7 +46,7 @@ def _panel(name: str, told: Mapping[int, Mapping[str, Any]], x: Array, label: st
         label, f"{name} [{unit}]",
         [Line("in force", place, column("before"), "reference", "dashed"),
          Line("by each log", place, column("after"), "measured")],
-        areas=[Area("95 %", place, column("low"), column("high"), "band")], height=PANEL_HEIGHT,
+        areas=[Area("95 %", place, column("low"), column("high"), "band")], height=PARAMETER_HEIGHT,
     )  # fmt: skip
 
 

@@ -173,7 +173,9 @@ def _fill() -> None:
     for machine in connection.execute(sa.text("SELECT name FROM machine")).scalars().all():
         count, heard = connection.execute(logs, {"m": machine}).one()
         trend: Trend = {}
-        state, moved, by = "no_log", None, None
+        state: str = "no_log"
+        moved: str | None = None
+        by: float | None = None
         for verdict, text in connection.execute(results, {"m": machine}):
             evidence = json.loads(text)
             state, trend = state_of(verdict, evidence), with_log(trend, evidence)
