@@ -16,7 +16,12 @@ from identification.estimation.regression.equation_rows import (
     solve_rows,
     stacked,
 )
-from identification.estimation.regression.held_command import between_samples, share_between, unseen
+from identification.estimation.regression.held_command import (
+    between_samples,
+    period_of,
+    share_between,
+    unseen,
+)
 from identification.estimation.regression.inertia import inertia_has_no_part
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
@@ -55,6 +60,11 @@ class RecordedLogs:
     def by_command(self) -> bool:
         """Whether an actuator's equation is fitted beside the mechanical one."""
         return self.drive == "command" and not self.held
+
+    @property
+    def command_period(self) -> float | None:
+        """Time [s] after which the loop gives its next command, None where it is the samples'."""
+        return period_of(self.share, self.logs[0].log.h)
 
     @property
     def name(self) -> str:

@@ -320,6 +320,7 @@ def _told(spread: Spread, recorded: RecordedLogs) -> KarnoppFit:
         breakaways=spread.events.breakaways,
         evaluations=spread.evaluations,
         remarks=(*_remarks(spread, recorded), *spread.remarks),
+        command_period=recorded.command_period,
     )
 
 

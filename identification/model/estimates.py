@@ -67,6 +67,8 @@ class KarnoppFit:
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
     bad: samples of the logs that the run contradicts, which were set aside.
+    command_period: time [s] after which the drive gives its next command, None where no log shows
+    that it is sooner than the next sample.
     """
 
     friction: Karnopp
@@ -86,6 +88,7 @@ class KarnoppFit:
     remarks: tuple[str, ...]
     effects: tuple[Acting, ...] = ()
     bad: tuple[BadSamples, ...] = ()
+    command_period: float | None = None
 
     @property
     def imposed(self) -> bool:

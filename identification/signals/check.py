@@ -8,6 +8,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.log import Log, Rig
+from identification.signals.frozen import noise_shows, within
 from identification.signals.jumps import Jumps, jumps
 
 SHORTEST_LOG = 100
@@ -200,6 +201,8 @@ def _check_stuck(log: Log, first_row: int) -> None:
     bend = np.diff(y, 2)
     bend = bend[bend != 0.0]
     if bend.size < SHORTEST_LOG or np.mean(bend[1:] * bend[:-1] < 0.0) < _NOISE_LIKE:
+        return
+    if not noise_shows(y, within(starts[long], starts[long] + lengths[long] + 1, len(y))):
         return
     worst = int(np.argmax(lengths))
     raise BadLog(

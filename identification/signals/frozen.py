@@ -4,6 +4,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.arrays import Array
+from identification.signals.differentiate import resolution
+from identification.signals.steps import block_noise
 from identification.thresholds import FROZEN_RUN
 
 REPEATS_ELSEWHERE = 1e-3  # share of repeats outside such stretches, below which they are a fault
@@ -16,7 +18,26 @@ WAYS_ALIKE = (
 LONGEST_OFF = 50  # samples for which a logger may drop out
 DROP_LEAPS = 5.0  # times the median step, that a value that drops out leaps
 STEADY_SPEED = 1.5  # ratio of the speeds before and after
+SLOW_BLOCK = 24  # samples that tell a signal's noise at their speed
+CLOCK_SHARE = 0.1  # of a sample, by which a clock may jitter
+TELLING_PART = 0.05  # of these blocks, that have to show the noise
 SPEED_AROUND = 8  # samples to either side, whose speed is looked at
+
+
+def noise_shows(x: Array, still: NDArray[np.bool_]) -> bool:
+    """Whether a body at rest would not be shown by one value: a sensor's noise exceeds its count.
+
+    still (n,): samples that repeat one value for long, which tell nothing of the noise. Nor does
+    quick motion, where a jittering clock makes noise that is none at rest.
+    """
+    moves = np.asarray(x, dtype=np.float64)[~still]
+    noise = block_noise(moves, SLOW_BLOCK)
+    if not len(noise):
+        return False
+    ends = moves[: (len(noise) + 1) * SLOW_BLOCK : SLOW_BLOCK]
+    step = np.abs(np.diff(ends, append=moves[-1])[: len(noise)]) / SLOW_BLOCK
+    shown = noise > np.maximum(resolution(x), CLOCK_SHARE * step)
+    return float(np.mean(shown)) > TELLING_PART
 
 
 def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
@@ -37,6 +58,7 @@ def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
     bend = bend[bend != 0.0]
     noisy = repeats <= REPEATS_ELSEWHERE * len(x) and len(bend) > len(x) // 2
     noisy = noisy and float(np.mean(bend[1:] * bend[:-1] < 0.0)) > LIKE_NOISE
+    noisy = noisy and noise_shows(x, within(low[long], high[long], len(x)))
     for a, b in zip(low[long].tolist(), high[long].tolist(), strict=True):
         if at_limits and x[a] in (x.min(), x.max()):
             continue
@@ -44,6 +66,14 @@ def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:
         if (noisy and (not off or _dropped(x, a, b))) or _caught_up(x, a, b):
             out[a:b] = True
     return out if out.mean() <= MOST_FROZEN else np.zeros_like(out)
+
+
+def within(low: NDArray[np.intp], high: NDArray[np.intp], n: int) -> NDArray[np.bool_]:
+    """Samples (n,) of these stretches, `low` to `high` - 1 each."""
+    at = np.zeros(n + 1, dtype=np.int64)
+    np.add.at(at, low, 1)
+    np.add.at(at, high, -1)
+    return np.asarray(np.cumsum(at)[:n] > 0)
 
 
 def _dropped(x: Array, low: int, high: int) -> bool:

@@ -27,6 +27,9 @@ MOST_JUMPS = 12  # of one size
 PARABOLA_SIDE = 5  # samples to either side of a spike that the parabola goes through
 LONGEST_SMALL = 3  # samples of a spike
 USUAL_SHARE = 0.6  # of the neighbours, that lie as near to the parabola as counts for its own error
+NOISE_BLOCK = 96  # samples, of which the median tells the noise around one
+LOUDER = 1.5  # times the noise of the calmest, that it is to count: fewer samples tell it
+MEDIAN_OF_NOISE = 0.6745  # median size of white noise of unit deviation
 CALM_PART = 0.2  # of a log in which its noise is taken to be alone
 
 
@@ -41,6 +44,30 @@ def white_noise(x: Array) -> float:
     power = np.sort(np.mean(third[: count * size].reshape(count, size) ** 2, axis=1))
     calm = power[: max(1, int(CALM_PART * count))]
     return max(float(np.sqrt(np.mean(calm) / 0.45)), 0.5 * resolution(x), 1e-12 * float(np.ptp(x)))
+
+
+def block_noise(x: Array, size: int) -> Array:
+    """White noise (one sigma) of each block of so many samples, (k,): the last few are left over.
+
+    By the median, which a kink or a spike does not move.
+    """
+    third = np.abs(np.diff(x, 3)) / np.sqrt(20.0)
+    count = len(third) // size
+    blocks = third[: count * size].reshape(count, size)
+    return np.asarray(np.median(blocks, axis=1) / MEDIAN_OF_NOISE)
+
+
+def local_noise(x: Array) -> Array:
+    """White noise of a signal around each sample (one sigma), (n,): `white_noise`, or clearly more.
+
+    A clock that jitters makes a position the noisier the faster the body is. x: (n,), without gaps.
+    """
+    least, blocks = white_noise(x), block_noise(x, NOISE_BLOCK)
+    if not len(blocks):
+        return np.full(len(x), least)
+    noise = maximum_filter1d(blocks, 3)
+    at = np.minimum(np.arange(len(x)) // NOISE_BLOCK, len(blocks) - 1)
+    return np.where(noise[at] > LOUDER * least, noise[at], least)
 
 
 @lru_cache
@@ -180,8 +207,8 @@ def small_spikes(x: Array) -> NDArray[np.bool_]:
     out = np.zeros(len(x), dtype=bool)
     if len(x) < 4 * PARABOLA_SIDE + LONGEST_SMALL:
         return out
-    noise = white_noise(x)
-    for length in range(1, LONGEST_SMALL + 1) if noise > 0.0 else ():
+    noise = local_noise(x)
+    for length in range(1, LONGEST_SMALL + 1) if np.all(noise > 0.0) else ():
         height, own = deviations(x, length)
         for first in np.flatnonzero(height > SPIKE_FROM * np.maximum(noise, own)):
             out[first : first + length] = True

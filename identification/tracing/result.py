@@ -94,6 +94,24 @@ class Residual:
 
 
 @dataclass(frozen=True, eq=False)
+class FreeCurve:
+    """An effect's part of an equation against a signal, free of its law and by its law.
+
+    at (k,): middles of the pieces in the signal's unit; free, sd (k,): mean of what the model
+    without the effect leaves there and the deviation of that mean; law (k,): mean of what the
+    effect gives: friction against the motion, a driving force [N], or a rate of the force [N/s].
+    """
+
+    effect: str
+    equation: str
+    signal: str
+    at: Array
+    free: Array
+    sd: Array
+    law: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Trace:
     """The result of `trace.trace`.
 
@@ -104,7 +122,8 @@ class Trace:
     it is not followed; next_experiment: one sentence, "" where none is needed; remarks: a line
     each. complete: the model predicts the test logs down to the sensors' noise; left: what is
     missing beside the effects named. not_tried: in words, what a halted trace has not looked
-    for, so that its verdict is one for the time being.
+    for, so that its verdict is one for the time being. command_period: as of a fit. curves: of the
+    effects named that are a function of a logged signal.
     """
 
     verdict: TraceVerdict
@@ -128,3 +147,5 @@ class Trace:
     left: Left = Left(0.0, ())
     remarks: tuple[str, ...] = field(default=())
     not_tried: tuple[str, ...] = ()
+    command_period: float | None = None
+    curves: tuple[FreeCurve, ...] = ()

@@ -18,6 +18,7 @@ from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
+from identification.tracing.free_curve import free_curves
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
@@ -138,6 +139,8 @@ def _told(
         remarks=(*rows.remarks, *judged.remarks, *_left_out(not_tried)),
         complete=judged.complete and not not_tried,
         left=judged.rest,
+        command_period=rows.recorded.command_period,
+        curves=free_curves(choice),
     )
 
 

@@ -103,6 +103,7 @@ class FitSummary:
 
     drive: what the fitted run was driven by; stiffness [N/m] couples a force-driven one to the
     measured position. force_relative, force_rms [N]: the mechanical equation on sliding samples.
+    command_period [s]: after which the drive gives its next command, None where that is the log's.
     """
 
     drive: Drive
@@ -115,11 +116,13 @@ class FitSummary:
     force_relative: float | None
     force_rms: float | None
     remarks: tuple[str, ...]
+    command_period: float | None = None
 
     def __post_init__(self) -> None:
-        for name in ("noise_y", "noise_F", "stiffness"):
-            if not getattr(self, name) >= 0:
-                raise BadModel(f"[fit] {name} = {getattr(self, name):g}, must be 0 or more")
+        for name in ("noise_y", "noise_F", "stiffness", "command_period"):
+            value = getattr(self, name)
+            if value is not None and not value >= 0:
+                raise BadModel(f"[fit] {name} = {value:g}, must be 0 or more")
 
 
 @dataclass(frozen=True)

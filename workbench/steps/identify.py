@@ -123,6 +123,7 @@ def _summary(
         force_relative=errors.relative if errors else None,
         force_rms=errors.rms if errors else None,
         remarks=(*fit.remarks, *always, *closed),
+        command_period=fit.command_period,
     )
 
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.arrays import Array, IntArray
 from identification.errors import BadLog, BadModel
+from identification.estimation.regression.held_command import with_period
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
@@ -96,7 +97,8 @@ def predict(
     how = Smoothing(held=model.rig.kind == "motor")
     blank = np.full(len(log), np.nan)
     applied = log.signals.get("F", blank)
-    run, refused = _run(model, log, body, chosen, restarts)
+    driven = as_driven(model, log, chosen)
+    run, refused = _run(model, driven, body, chosen, restarts)
     simulated, other = (run, None) if chosen == "command" else _commanded(model, body, restarts)
     return Prediction(
         t=log["t"],
@@ -218,6 +220,13 @@ def default_drive(model: Model, log: Log) -> Drive:
     return "command" if known and "u" in log else "force"
 
 
+def as_driven(model: Model, log: Log, drive: Drive) -> Log:
+    """The log with what drove the machine between its samples, as the model's logs showed it."""
+    if drive == "force":
+        return log
+    return with_period(log, model.fit.command_period, model.rig.kind == "motor")
+
+
 def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
     """The run that the fit compared with one of its logs: from its start, coupled as it was.
 
@@ -229,7 +238,7 @@ def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
     restarts = _restarts(log, FORCE_WINDOW) if drive == "force" else None
     return free_run(
         model.simulated,
-        log,
+        as_driven(model, log, drive),
         model.log[index].start,
         drive,
         stiffness=model.fit.stiffness if drive == "force" else 0.0,
@@ -255,7 +264,7 @@ def _commanded(
     """The run by the command beside that by force, where there are actuator and command."""
     if model.actuator is None or "u" not in body:
         return None, None
-    return _run(model, body, body, "command", restarts)
+    return _run(model, as_driven(model, body, "command"), body, "command", restarts)
 
 
 def _restarts(log: Log, window: float) -> tuple[IntArray, Array, Array]:

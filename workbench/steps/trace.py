@@ -14,7 +14,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import actuator_units
 from identification.progress import KeepGoing, without_end
 from identification.signals.bad_samples import BadSamples
-from identification.tracing.result import Errors, FoundEffect, Trace
+from identification.tracing.result import Errors, FoundEffect, FreeCurve, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
@@ -143,6 +143,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
             force_relative=errors.force_relative,
             force_rms=errors.force_rms,
             remarks=found.remarks,
+            command_period=found.command_period,
         ),
         log=tuple(_entry(source, errors, chi) for source in sources.runs),
         versions=versions(),
@@ -210,6 +211,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             }
             for e in found.effects
         ],
+        "curves": [_curve(one) for one in found.curves],
         "rivals": [asdict(rival) for rival in found.rivals],
         "unknown": {
             "depends_on": list(found.unknown.depends_on),
@@ -228,6 +230,12 @@ def trace_document(traced: Traced) -> dict[str, Any]:
         "remarks": [*traced.remarks, *found.remarks],
         "versions": versions(),
     }
+
+
+def _curve(one: FreeCurve) -> dict[str, Any]:
+    """A free curve and its law, an array each as a list."""
+    lists = {name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}
+    return {"key": one.effect, "equation": one.equation, "signal": one.signal, **lists}
 
 
 def _fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:

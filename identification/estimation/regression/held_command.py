@@ -80,6 +80,22 @@ def between_samples(log: Log, share: float, held: bool) -> Log:
     return log.with_signals(**means)
 
 
+def period_of(share: float, h: float) -> float | None:
+    """Time [s] after which the loop gives its next command, in logs with samples every h [s].
+
+    None where nothing shows that this is sooner than the next sample. R periods a sample make a
+    share of (R - 1) / (2 R).
+    """
+    return h * (1.0 - 2.0 * share) if share > 0.0 else None
+
+
+def with_period(log: Log, period: float | None, held: bool) -> Log:
+    """Another log of such a machine, whatever its clock, with the mean command until its next
+    sample; held: as in `between_samples`."""
+    share = 0.0 if period is None else 0.5 * (1.0 - period / log.h)
+    return between_samples(log, max(share, 0.0), held)
+
+
 def unseen(log: Log, share: float) -> float:
     """Noise of a motor's force [N] that its loop adds between the samples of a log of means.
 

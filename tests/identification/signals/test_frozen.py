@@ -4,6 +4,9 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
+from identification.errors import BadLog
+from identification.log import Log, Rig
+from identification.signals.check import check
 from identification.signals.frozen import frozen
 
 
@@ -49,3 +52,26 @@ def test_a_command_that_drops_out_for_a_moment() -> None:
     u = 20.0 * motion(noise=1e-3)
     u[1300:1315] = 0.0
     assert np.count_nonzero(frozen(u, at_limits=True)) == 15
+
+
+def jittering(count: float, noise: float = 0.0) -> Array:
+    """An encoder's position to and fro with rests, by a clock that jitters."""
+    rng = np.random.default_rng(1)
+    t = 1e-3 * np.arange(8000) + 2e-5 * rng.standard_normal(8000)
+    y = 0.05 * np.clip(1.3 * np.sin(2.0 * np.pi * t), -1.0, 1.0)
+    return np.asarray(count * np.round((y + noise * rng.standard_normal(8000)) / count))
+
+
+def test_an_encoder_at_rest_is_no_fault_though_its_clock_jitters() -> None:
+    y = jittering(1e-6)
+    assert np.mean(np.diff(y) == 0.0) > 0.2  # it stands, and repeats nothing else
+    assert not np.any(frozen(y))
+    check(Log("encoder", {"t": 1e-3 * np.arange(len(y)), "y": y}), Rig("force"))
+
+
+def test_an_encoder_with_noise_at_rest_is_one_where_it_stands() -> None:
+    y = jittering(1e-8, noise=2e-5)
+    y[2000:2300] = y[2000]
+    assert np.flatnonzero(frozen(y)).tolist() == list(range(2000, 2300))
+    with pytest.raises(BadLog, match="sticks"):
+        check(Log("encoder", {"t": 1e-3 * np.arange(len(y)), "y": y}), Rig("force"))

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array, frozen
-from identification.signals.steps import jump_size, small_jumps, small_spikes, white_noise
+from identification.signals.steps import (
+    jump_size,
+    local_noise,
+    small_jumps,
+    small_spikes,
+    white_noise,
+)
 
 H, NOISE = 1e-3, 1e-5
 T = H * np.arange(6000.0)
@@ -53,3 +59,20 @@ def test_an_encoder_s_counts_are_neither(count: float) -> None:
 
 def test_noise_is_told_beside_motion() -> None:
     assert white_noise(way()) == pytest.approx(NOISE, rel=0.15)
+
+
+def jittering(seed: int) -> Array:
+    """The same motion with rests, by a clock that jitters: 30 times as noisy in fast motion."""
+    rng = np.random.default_rng(seed)
+    t = T + 1e-6 * rng.standard_normal(len(T))
+    y = 0.05 * np.clip(1.3 * np.sin(2.0 * np.pi * t), -1.0, 1.0)
+    return np.asarray(y + 1e-8 * rng.standard_normal(len(T)))
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_a_clock_that_jitters_makes_no_spikes(seed: int) -> None:
+    y = jittering(seed)
+    assert not np.any(small_spikes(y))
+    assert 1.0 < np.max(local_noise(y)) / (0.05 * 1.3 * 2.0 * np.pi * 1e-6) < 1.7
+    y[1990:1993] += 20.0 * np.max(local_noise(y))
+    assert np.flatnonzero(small_spikes(y)).tolist() == [1990, 1991, 1992]

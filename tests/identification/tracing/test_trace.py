@@ -115,6 +115,10 @@ def test_the_effect_is_named_and_its_size_found(key: str, values: dict[str, Any]
     errors = "actuator_rms" if key == "valve_dead_zone" else "force_rms"
     before, after = getattr(found.before["test"], errors), getattr(found.after["test"], errors)
     assert after < 0.6 * before
+    for curve in found.curves:  # what is there without the effect, free of its law, is its law
+        assert curve.effect == key and np.ptp(curve.law) > 1.0
+        assert np.mean(((curve.free - curve.law) / curve.sd) ** 2) < 2.0
+    assert bool(found.curves) == (key in ("stribeck", "warmup", "cogging"))
 
 
 @pytest.mark.parametrize(
