@@ -21,12 +21,12 @@ import click
 from identification.errors import UserError
 
 if TYPE_CHECKING:
-    from rich.table import Table
+    from rich.padding import Padding
 
 Row = tuple[str, ...]
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-PIPED_WIDTH = 120
+PIPED_WIDTH = 100
 
 
 class Bar(Protocol):
@@ -261,19 +261,25 @@ def progress(label: str, total: float | None = None, *, as_json: bool = False) -
         yield Shown(bar, bar.add_task(label, total=total))
 
 
+def next_step(text: str) -> str:
+    """What to do next, as a line for a terminal; commands stand in `...` as in a report."""
+    return f"next: {text.replace('`', '')}"
+
+
 def written(folder: Path, *names: str) -> str:
     """Where the results lie."""
     return "written: " + ", ".join(str(folder / name) for name in names)
 
 
-def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Table":
-    """A plain table for a terminal; right: the columns of numbers."""
+def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Padding":
+    """A plain table for a terminal, a blank line above it; right: the columns of numbers."""
     from rich.box import SIMPLE_HEAD
+    from rich.padding import Padding
     from rich.table import Table
 
-    out = Table(box=SIMPLE_HEAD, pad_edge=False)
+    out = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
     for number, name in enumerate(head):
         out.add_column(name, justify="right" if number in right else "left", overflow="fold")
     for row in rows:
         out.add_row(*row)
-    return out
+    return Padding(out, (1, 0, 0, 0))

@@ -213,7 +213,7 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     assert any("modulus margin" in line for line in found["rst"]["missed"])
     assert main(asked) == 1
     shown = capsys.readouterr().out
-    assert "recommended: none" in shown and "RST misses: modulus margin" in shown
+    assert "No controller keeps every goal" in shown and "RST misses: modulus margin" in shown
     assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
 
 

@@ -7,7 +7,7 @@ from typing import Literal
 import click
 
 from workbench.options import POSITIVE, card_option, effects_option
-from workbench.output import OutputFolder, emit, output_options, progress, written
+from workbench.output import OutputFolder, emit, next_step, output_options, progress, written
 
 
 @click.command(epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a")
@@ -44,7 +44,7 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.model import read_model
     from workbench.logs.sources import read_sources
-    from workbench.report.prediction import prediction_lines
+    from workbench.report.prediction import prediction_lines, then_of_prediction
     from workbench.steps.predict import predict_sources, prediction_csv
 
     model = read_model(model_file, library(effects))
@@ -57,6 +57,10 @@ def command(
         {**found.summary, "out": folder.final},
         as_json,
         lambda: "\n".join(
-            [*prediction_lines(found, model.rotary), written(folder.final, "prediction.csv")]
+            [
+                *prediction_lines(found, model.rotary),
+                *map(next_step, then_of_prediction(log, card)),
+                written(folder.final, "prediction.csv"),
+            ]
         ),
     )

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench.jobs.options import JobOptions, job_options, worker
-from workbench.output import emit
+from workbench.output import emit, next_step
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -62,10 +62,16 @@ def pass_view(done: "PassReport") -> "Group":
     """What a pass did, for a terminal."""
     from rich.console import Group, RenderableType
 
+    from workbench.jobs.alarms import ALARMING
     from workbench.registry.views import outcomes_view
 
     judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"
     parts: list[RenderableType] = [judged, *remarks(done)]
+    alarming = dict.fromkeys(o.machine for o in done.outcomes if o.verdict in ALARMING)
+    parts.extend(
+        next_step(f"`workbench registry show {machine}` says what has changed, and what was done")
+        for machine in alarming
+    )
     if done.outcomes:
         parts.append(outcomes_view(done.outcomes))
     return Group(*parts)

@@ -35,13 +35,16 @@ class PredictResult(Result):
         return prediction_frame(self.found.runs)
 
     def report(self) -> str:
-        from workbench.report.page import Section, page, render
-        from workbench.report.prediction import prediction_section
+        from workbench.report.page import Section, page
+        from workbench.report.prediction import prediction_section, then_of_prediction
+        from workbench.report.templating import render
 
-        lines = Section("In words", render("lines", lines=self._lines()))
-        return page(
-            "Prediction", self._lines()[0], [lines, prediction_section(self.found, self.rotary)]
-        )
+        first, *more = self._lines()
+        sections = [prediction_section(self.found, self.rotary)]
+        if more:
+            sections.append(Section("In words", render("lines", lines=more)))
+        lead, then = first.rstrip(".") + ".", then_of_prediction("LOG", "CARD")
+        return page("Prediction", lead, sections, then)
 
     def _lines(self) -> list[str]:
         from workbench.report.prediction import prediction_lines
@@ -49,9 +52,10 @@ class PredictResult(Result):
         return prediction_lines(self.found, self.rotary)
 
     def plot(self) -> "Figure":
-        from workbench.report.prediction import prediction_figure
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.prediction import prediction_chart
 
-        return prediction_figure(self.found, self.rotary)
+        return chart_figure(prediction_chart(self.found, self.rotary))
 
     def _view(self) -> object:
         return "\n".join(self._lines())
@@ -144,7 +148,7 @@ class SimulateResult:
         return f"{self._line()}\n{self.frame!r}"
 
     def _repr_html_(self) -> str:
-        from workbench.report.page import render
+        from workbench.report.templating import render
 
         shown = self.frame._repr_html_()  # type: ignore[operator]
         return f"{render('lead', sentence=self._line())}\n{shown}"

@@ -62,9 +62,10 @@ class DesignResult(Result):
         return design_report(self.design, self.model.rotary)
 
     def plot(self) -> "Figure":
-        from workbench.report.controllers import step_figure
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.controllers import step_chart
 
-        return step_figure(self.design)
+        return chart_figure(step_chart(self.design))
 
     def _view(self) -> object:
         from workbench.report.design_tables import design_view
@@ -72,10 +73,15 @@ class DesignResult(Result):
         return design_view(self.design, None, self.model.rotary)
 
     def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.design_tables import DESIGN_HEAD, design_lines, margin_rows
+        from workbench.report.design_tables import (
+            DESIGN_HEAD,
+            design_lines,
+            design_sentence,
+            margin_rows,
+        )
 
-        first, *lines = design_lines(self.design, self.model.rotary)
-        return first, [Part(DESIGN_HEAD, margin_rows(self.design), lines)]
+        lines = design_lines(self.design, self.model.rotary)
+        return design_sentence(self.design), [Part(DESIGN_HEAD, margin_rows(self.design), lines)]
 
     def _files(self) -> Iterator[tuple[str, str]]:
         yield "design.json", self.to_json() + "\n"
@@ -111,9 +117,10 @@ class ValidateResult(Result):
         return validation_report(self.found, self.traces, self.rotary)
 
     def plot(self) -> "Figure":
-        from workbench.report.loop import loop_figure
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.loop import step_chart
 
-        return loop_figure(self.found, self.traces, "model", self.rotary)
+        return chart_figure(step_chart(self.found, self.traces, "model", self.rotary))
 
     def _view(self) -> object:
         from workbench.report.validation_tables import validation_view

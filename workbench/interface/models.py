@@ -109,11 +109,13 @@ class IdentifyResult(_OfModel):
         return identification_report(self.found)
 
     def plot(self) -> "Figure":
-        from workbench.report.fit import fit_figure
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.fit import fit_chart
         from workbench.steps.predict import fitted_run
 
-        log = self.found.sources[0].log
-        return fit_figure(self.model, log, fitted_run(self.model, log, 0))
+        sources = self.found.sources
+        runs = [fitted_run(self.model, one.log, number) for number, one in enumerate(sources)]
+        return chart_figure(fit_chart(self.model, sources, runs))
 
     def _view(self) -> object:
         from workbench.report.model_tables import model_view
@@ -168,11 +170,15 @@ class TraceResult(_OfModel):
         return trace_report(self.found)
 
     def plot(self) -> "Figure":
-        from workbench.report.trace_friction import friction_figure
-        from workbench.report.trace_pictures import pictures, signal_figure
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.trace_friction import friction_chart
+        from workbench.report.trace_pictures import pictures, signal_chart
 
-        drawn = pictures(self.found.trace)
-        return signal_figure(drawn[0], self.model.rotary) if drawn else friction_figure(self.found)
+        drawn, rig = pictures(self.found.trace), self.model.rig
+        chart = friction_chart(self.found)
+        if drawn:
+            chart = signal_chart(drawn[0], self.model.rotary, rig.command_unit)
+        return chart_figure(chart)
 
     def _view(self) -> object:
         from workbench.report.trace_tables import trace_view
@@ -180,13 +186,15 @@ class TraceResult(_OfModel):
         return trace_view(self.found, None)
 
     def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.trace_tables import next_run, trace_parts, trace_sentence
+        from workbench.report.trace_tables import trace_parts
+        from workbench.report.trace_words import then_of, trace_sentence
 
         found = self.found.trace
         parts = [Part(head, rows, lines) for head, rows, lines in trace_parts(self.found)]
         notes = [f"note: {line}" for line in (*self.found.remarks, *found.remarks)]
         parts[-1] = parts[-1]._replace(lines=[*parts[-1].lines, *notes])
-        return f"{trace_sentence(self.found)} {next_run(found)}".strip(), parts
+        then = " ".join(f"Next: {line}." for line in then_of(self.found))
+        return f"{trace_sentence(self.found)} {then}".strip(), parts
 
     def _files(self) -> Iterator[tuple[str, str]]:
         from workbench.documents.model import model_document

@@ -74,7 +74,7 @@ class Result(ABC):
         return as_text(self._view()).rstrip()
 
     def _repr_html_(self) -> str:
-        from workbench.report.page import render
+        from workbench.report.templating import render
 
         sentence, parts = self._told()
         shown = [render("lead", sentence=sentence)]

@@ -21,7 +21,7 @@ from workbench.jobs.drift_verdict import Drift, DriftJudge
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Source, Sources, read_sources
 from workbench.registry.values import Candidate, Judgement
-from workbench.report.trace_tables import trace_sentence
+from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.trace import Traced, trace_sources

@@ -23,7 +23,8 @@ from workbench.report.figures import (
     line,
     style,
 )
-from workbench.report.page import Section, page, render
+from workbench.report.page import Section, page
+from workbench.report.templating import render
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -10,12 +10,12 @@ from workbench.registry.values import Decision, LogOutcome, MachineState
 
 if TYPE_CHECKING:
     from rich.console import Group
-    from rich.table import Table
+    from rich.padding import Padding
 
 SHORT = 12  # characters of a fingerprint that are shown
 
 
-def list_view(machines: Sequence[MachineState]) -> "Table | str":
+def list_view(machines: Sequence[MachineState]) -> "Padding | str":
     """A line a machine."""
     if not machines:
         return "no machine yet; 'workbench registry add MACHINE MODEL DESIGN' makes one"
@@ -64,7 +64,7 @@ def machine_view(
     return Group(*parts)
 
 
-def outcomes_view(outcomes: Sequence[LogOutcome]) -> "Table":
+def outcomes_view(outcomes: Sequence[LogOutcome]) -> "Padding":
     """A line a log."""
     return table(
         ("machine", "log", "verdict", "version", "reason"),
@@ -75,7 +75,7 @@ def outcomes_view(outcomes: Sequence[LogOutcome]) -> "Table":
     )
 
 
-def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> "Table":
+def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> "Padding":
     """Two versions side by side."""
     head = ("parameter", names[0], "unit", "95 %", names[1], "95 %", "change")
     return table(

@@ -15,16 +15,17 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from identification.arrays import Array
-from workbench.report.page import render, safe
+from workbench.report.templating import render, safe
 
 Colour = Literal["measured", "model", "reference", "other", "before", "band", "quiet"]
 Look = Literal["line", "bold", "dashed", "dotted", "dots"]
 
 FIRST_VIEW = 4000  # points of a line at least: two on each pixel of a wide screen
-FINEST = 40_000  # points of a line at most
+FINEST_POINTS = 40_000  # points of a line at most
 ALL_POINTS = 160_000  # of a chart's lines together; 0.9 MB in the page
 EVEN = 1e-6  # of a step, within which a clock counts as even
-SPREAD = 1e-6  # of the range, by which dots at the same place are set apart
+LARGEST = 1e30  # number that is drawn; loops that run away go far beyond
+DOT_SPREAD = 1e-6  # of the range, by which dots at the same place are set apart
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +128,7 @@ def chart_data(chart: Chart) -> dict[str, Any]:
     of little-endian numbers); `lines`: name, colour and look of every column in that order.
     """
     lines = [line for panel in chart.panels for line in _columns(panel)]
-    points = int(np.clip(ALL_POINTS // max(len(lines), 1), FIRST_VIEW, FINEST))
+    points = int(np.clip(ALL_POINTS // max(len(lines), 1), FIRST_VIEW, FINEST_POINTS))
     return {
         "name": chart.name,
         "shared_x": chart.shared_x,
@@ -196,7 +197,7 @@ def _table(group: list[_Column], points: int) -> dict[str, Any]:
         order = np.argsort(x, kind="stable")
         x, values = x[order], [np.asarray(y)[order] for y in values]
         # Those at the same place would be drawn as one.
-        x = x + SPREAD * np.ptp(x) * np.arange(len(x)) / max(len(x), 1) if len(x) else x
+        x = x + DOT_SPREAD * np.ptp(x) * np.arange(len(x)) / max(len(x), 1) if len(x) else x
     else:
         x, values = thinned_together(x, values, points)
     return {"x": coded_x(x), "y": [coded(y, "f4") for y in values]}
@@ -219,9 +220,9 @@ def thinned_together(x: Array, values: Iterable[Array], points: int) -> tuple[Ar
 
 
 def _low_and_high(y: Array, starts: Any, size: int) -> Array:
-    blocks = np.full(len(starts) * size, np.nan)
-    blocks[: len(y)] = y
-    blocks = blocks.reshape(len(starts), size)
+    filled = np.full(len(starts) * size, np.nan)
+    filled[: len(y)] = y
+    blocks = filled.reshape(len(starts), size)
     known = np.isfinite(blocks)
     low = np.where(known, blocks, np.inf)
     high = np.where(known, blocks, -np.inf)
@@ -244,6 +245,7 @@ def coded_x(x: Array) -> dict[str, Any]:
 
 
 def coded(values: Array, kind: Literal["f4", "f8"]) -> dict[str, Any]:
-    """Numbers as base64; NaN where there is none."""
-    plain = np.asarray(values, dtype=f"<{kind}")
+    """Numbers as base64; NaN where there is none, or none that can be drawn."""
+    known = np.where(np.abs(values) < LARGEST, values, np.nan)
+    plain = np.asarray(known, dtype=f"<{kind}")
     return {"type": kind, "base64": base64.b64encode(plain.tobytes()).decode("ascii")}

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-COLOURS: dict[Colour, str] = {
+FIGURE_COLOURS: dict[Colour, str] = {
     "measured": MEASURED,
     "model": MODEL,
     "reference": REFERENCE,
@@ -37,38 +37,38 @@ LOOKS: dict[str, dict[str, Any]] = {
     "dashed": {"ls": "--"},
     "dotted": {"ls": ":"},
 }
-WIDTH, PANEL_HEIGHT = 9.0, 2.3  # inch
+FIGURE_WIDTH, PANEL_HEIGHT = 9.0, 2.3  # inch
 
 
 def chart_figure(chart: Chart) -> "Figure":
     """The same panels, lines, areas, bands and marks, without zoom."""
     rows = -(-len(chart.panels) // chart.columns)
     with style():
-        drawn = figure(WIDTH, PANEL_HEIGHT * max(rows, 1.4))
+        drawn = figure(FIGURE_WIDTH, PANEL_HEIGHT * max(rows, 1.4))
         every = drawn.subplots(rows, chart.columns, squeeze=False).ravel()
         for axes, panel in zip(every, chart.panels, strict=False):
             _panel(axes, panel)
         for axes in every[len(chart.panels) :]:
             axes.set_visible(False)
-        found: dict[str, Any] = {}
-        for axes in every:
-            handles, names = axes.get_legend_handles_labels()
-            found.update(zip(reversed(names), reversed(handles), strict=True))
-        names = list(reversed(found))
-        drawn.legend(
-            [found[name] for name in names],
-            names,
-            loc="outside upper right",
-            ncols=4,
-            markerscale=3,
-        )
+        _legend(drawn, every.tolist())
     return drawn
+
+
+def _legend(drawn: "Figure", every: "list[Axes]") -> None:
+    """One legend where a panel's names hold for all, else one a panel."""
+    legends = [axes.get_legend_handles_labels() for axes in every]
+    handles, names = max(legends, key=lambda one: len(one[1]))
+    if all(set(one) <= set(names) for _, one in legends):
+        drawn.legend(handles, names, loc="outside upper right", ncols=4, markerscale=3)
+        return
+    for axes in every:
+        axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4, markerscale=3)
 
 
 def _panel(axes: "Axes", panel: Panel) -> None:
     for area in panel.areas:
         axes.fill_between(
-            area.x, area.low, area.high, color=COLOURS[area.colour], alpha=0.4, lw=0,
+            area.x, area.low, area.high, color=FIGURE_COLOURS[area.colour], alpha=0.4, lw=0,
             label=area.name,
         )  # fmt: skip
     for band in panel.bands:
@@ -88,7 +88,7 @@ def _panel(axes: "Axes", panel: Panel) -> None:
 
 def _band(axes: "Axes", band: Band) -> None:
     span = axes.axvspan if band.axis == "x" else axes.axhspan
-    span(band.low, band.high, color=COLOURS[band.colour], alpha=0.25, lw=0, label=band.name)
+    span(band.low, band.high, color=FIGURE_COLOURS[band.colour], alpha=0.25, lw=0, label=band.name)
 
 
 def _mark(axes: "Axes", mark: Mark) -> None:
@@ -97,7 +97,7 @@ def _mark(axes: "Axes", mark: Mark) -> None:
 
 
 def _line(axes: "Axes", one: Line) -> None:
-    colour = COLOURS[one.colour]
+    colour = FIGURE_COLOURS[one.colour]
     if one.look == "dots":
         keep = evenly_spread(len(one.x))
         axes.plot(

@@ -1,7 +1,5 @@
 """Sections of a design: margins in a table, sensitivity functions, the linear step response."""
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from scipy.signal import lfilter
 
@@ -10,6 +8,7 @@ from design.rst import closed_loop
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design
+from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
 from workbench.report.design_tables import (
     DESIGN_HEAD,
     design_lines,
@@ -17,18 +16,11 @@ from workbench.report.design_tables import (
     margin_rows,
     polynomial_lines,
 )
-from workbench.report.figures import (
-    CONTROLLER_COLOURS,
-    OTHER,
-    figure,
-    inline,
-    label,
-    style,
-)
-from workbench.report.page import Section, render
+from workbench.report.loop import LOOP_COLOURS
+from workbench.report.page import Section
+from workbench.report.templating import render
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+MOST_DB = float(20 * np.log10(2.0))  # of |S_yp| at a modulus margin of 0.5
 
 
 def controllers(found: Design, rotary: bool = False) -> Section:
@@ -54,52 +46,45 @@ def sensitivity_section(found: Design, rotary: bool = False) -> Section:
     """|S_yp| with its limit, and |S_up|."""
     A, B = np.array(found.plant.A), np.array(found.plant.B)
     w = np.geomspace(1e-3, 1.0, 400) * np.pi / found.plant.h
-    with style():
-        drawn = figure(9.0, 3.4)
-        left, right = drawn.subplots(1, 2)
-        for name, one in found.controllers.items():
-            s = sensitivities(A, B, one.rst, w)
-            left.semilogx(w, _db(s.S_yp), color=CONTROLLER_COLOURS[name], label=name.upper())
-            right.semilogx(w, _db(s.S_up), color=CONTROLLER_COLOURS[name])
-        left.axhline(20 * np.log10(2.0), color=OTHER, ls=":", label="modulus margin 0.5")
-        top = right.get_ylim()[1]
-        right.set_ylim(top - 80.0, top)
-        label(left, "frequency [rad/s]", "|S_yp| [dB]", "disturbance to position")
-        label(
-            right,
-            "frequency [rad/s]",
-            f"|S_up| [dB, {shown(rotary).stiffness}]",
-            "measurement noise to force",
-        )
-        left.legend(loc="lower right")
-        svg = inline(drawn, "sensitivity", "sensitivity functions against frequency")
+    noise: list[Line] = []
+    disturbance = [Line("modulus margin 0.5", w, np.full(len(w), MOST_DB), "other", "dotted")]
+    for name, one in found.controllers.items():
+        s, colour = sensitivities(A, B, one.rst, w), LOOP_COLOURS[name]
+        disturbance.append(Line(name.upper(), w, _db(s.S_yp), colour))
+        noise.append(Line(name.upper(), w, _db(s.S_up), colour))
+    top = max(float(line.y.max()) for line in noise) + 5.0 if noise else 0.0
+    unit, frequency = shown(rotary).stiffness, "frequency [rad/s]"
+    panels = (
+        Panel(frequency, "|S_yp| [dB]", disturbance, "disturbance to position", log_x=True),
+        Panel(
+            frequency, f"|S_up| [dB, {unit}]", noise, "measurement noise to force",
+            log_x=True, y_range=(top - 80.0, top),
+        ),
+    )  # fmt: skip
     caption = "Below 0 dB the loop suppresses disturbances; the peak of |S_yp| is 1/modulus margin."
-    return Section("Sensitivity", render("figure", svg=svg, caption=caption))
+    chart = Chart("sensitivity", "sensitivity functions against frequency", panels, columns=2)
+    return Section("Sensitivity", chart_html(chart, caption))
 
 
 def step_response(found: Design) -> Section:
     """Linear step response of both loops, without Coulomb friction."""
-    with style():
-        svg = inline(step_figure(found), "step", "linear step response of the closed loop")
     caption = (
-        "Response of the linear loop. The machine has Coulomb friction too: workbench validate"
+        "Response of the linear loop. The machine has Coulomb friction too: `workbench validate`"
         " shows the loop with it."
     )
-    return Section("Step response", render("figure", svg=svg, caption=caption))
+    return Section("Step response", chart_html(step_chart(found), caption))
 
 
-def step_figure(found: Design) -> "Figure":
-    """The figure of `step_response`."""
-    with style():
-        drawn = figure(9.0, 3.0)
-        axes = drawn.subplots()
-        for name, one in found.controllers.items():
-            t, y = linear_step(found, one)
-            axes.step(t, y, where="post", color=CONTROLLER_COLOURS[name], label=name.upper())
-        axes.axhline(1.0, color=OTHER, ls=":", lw=1.0)
-        label(axes, "time [s]", "position / step [-]")
-        axes.legend(loc="lower right")
-    return drawn
+def step_chart(found: Design) -> Chart:
+    """The chart of `step_response`."""
+    lines = []
+    for name, one in found.controllers.items():
+        t, y = linear_step(found, one)
+        # Held from sample to sample.
+        held = np.repeat(t, 2)[1:], np.repeat(y, 2)[:-1]
+        lines.append(Line(name.upper(), *held, LOOP_COLOURS[name]))
+    panel = Panel("time [s]", "position / step [-]", lines, marks=[Mark(1.0)])
+    return Chart("step", "linear step response of the closed loop", [panel])
 
 
 def linear_step(found: Design, one: Controller) -> tuple[Array, Array]:

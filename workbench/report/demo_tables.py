@@ -3,14 +3,15 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from workbench.output import Row, table, written
+from workbench.cards.readable import as_shown, in_digits, number, shown_unit
+from workbench.output import Row, next_step, table, written
 from workbench.report.design_tables import design_lines
-from workbench.report.model_tables import in_digits
-from workbench.report.trace_tables import effect_rows, error_rows, errors_head, trace_sentence
+from workbench.report.trace_tables import effect_rows, error_rows, errors_head
+from workbench.report.trace_words import trace_sentence
 from workbench.report.validation_tables import (
     validation_lines,
+    validation_sentence,
     validation_table,
-    validation_verdict,
 )
 from workbench.steps.demo import Demonstration
 
@@ -23,19 +24,22 @@ def demo_view(found: Demonstration, folder: Path) -> "Group":
     from rich.console import Group
 
     rotary = found.traced.model.rotary
+    traced = found.traced
     return Group(
-        "Two logs of the paper's rig (table 2) with an effect that no model here declares were"
-        " simulated; only the logs were used below.",
-        trace_sentence(found.traced),
-        table(errors_head(True), error_rows(found.traced.trace, rotary)),
+        "Two logs of the paper's rig (table 2) were simulated, with an effect that no model here"
+        " declares; only the logs were used. What came out:",
+        trace_sentence(traced),
+        f"Against the truth, the worst parameter is {number(100 * found.worst_error, 2)} % off.",
+        validation_sentence(found.validation),
+        next_step(f"open {folder / 'report.html'}; then the same with your own log:"),
+        "      workbench init LOG, workbench identify LOG --card card.toml",
+        table(errors_head(True), error_rows(traced.trace, rotary)),
         table(("effect", "estimate", "unit", "95 % interval", "truth"), _effects(found)),
         table(("parameter", "estimate", "unit", "95 % interval", "truth"), _rows(found)),
-        f"worst error of an identified parameter: {100 * found.worst_error:.3g} %",
-        *design_lines(found.design, rotary),
-        "",
-        validation_verdict(found.validation),
         validation_table(found.validation, rotary),
         *validation_lines(found.validation, rotary),
+        "",
+        *design_lines(found.design, rotary),
         written(folder, "report.html", "design.html", "validation.html"),
     )
 
@@ -43,7 +47,8 @@ def demo_view(found: Demonstration, folder: Path) -> "Group":
 def _rows(found: Demonstration) -> list[Row]:
     rows: list[Row] = []
     for name, e in found.traced.model.friction.items():
-        true = f"{found.truth['friction'][name]['value']:g}"
+        true = _true(found.truth["friction"][name]["value"], e.unit)
+        e = as_shown(e)
         if e.value is None or e.low is None or e.high is None:
             rows.append((name, "-", e.unit, f"not identified: {e.reason}", true))
             continue
@@ -60,5 +65,11 @@ def _effects(found: Demonstration) -> list[Row]:
     for e in traced.trace.effects:
         for p in e.effect.params:
             true = found.truth["effects"].get(e.effect.key, {}).get(p.name)
-            out.append((*next(rows)[:4], f"{true['value']:g}" if true else "absent"))
+            said = _true(true["value"], p.unit) if true else "absent"
+            out.append((*next(rows)[:4], said))
     return out
+
+
+def _true(value: float, unit: str) -> str:
+    """A true value in the unit in which its estimate is shown."""
+    return f"{shown_unit(unit).factor * value:g}"

@@ -4,9 +4,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import length
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import DriveUnits, equation_lines, force_lines
-from workbench.output import Row, table, written
+from workbench.output import Row, next_step, table, written
+from workbench.steps.recommend import other_figures, own_figures
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -15,12 +17,18 @@ DESIGN_HEAD = (
     "loop",
     "w_n rad/s",
     "zeta",
-    "modulus margin",
+    "modulus",
     "worst",
     "gain",
     "phase",
     "delay",
+    "periods",
     "|S_up|",
+)
+MARGINS_SAID = (
+    "modulus, gain, phase, delay: the margins, how much more of each the loop bears; worst: the"
+    " least modulus margin inside the parameters' intervals; periods: the delay margin in sampling"
+    " periods; |S_up|: at most, from measurement noise to force"
 )
 
 
@@ -31,7 +39,9 @@ def margin_rows(found: Design) -> list[Row]:
 
 def _margins(one: Controller) -> Row:
     m = one.margins
-    delay = "any" if m.delay_s is None else f"{1e3 * m.delay_s:.3g} ms ({m.delay_samples:.2g} h)"
+    delay = ("any", "any")
+    if m.delay_s is not None and m.delay_samples is not None:
+        delay = f"{1e3 * m.delay_s:.3g} ms", f"{m.delay_samples:.2g}"
     return (
         f"{one.dominant[0]:.3g}",
         f"{one.dominant[1]:.2g}",
@@ -39,7 +49,7 @@ def _margins(one: Controller) -> Row:
         "unstable" if m.worst_modulus is None else f"{m.worst_modulus:.3f}",
         "any" if m.gain_up is None else f"x {m.gain_up:.3g}",
         "any" if m.phase_deg is None else f"{m.phase_deg:.3g} deg",
-        delay,
+        *delay,
         "-" if m.S_up_max_db is None else f"{m.S_up_max_db:.3g} dB",
     )
 
@@ -48,7 +58,9 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
     p, c = found.plant, found.compensator
     units = shown(rotary, found.command.unit if found.command else "V")
-    lines = [f"recommended: {_recommended(found)}", f"plant: {p.source}, {p.why}"]
+    why = found.recommendation.why if found.recommendation else ""
+    lines = [other_figures(why)] if found.recommended != "none" and other_figures(why) else []
+    lines += [MARGINS_SAID, f"plant: {p.source}, {p.why}"]
     lines.append(f"position loop every {1e3 * p.h:.4g} ms{_output(found, units)}")
     if found.force:
         f = found.force
@@ -62,7 +74,10 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
             f"PID: k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s,"
             f" eps = {g.eps:.4g} s"
         )
-    lines.append(f"compensator: N_c = {c.N_c:g}, e_T = {c.e_T:.3g} {units.position}")
+    lines.append(
+        f"compensator: pushes with the whole breakaway force at a position error of"
+        f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)"
+    )
     lines.extend(f"no {name.upper()}: {why}" for name, why in found.refused.items())
     for name, one in found.controllers.items():
         lines.extend(f"{name.upper()} misses: {missed}" for missed in one.missed)
@@ -71,10 +86,27 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
     return [*lines, *(f"note: {line}" for line in found.remarks)]
 
 
-def _recommended(found: Design) -> str:
+def design_sentence(found: Design) -> str:
+    """Which controller, and what speaks for it, in one or two sentences."""
     if found.recommended == "none":
-        return "none, no controller keeps every goal"
-    return found.recommendation.why if found.recommendation else found.recommended.upper()
+        return "No controller keeps every goal; below is what each misses."
+    why = ""
+    if found.recommendation:
+        why = f". With friction in simulation: {own_figures(found.recommendation.why)}"
+    said = (
+        f"{found.recommended.upper()} recommended, position loop every {1e3 * found.plant.h:.4g} ms"
+    )
+    return f"{said}{why}."
+
+
+def then_of_design(found: Design, folder: Path | None = None) -> list[str]:
+    """What to do next with a design; `folder` in which it lies."""
+    file = "design.json" if folder is None else str(folder / "design.json")
+    if found.recommended == "none":
+        return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and"
+                " identify again"]  # fmt: skip
+    return [f"`workbench validate MODEL {file}` checks it in simulation, then `workbench export"
+            f" {file} --to c` writes it as code"]  # fmt: skip
 
 
 def _output(found: Design, units: Shown) -> str:
@@ -126,6 +158,8 @@ def design_view(found: Design, folder: Path | None, rotary: bool = False) -> "Gr
     chosen = None if found.recommended == "none" else found.recommended
     lines = (*design_lines(found, rotary), *drive_lines(found, chosen))
     return Group(
+        design_sentence(found),
+        *map(next_step, then_of_design(found, folder)),
         table(DESIGN_HEAD, margin_rows(found)),
         *lines,
         *([] if folder is None else [written(folder, "design.json", "report.html")]),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.model.karnopp import NAMES
+from workbench.cards.readable import number
 from workbench.cards.units import si_unit
 from workbench.report.figures import (
     BAND,
@@ -34,7 +35,8 @@ SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 
 def doctor_view(found: Examined, out: Path | None) -> str:
     """What the log shows, in at most 40 lines of 100 columns."""
-    lines = [f"{found.file}: {_verdict(found)}", *_labelled("clock", [_clock(found.clock)])]
+    lines = [f"{found.file}: {_verdict(found)}", *_labelled("next", [_then(found)])]
+    lines += _labelled("clock", [_clock(found.clock)])
     lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
     lines += _labelled("samples", [_plain(found, one.line) for one in found.bad])
     lines += _labelled("delay", [_delay(one) for one in found.delays])
@@ -66,6 +68,16 @@ def _verdict(found: Examined) -> str:
     can = sum(one.can for one in nine)
     many = "all of" if can == len(nine) else f"{can} of"
     return f"can be identified; {many} the nine parameters can be told from it"
+
+
+def _then(found: Examined) -> str:
+    """What to do next."""
+    if found.refused:
+        return "mend the log or its card (see refused), then ask again"
+    if found.verdict == "nothing":
+        return "log again, with the motion that 'add' names"
+    first = f"workbench identify {found.file} --card CARD"
+    return f"{first}; for the rest, log what 'add' names" if found.add else first
 
 
 def _labelled(name: str, texts: Sequence[str], most: int = MOST_OF_A_KIND) -> list[str]:
@@ -108,11 +120,11 @@ def _sensor(found: Examined, one: SensorState) -> str:
     low, high = factor * one.low, factor * one.high
     if low == high:
         return f"{one.name}: always {low:.4g} {unit}".rstrip()
-    step = f"step {factor * one.step:.3g}" if one.step > 0.0 else "no step seen"
-    noise = f"noise {factor * one.noise:.2g}"
+    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no step seen"
+    noise = f"noise {number(factor * one.noise, 2)}"
     share = max(one.noise, one.step / np.sqrt(12.0)) / (one.high - one.low)
     span = f"{low:.4g} to {high:.4g} {unit}".rstrip()
-    return f"{one.name}: {span}, {noise}, {step} ({share:.2g} of range)"
+    return f"{one.name}: {span}, {noise}, {step} ({number(100 * share, 2)} % of its range)"
 
 
 def _delay(one: Delay) -> str:

@@ -11,9 +11,11 @@ from workbench.report.drift_tables import (
     notes,
     run_rows,
     shift_rows,
+    then_of_drift,
 )
 from workbench.report.figures import BAND, MEASURED, MODEL, REFERENCE, figure, inline, label, style
-from workbench.report.page import Section, page, render
+from workbench.report.page import Section, page
+from workbench.report.templating import render
 from workbench.steps.drift import Drifted, Tested
 
 if TYPE_CHECKING:
@@ -25,22 +27,30 @@ LINEAR_UP_TO = 1.0  # statistic over threshold up to which the axis is linear
 
 def drift_report(found: Drifted) -> str:
     """HTML: whether the machine has changed, in what, and how the logs before it looked."""
-    sections = [_table("The logs", RUN_HEAD, run_rows(found))]
+    sections, logs = [], _table("The logs", RUN_HEAD, run_rows(found))
     judged = [one for one in found.tests if one.test.shifts]
     if judged:
         last = judged[-1]
-        sections.append(_pictures(found, last))
+        sections += [_pictures(found, last), logs]
         sections.append(
             _table(f"Parameters before and after, {last.source.file}", SHIFT_HEAD, shift_rows(last))
         )
+    else:
+        sections.append(logs)
     sections.append(Section("Notes", render("lines", lines=notes(found))))
-    return page(f"Drift test of {found.model.card}", drift_sentence(found), sections)
+    then = then_of_drift(found)
+    return page(f"Drift test of {found.model.card}", drift_sentence(found), sections, then)
 
 
 def _pictures(found: Drifted, last: Tested) -> Section:
     with style():
         drawn = drift_figure(found, last)
         html = inline(drawn, "drift", "Parameters before and after, and the statistic over logs")
+    caption = (
+        "Left: each parameter of this log and of the model in force, with 95 % intervals. Right:"
+        " how far all of them together have moved; above 1 it is drift."
+    )
+    html = render("figure", svg=html, caption=caption)
     return Section("Before and after, and over the logs", html)
 
 

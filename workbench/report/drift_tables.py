@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 
 from identification.drift.drift_test import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
-from workbench.output import Row, table, written
+from workbench.cards.readable import number, shown_unit
+from workbench.output import Row, next_step, table, written
 from workbench.steps.drift import Drifted, Tested
 
 if TYPE_CHECKING:
@@ -114,14 +115,35 @@ def _shift_row(shift: Shift) -> Row:
     interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
     pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
     told = [told_estimate(value, shift.unit, sd).value for value, sd in pairs]
-    before, after = ("-" if value is None else f"{value:.4g}" for value in told)
-    return (shift.name, before, after, shift.unit, signed_percent(shift.change), interval)
+    unit, factor = shown_unit(shift.unit)
+    before, after = ("-" if value is None else number(factor * value, 5) for value in told)
+    return (shift.name, before, after, unit, signed_percent(shift.change), interval)
+
+
+def then_of_drift(found: Drifted) -> list[str]:
+    """What to do next after a drift test."""
+    match found.verdict:
+        case "drift":
+            logs = _files(found, "drift").replace(", ", " ")
+            return [f"`workbench identify {logs} --card CARD`, then `workbench design`: a model and"
+                    " a controller of the machine as it is now"]  # fmt: skip
+        case "structure":
+            logs = _files(found, "structure").replace(", ", " ")
+            return [f"`workbench trace {logs} --card CARD` finds the effect that joined"]
+        case "not_judged":
+            return ["log longer, with more speeds, reversals and rests; the notes say what could"
+                    " not be seen"]  # fmt: skip
+        case _:
+            return ["nothing to change; test the next log with the same `--state FILE`, which finds"
+                    " slow changes too"]  # fmt: skip
 
 
 def notes(found: Drifted) -> list[str]:
     """What to know of the tests: thresholds, runs not judged, remarks."""
     setting = found.settings
     out = [
+        "this log, mean of logs: how far the parameters have moved, of how far it takes to be"
+        " drift; chi-square: what the model leaves, of what it may",
         f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
         f" sure: thresholds for a false alarm in {setting.run_length:g} logs or more",
         "the intervals hold the errors of the model and of the log, and how much the machine varies"
@@ -142,13 +164,12 @@ def drift_view(found: Drifted, folder: Path | None) -> "Group":
     """The verdict, every run, the parameters of the last one, for a terminal."""
     from rich.console import Group, RenderableType
 
-    parts: list[RenderableType] = [drift_sentence(found), table(RUN_HEAD, run_rows(found))]
-    said = seen_sentence(found.tests[-1].test, found.settings.to_be_seen)
-    if said:
-        parts.insert(1, f"{found.tests[-1].source.file}: {said}.")
+    parts: list[RenderableType] = [drift_sentence(found)]
+    parts.extend(map(next_step, then_of_drift(found)))
+    parts.append(table(RUN_HEAD, run_rows(found), right=()))
     rows = shift_rows(found.tests[-1])
     if rows:
-        parts.append(table(SHIFT_HEAD, rows))
+        parts.append(table(SHIFT_HEAD, rows, right=(1, 2)))
     parts.extend(f"note: {line}" for line in notes(found))
     if folder is not None:
         parts.append(written(folder, "drift.json", "report.html"))

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from workbench.report.page import safe
+from workbench.report.templating import safe
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,7 +21,6 @@ MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
 GREY = "#7a7a7a"
 BEFORE = "#8a8a8a"
-CONTROLLER_COLOURS = {"rst": REFERENCE, "pid": MODEL, "present": GREY}
 # The colours of the pages' style in place of the figures'.
 SCHEME = {
     "#000000": "var(--measured)",
@@ -35,6 +34,7 @@ SCHEME = {
 }
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
+SHOWN_SHARE = 0.995  # of the points that axes hold; the rarest would flatten the rest
 STYLE: dict[Any, Any] = {
     "svg.fonttype": "none",
     "font.size": 9.0,

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
-from workbench.output import Row, table
+from workbench.output import Row, next_step, table
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
-NEXT_COMMAND = "next: workbench doctor {log} --card {card}"
+NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
 def proposal_view(of: Proposal, card: Path, refused: str) -> object:
@@ -15,17 +15,17 @@ def proposal_view(of: Proposal, card: Path, refused: str) -> object:
     """
     from rich.console import Group
 
-    parts: list[object] = [f"rig: {of.kind}, {of.motion}"]
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
+    guesses = [row[0] for row in rows if row[3] == "guess"]
+    looked = f"look at the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
+    parts: list[object] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
+    parts.append(next_step(NEXT_COMMAND.format(log=of.path, card=card)))
+    if refused:
+        parts.append(f"With this card the log cannot be read yet: {refused}")
     parts.append(table(("", "column or value", "unit", "", "why"), rows, right=()))
     parts += [f"note: {line}" for line in of.remarks]
     parts += [f"left out: {shown} ({why})" for shown, why in of.unused.items()]
-    guesses = [row[0] for row in rows if row[3] == "guess"]
-    if guesses:
-        parts.append(f"guesses, to be looked at in the card: {', '.join(guesses)}")
-    if refused:
-        parts.append(f"note: with this card: {refused}")
-    parts += [f"written: {card}", NEXT_COMMAND.format(log=of.path, card=card)]
+    parts.append(f"written: {card}")
     return Group(*[one for one in parts])  # type: ignore[arg-type]
 
 

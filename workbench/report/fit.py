@@ -1,58 +1,53 @@
-"""Section: measured and simulated position and force over time."""
+"""Section: measured and simulated position and force over time, all logs."""
 
-from typing import TYPE_CHECKING
-
-import numpy as np
+from collections.abc import Sequence
 
 from identification.arrays import Array
-from identification.log import Log
 from identification.model.inverse_model import Smoothing, force_predicted
 from identification.simulation.free_run import FreeRun
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import units_of
 from workbench.documents.model import Model
-from workbench.report.figures import MEASURED, MODEL, figure, inline, label, line, style
+from workbench.logs.sources import Source
+from workbench.report.chart import Chart, Line, Panel, Part, chart_html
+from workbench.report.in_a_row import in_a_row, liveliest
 from workbench.report.model_tables import held
-from workbench.report.page import Section, render
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-ZOOM = 0.12  # part of the log shown enlarged
+from workbench.report.page import Section
 
 
-def fit(model: Model, log: Log, run: FreeRun | None) -> Section:
-    """Position and force of one log, the whole of it and its liveliest part."""
-    with style():
-        drawn = fit_figure(model, log, run)
-        svg = inline(drawn, "fit", "measured and simulated position and force over time")
-    return Section("Fit over time", render("figure", svg=svg, caption=_caption(model)))
+def fit(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Section:
+    """Position and force of every log, measured and by the model."""
+    return Section("Fit over time", chart_html(fit_chart(model, sources, runs), _caption(model)))
 
 
-def fit_figure(model: Model, log: Log, run: FreeRun | None) -> "Figure":
-    """The figure of `fit`."""
-    units = shown(model.rotary)
-    t = log["t"] - log["t"][0]
-    position = run.y if run else None
-    predicted = run.F if run else log["F"]
-    if model.fit.drive == "force" or model.rig.kind == "motor":
+def fit_chart(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Chart:
+    """The chart of `fit`."""
+    units, row = units_of(model.rotary), in_a_row(sources)
+    pairs = list(zip(sources, runs, strict=True))
+    position = [run.y if run else empty for (_, run), empty in zip(pairs, row.none(), strict=True)]
+    columns = (
+        ("position", units.position, "y", position),
+        ("applied force", units.force, "F", [_force(model, *pair) for pair in pairs]),
+    )
+    panels = []
+    for name, (unit, factor), signal, modelled in columns:
+        measured = factor * row.joined([one.log[signal] for one in sources])
+        lines = [Line("measured", row.t, measured, "measured")]
+        if signal == "F" or any(runs):
+            lines.append(Line("model", row.t, factor * row.joined(modelled), look="dashed"))
+        panels.append(Panel(row.label, f"{name} [{unit}]", lines, marks=row.marks))
+    part = liveliest(sources[0].log["y"])
+    lively = Part("liveliest part", float(row.t[part.start]), float(row.t[part.stop - 1]))
+    logs = row.parts if len(sources) > 1 else ()
+    what = "measured and simulated position and applied force over time"
+    return Chart("fit", what, panels, parts=(*logs, lively))
+
+
+def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
+    """Force by the model: simulated where an actuator gives it, else what the motion needs."""
+    if model.fit.drive == "force" or model.rig.kind == "motor" or run is None:
         how = Smoothing(held=model.rig.kind == "motor")
-        predicted = force_predicted(log, model.karnopp, how)
-    with style():
-        drawn = figure(9.0, 5.0)
-        axes = drawn.subplots(2, 2, width_ratios=[1.5, 1.0])
-        part = liveliest(log["y"])
-        for column, where in enumerate((slice(None), part)):
-            for row, (name, simulated) in enumerate((("y", position), ("F", predicted))):
-                at = axes[row][column]
-                line(at, t[where], log[name][where], color=MEASURED, label="measured")
-                if simulated is not None:
-                    line(at, t[where], simulated[where], color=MODEL, ls="--", label="model")
-        label(axes[0][0], "", f"position [{units.position}]", "whole log")
-        label(axes[0][1], "", "", "its liveliest part")
-        label(axes[1][0], "time [s]", f"applied force [{units.force}]")
-        label(axes[1][1], "time [s]", "")
-        drawn.legend(*axes[1][0].get_legend_handles_labels(), loc="outside upper right", ncols=2)
-    return drawn
+        return force_predicted(source.log, model.karnopp, how)
+    return run.F
 
 
 def _caption(model: Model) -> str:
@@ -68,19 +63,3 @@ def _caption(model: Model) -> str:
         f"The model is driven by the measured force, {held(model)}: a free run on a measured force"
         f" drifts at every stop.{inverse}"
     )
-
-
-def liveliest(y: Array) -> slice:
-    """The stretch of the log in which the position moves most."""
-    size = max(50, round(ZOOM * len(y)))
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(y)))])
-    if len(y) <= size:
-        return slice(0, len(y))
-    # Blocks keep the noise of a fast log from counting as motion.
-    block = max(1, size // 50)
-    coarse = y[::block]
-    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(coarse)))])
-    wide = max(2, size // block)
-    gain = way[wide:] - way[:-wide]
-    start = int(np.argmax(gain)) * block if gain.size else 0
-    return slice(start, min(start + size, len(y)))

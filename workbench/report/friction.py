@@ -1,7 +1,7 @@
 """Section: friction against velocity, the data under the identified curve."""
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,26 +11,19 @@ from identification.model.estimates import KarnoppFit
 from identification.model.inverse_model import held_force
 from identification.model.karnopp import NAMES, Karnopp
 from identification.signals.differentiate import differentiate, low_pass
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import Units, units_of
 from workbench.documents.model import Model
-from workbench.report.figures import (
-    BAND,
-    MEASURED,
-    MODEL,
-    evenly_spread,
-    figure,
-    inline,
-    label,
-    style,
-)
-from workbench.report.page import Section, render
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
+from workbench.logs.sources import Source
+from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
+from workbench.report.figures import evenly_spread
+from workbench.report.page import Section
 
 CURVES = 200
+POINTS = 80  # of a branch of the curve
+FRICTION_DOTS = 3000  # of a panel
 SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
 SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
+LOW_IN_BANDS, LOW_SHARE = 4.0, 0.25  # low speeds: in widths of the band, and of all speeds
 
 
 @dataclass(frozen=True)
@@ -51,34 +44,84 @@ def friction_data(model: Model, log: Log) -> FrictionData:
     return FrictionData(motion.v[inner], motion.a[inner], (F - model.karnopp.m * motion.a)[inner])
 
 
-def friction_curve(model: Model, fit: KarnoppFit, log: Log) -> Section:
-    """Friction of the log's samples against velocity, with the Karnopp curve and its band."""
-    units = shown(model.rotary)
-    data, p = friction_data(model, log), model.karnopp
-    v_p = np.linspace(p.dv_p, max(float(data.v.max()), 1.2 * p.dv_p), 80)
-    v_n = np.linspace(min(float(data.v.min()), 1.2 * p.dv_n), p.dv_n, 80)
-    with style():
-        drawn = figure(9.0, 4.6)
-        axes = drawn.subplots()
-        keep = evenly_spread(len(data.v))
-        axes.plot(
-            data.v[keep], data.F_f[keep], ".", ms=3.5, color=MEASURED, alpha=0.45, mew=0,
-            rasterized=True, label="log: F_e − m a",
-        )  # fmt: skip
-        for v in (v_n, v_p):
-            low, high = _interval(fit, p, v)
-            first = v is v_n
-            axes.fill_between(
-                v, low, high, color=BAND, alpha=0.5, lw=0, label="95 % interval" if first else None
+def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> Section:
+    """Friction of the logs' samples against velocity, with the Karnopp curve and its band."""
+    chart = friction_chart(model, fit, [friction_data(model, one.log) for one in sources])
+    return Section("Friction", chart_html(chart, _caption(model)))
+
+
+def friction_chart(model: Model, fit: KarnoppFit, data: Sequence[FrictionData]) -> Chart:
+    """The whole range of speeds, and the low ones."""
+    p = model.karnopp
+    v, F_f = (np.concatenate([getattr(one, name) for one in data]) for name in ("v", "F_f"))
+    reach = (min(float(v.min()), 1.2 * p.dv_n), max(float(v.max()), 1.2 * p.dv_p))
+    low, panels = low_speeds(p, reach), []
+    dots = Line("log: F_e − m a", v, F_f, "measured", "dots")
+    for title, (begin, end) in (("all speeds", reach), ("low speeds", low)):
+        v_n, v_p = np.linspace(begin, p.dv_n, POINTS), np.linspace(p.dv_p, end, POINTS)
+        curve_v, curve_F = with_bar(v_n, _slip(v_n, p), v_p, _slip(v_p, p), p, end - begin)
+        bottom, top = (extent(p, begin, end, sign) for sign in (-1, 1))
+        panels.append(
+            friction_panel(
+                title, units_of(model.rotary), dots,
+                [Line("Karnopp model", curve_v, curve_F, "model", "bold")],
+                (begin, end), (SHOWN_RANGE * bottom, SHOWN_RANGE * top), p,
+                [
+                    Area("95 % interval", v_n, *_interval(fit, p, v_n)),
+                    Area("", v_p, *_interval(fit, p, v_p)),
+                ],
             )
-            axes.plot(v, _slip(v, p), color=MODEL, lw=1.8, label="Karnopp model" if first else None)
-        axes.plot([0, 0], [p.F_sn, p.F_sp], color=MODEL, lw=1.8, marker="_", ms=10)
-        axes.axvspan(p.dv_n, p.dv_p, color="#0072b2", alpha=0.10, lw=0, label="stick band")
-        _limits(axes, p, v_n[0], v_p[-1])
-        axes.legend(loc="upper left", markerscale=2.5)
-        label(axes, f"velocity [{units.velocity}]", f"friction force [{units.force}]")
-        svg = inline(drawn, "friction", "friction force against velocity, data and model")
-    return Section("Friction", render("figure", svg=svg, caption=_caption(model)))
+        )  # fmt: skip
+    what = "friction force against velocity, samples of the logs and the model"
+    return Chart("friction", what, panels, columns=2, shared_x=False)
+
+
+def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
+    """The speeds [m/s] around the stick band, where friction bends."""
+    low = min(LOW_IN_BANDS * max(p.dv_p, -p.dv_n), LOW_SHARE * max(reach[1], -reach[0]))
+    low = max(low, 1.5 * p.dv_p, -1.5 * p.dv_n)
+    return -low, low
+
+
+def with_bar(
+    v_n: Array, F_n: Array, v_p: Array, F_p: Array, p: Karnopp, wide: float
+) -> tuple[Array, Array]:
+    """The two branches of a friction curve, and between them the bar of breakaway at rest."""
+    at_rest, gap = 1e-6 * wide, [np.nan]
+    v = np.concatenate([v_n, [-3 * at_rest, -at_rest, at_rest, 3 * at_rest], v_p])
+    return v, np.concatenate([F_n, gap, [p.F_sn, p.F_sp], gap, F_p])
+
+
+def extent(p: Karnopp, low: float, high: float, sign: int) -> float:
+    """Largest friction of the model in a direction, at speeds up to `low` or `high`."""
+    if sign > 0:
+        return max(p.F_sp, p.F_cp + p.F_vp * high)
+    return min(p.F_sn, -p.F_cn + p.F_vn * low)
+
+
+def friction_panel(
+    title: str,
+    units: Units,
+    samples: Line,
+    lines: Sequence[Line],
+    x_range: tuple[float, float],
+    y_range: tuple[float, float],
+    p: Karnopp,
+    areas: Sequence[Area] = (),
+) -> Panel:
+    """Friction [N] against velocity [m/s], the dots those samples that lie in the range shown."""
+    (speed, factor), (force, _) = units.velocity, units.force
+    v = samples.x
+    inside = np.flatnonzero((v >= x_range[0]) & (v <= x_range[1]))
+    inside = inside[evenly_spread(len(inside), FRICTION_DOTS)]
+    dots = replace(samples, x=factor * v[inside], y=samples.y[inside])
+    return Panel(
+        f"velocity [{speed}]", f"friction force [{force}]",
+        [dots, *(replace(one, x=factor * one.x) for one in lines)], title,
+        areas=[replace(one, x=factor * one.x) for one in areas],
+        bands=[Band("stick band", factor * p.dv_n, factor * p.dv_p, "x")],
+        x_range=(factor * x_range[0], factor * x_range[1]), y_range=y_range, height=280,
+    )  # fmt: skip
 
 
 def _slip(v: Array, p: Karnopp) -> Array:
@@ -98,16 +141,9 @@ def _interval(fit: KarnoppFit, p: Karnopp, v: Array) -> tuple[Array, Array]:
     return low, high
 
 
-def _limits(axes: "Axes", p: Karnopp, v_low: float, v_high: float) -> None:
-    top = max(p.F_sp, p.F_cp + p.F_vp * v_high)
-    bottom = min(p.F_sn, -p.F_cn + p.F_vn * v_low)
-    axes.set_ylim(SHOWN_RANGE * bottom, SHOWN_RANGE * top)
-    axes.set_xlim(1.05 * v_low, 1.05 * v_high)
-
-
 def _caption(model: Model) -> str:
     text = (
-        "Each dot is one sample: applied force less inertia, smoothed as the velocity is. Inside"
+        "Each dot is one sample: applied force less inertia, smoothed as the velocity is. Within"
         " the shaded band the model sticks; there, friction takes any value between the two"
         " breakaway limits (the bar at zero)."
     )

@@ -1,30 +1,27 @@
 """Sections of a validation: verdict, steps and smooth reference in the simulated loop."""
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
 
 from design.loop import LoopRun
-from workbench.cards.parameter_units import shown
-from workbench.report.figures import (
-    CONTROLLER_COLOURS,
-    GREY,
-    OTHER,
-    figure,
-    inline,
-    label,
-    line,
-    style,
-)
-from workbench.report.page import Section, render
+from identification.arrays import Array
+from workbench.cards.readable import number, units_of
+from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.page import Section
+from workbench.report.templating import render
 from workbench.report.validation_tables import validation_head, validation_lines, validation_rows
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Traces
 from workbench.steps.validate import Validation
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-DASHED = "--"  # with the compensator
+LOOP_COLOURS: dict[str, Colour] = {"rst": "reference", "pid": "model", PRESENT: "before"}
+ERRORS_SHOWN: tuple[tuple[Literal["step", "smooth"], str], ...] = (
+    ("smooth", "along the smooth reference"),
+    ("step", "at rest, last step"),
+)
+SETTLED_FOR = 4.0  # settling times shown after a step
+SINCE = "time since the step [s]"
 
 
 def judged(found: Validation, rotary: bool) -> Section:
@@ -37,56 +34,116 @@ def judged(found: Validation, rotary: bool) -> Section:
 
 def loop(
     found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
-) -> Section:
-    """Position, error, force and command in the loop on one plant, all controllers."""
-    with style():
-        drawn = loop_figure(found, traces, place, rotary)
-        svg = inline(drawn, f"loop-{place}", "simulated loop: position, error, force, command")
-    caption = (
-        "The loop with the identified Karnopp friction and the logs' noise; broken lines: with the"
-        " compensator; the command's limits are broken grey lines."
-        " Left and right have their own time axes."
+) -> list[Section]:
+    """The loop on one plant, all controllers over each other: after steps, then where they rest."""
+    on = "the identified plant" if place == "model" else "the other plant"
+    steps = (
+        "The loop with the identified Karnopp friction and the logs' noise, all controllers from"
+        " the moment of the step; dashed: with the compensator, broken grey lines: the command's"
+        " limits."
     )
-    title = "Loop on the identified plant" if place == "model" else "Loop on the other plant"
-    return Section(title, render("figure", svg=svg, caption=caption))
+    quiet = "What is left of the error where it should be none: the smaller, the better."
+    return [
+        Section(f"Steps on {on}", chart_html(step_chart(found, traces, place, rotary), steps)),
+        Section(
+            f"Error on {on}", chart_html(error_chart(found, traces, place, rotary), quiet)
+        ),
+    ]  # fmt: skip
 
 
-def loop_figure(
+def step_chart(
     found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
-) -> "Figure":
-    """The figure of `loop`."""
-    units, first = shown(rotary), found.figures[found.judged][place]
+) -> Chart:
+    """Position and command after the first step up and the first one down, loops overlaid."""
+    (unit, factor), first = units_of(rotary).position, found.figures[found.judged][place]
+    runs = _runs(traces, place, "step")
+    some = next(iter(runs.values()))
+    begins = [int(at) for at in np.flatnonzero(np.diff(some.r))[:2] + 1]
+    span = _span(found, place, begins[1] - begins[0], some)
+    command = first.command_unit if first.command_peak is not None else units_of(rotary).force.name
     limit = first.command_limit
-    unit = first.command_unit if first.command_peak is not None else units.force
-    with style():
-        drawn = figure(9.0, 7.8)
-        axes = drawn.subplots(4, 2, sharex="col")
-        runs = {name: run for (name, where), run in traces.items() if where == place}
-        for column, kind in enumerate(("step", "smooth")):
-            for number, (name, run) in enumerate(runs.items()):
-                trace = run.step if kind == "step" else run.smooth
-                _lines([row[column] for row in axes], trace, name, number == 0)
-            axes[3][column].set_xlabel("time [s]")
-            for edge in () if limit is None else (-limit, limit):
-                axes[3][column].axhline(edge, color=GREY, ls="--", lw=0.8)
-        label(axes[0][0], "", f"position [{units.position}]", "steps")
-        label(axes[0][1], "", "", "smooth reference")
-        label(axes[1][0], "", f"error [{units.position}]")
-        label(axes[2][0], "", f"applied force [{units.force}]")
-        label(axes[3][0], "time [s]", f"command [{unit}]")
-        handles = axes[0][0].get_legend_handles_labels()
-        drawn.legend(*handles, loc="outside upper right", ncols=6)
-    return drawn
+    panels = []
+    for begin in begins:
+        height = factor * float(some.r[begin] - some.r[begin - 1])
+        title = f"step of {number(height)} {unit}"
+        lines = [_cut(some, some.r, begin, span, factor, "reference", "other", "dotted")]
+        lines += [_of(name, run, run.y, begin, span, factor) for name, run in runs.items()]
+        panels.append(
+            Panel(SINCE, f"position [{unit}]", lines, title, y_range=_near(lines, height))
+        )
+    for begin in begins:
+        lines = [_of(name, run, run.u, begin, span, 1.0) for name, run in runs.items()]
+        marks = [] if limit is None else [Mark(-limit), Mark(limit)]
+        panels.append(Panel(SINCE, f"command [{command}]", lines, marks=marks))
+    what = "position and command after a step in the simulated loop, all controllers"
+    return Chart(f"loop-{place}", what, panels, columns=2)
 
 
-def _lines(axes: "list[Axes]", trace: LoopRun, name: str, first: bool) -> None:
-    position, error, force, command = axes
-    if first:
-        line(position, trace.t, trace.r, color=OTHER, ls=":", label="reference")
+def _near(lines: Sequence[Line], height: float) -> tuple[float, float] | None:
+    """Range around a step where a loop leaves it by far, as one that runs away."""
+    reference, *loops = lines
+    low, high = float(reference.y.min()), float(reference.y.max())
+    low, high = min(low, high - abs(height)), max(high, low + abs(height))
+    low, high = low - abs(height), high + abs(height)
+    inside = all(bool(np.all((one.y > low) & (one.y < high))) for one in loops)
+    return None if inside else (low, high)
+
+
+def error_chart(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
+) -> Chart:
+    """Error along the smooth reference and in the last dwell, loops overlaid."""
+    unit, factor = units_of(rotary).position
+    panels = []
+    for kind, title in ERRORS_SHOWN:
+        runs = _runs(traces, place, kind)
+        some = next(iter(runs.values()))
+        begin = 0 if kind == "smooth" else _rest(some)
+        span = len(some.t) - begin
+        lines = [_of(name, run, run.r - run.y, begin, span, factor) for name, run in runs.items()]
+        start = "time [s]" if kind == "smooth" else "time, after half of the dwell [s]"
+        panels.append(Panel(start, f"error [{unit}]", lines, title))
+    what = "error along the smooth reference and at rest in the simulated loop, all controllers"
+    return Chart(f"error-{place}", what, panels, columns=2, shared_x=False)
+
+
+def _runs(
+    traces: Mapping[tuple[str, str], Traces], place: str, kind: Literal["step", "smooth"]
+) -> dict[str, LoopRun]:
+    return {name: getattr(run, kind) for (name, where), run in traces.items() if where == place}
+
+
+def _span(found: Validation, place: str, most: int, run: LoopRun) -> int:
+    """Samples after a step in which the loops differ: until the slowest has long settled."""
+    times = [one[place].settling for one in found.figures.values() if place in one]
+    h = float(run.t[1] - run.t[0])
+    return int(np.clip(SETTLED_FOR * float(np.median(times)) / h, min(50, most), most))
+
+
+def _rest(run: LoopRun) -> int:
+    """First sample of the last half of the last dwell."""
+    last = int(np.flatnonzero(np.diff(run.r))[-1]) + 1
+    return (last + len(run.r)) // 2
+
+
+def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: float) -> Line:
+    """A line of a loop, called and coloured by its controller."""
     alone = name.removesuffix(COMPENSATED)
-    colour, look = CONTROLLER_COLOURS[alone], "-" if alone == name else DASHED
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
-    line(position, trace.t, trace.y, color=colour, ls=look, label=shown)
-    line(error, trace.t, trace.r - trace.y, color=colour, ls=look)
-    line(force, trace.t, trace.F, color=colour, ls=look, lw=0.8)
-    line(command, trace.t, trace.u, color=colour, ls=look, lw=0.8)
+    look: Look = "line" if alone == name else "dashed"
+    return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], look)
+
+
+def _cut(
+    run: LoopRun,
+    values: Array,
+    begin: int,
+    span: int,
+    factor: float,
+    name: str,
+    colour: Colour,
+    look: Look,
+) -> Line:
+    part = slice(begin, begin + span)
+    t = run.t[part]
+    return Line(name, t - t[0], factor * np.asarray(values, dtype=np.float64)[part], colour, look)

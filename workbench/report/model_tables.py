@@ -1,13 +1,14 @@
 """Results as tables for a terminal and as rows for a report."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import shown
+from workbench.cards.readable import as_shown, in_digits, length, number, times
 from workbench.documents.model import Model
-from workbench.output import Row, table, written
+from workbench.output import Row, next_step, table, written
 
 if TYPE_CHECKING:
     from rich.console import Group
@@ -43,23 +44,14 @@ def parameter_rows(model: Model) -> list[Row]:
 
 
 def _cells(estimate: Estimate) -> tuple[str, str, str]:
+    estimate = as_shown(estimate)
     if estimate.value is None:
         return "-", estimate.unit, f"not identified: {estimate.reason}"
     if estimate.low is None or estimate.high is None:
-        return f"{estimate.value:.4g}", estimate.unit, estimate.reason or "no interval"
+        return number(estimate.value, 4), estimate.unit, estimate.reason or "no interval"
     low, high = in_digits((estimate.low, estimate.high), estimate.value, estimate.sd)
     (value,) = in_digits((estimate.value,), estimate.value, estimate.sd)
     return value, estimate.unit, f"{low} to {high}"
-
-
-def in_digits(values: Iterable[float], size: float, sd: float | None) -> list[str]:
-    """Numbers with as many digits as their standard deviation leaves meaning to."""
-    import math
-
-    digits = 4
-    if sd and size and math.isfinite(sd):
-        digits = max(2, math.ceil(math.log10(abs(size) / sd)) + 2)
-    return [f"{value:#.{min(digits, 8)}g}".rstrip(".") for value in values]
 
 
 def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> "Group":
@@ -67,7 +59,8 @@ def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> "Gr
     from rich.console import Group, RenderableType
 
     rows = [row[:4] for row in parameter_rows(model)]
-    parts: list[RenderableType] = [table(MODEL_HEAD, rows)]
+    parts: list[RenderableType] = [summary(model), next_step(next_of_model(model, folder))]
+    parts.append(table(MODEL_HEAD, rows))
     parts.extend(fit_lines(model))
     parts.extend(f"note: {line}" for line in (*remarks, *model.fit.remarks))
     if folder is not None:
@@ -76,25 +69,41 @@ def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> "Gr
 
 
 def summary(model: Model) -> str:
-    """What was found, in one sentence."""
+    """What was found, in one or two sentences."""
     known = [name for name, e in model.friction.items() if e.value is not None]
-    text = f"{len(known)} of 9 friction parameters identified from {len(model.log)} run(s)."
+    many = "All nine" if len(known) == len(model.friction) else f"{len(known)} of the nine"
+    logs = "one log" if len(model.log) == 1 else f"{len(model.log)} logs"
+    text = f"{many} friction parameters identified from {logs}."
     if model.assumed:
-        text += f" The logs do not tell {', '.join(model.assumed)}."
+        text += f" Not told: {', '.join(model.assumed)}."
     if model.fit.adequate:
-        return text + " The model leaves nothing but sensor noise."
-    return text + (
-        " The model leaves more than sensor noise: run 'workbench trace' to find what it lacks, and"
-        " see the remarks."
-    )
+        return f"{text} The model leaves nothing but sensor noise."
+    return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
+
+
+def left_of(model: Model) -> str:
+    """What the model leaves, beside the noise."""
+    off = [e.position_rms for e in model.log if e.position_rms is not None]
+    if not off:
+        return f"{times(model.fit.chi_square**0.5)} the sensors' noise"
+    noise = length(model.fit.noise_y, model.rotary)
+    return f"{length(max(off), model.rotary)} rms of position, where the sensor's noise is {noise}"
+
+
+def next_of_model(model: Model, folder: Path | None = None) -> str:
+    """What to do with a model, and the command that does it; `folder` in which it lies."""
+    if not model.fit.adequate:
+        logs = " ".join(dict.fromkeys(e.file for e in model.log))
+        return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks"
+    file = "model.json" if folder is None else str(folder / "model.json")
+    return f"`workbench design {file}` makes a controller for this machine"
 
 
 def fit_lines(model: Model) -> list[str]:
     """What the fit leaves, in words."""
-    unit = shown(model.rotary).position
     by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
-        f"{e.file}: simulated position within {e.position_rms:.3g} {unit} rms over"
+        f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
         f" {e.duration:.4g} s, driven by {by}"
         for e in model.log
         if e.position_rms is not None
@@ -111,8 +120,9 @@ def fit_lines(model: Model) -> list[str]:
     else:
         p = model.plant
         lines.append(
-            f"ARX plant {p.input} -> y: na={p.na}, nb={p.nb}, nk={p.nk} at {1e3 * p.h:.4g} ms,"
-            f" one step ahead within {p.one_step_rms:.2g} {unit} rms on held-out samples"
+            f"linear plant (ARX) from {p.input} to y, every {1e3 * p.h:.4g} ms: na={p.na},"
+            f" nb={p.nb}, nk={p.nk}; one step ahead within"
+            f" {length(p.one_step_rms, model.rotary)} rms on held-out samples"
         )
     return lines
 
@@ -125,4 +135,4 @@ def held(model: Model) -> str:
     if model.fit.stiffness == 0.0:
         return anew
     unit = shown(model.rotary).stiffness
-    return f"held to the measured position by {model.fit.stiffness:.3g} {unit} and {anew}"
+    return f"held to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"

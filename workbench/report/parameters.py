@@ -3,7 +3,8 @@
 from identification.estimation.estimates import AT_ZERO
 from workbench.documents.model import Model, used
 from workbench.report.model_tables import parameter_rows
-from workbench.report.page import Section, render
+from workbench.report.page import Section
+from workbench.report.templating import render
 
 
 def parameters_section(model: Model) -> Section:

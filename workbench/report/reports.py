@@ -10,14 +10,16 @@ from workbench.report.controllers import (
     sensitivity_section,
     step_response,
 )
+from workbench.report.design_tables import design_sentence, then_of_design
 from workbench.report.fit import fit
 from workbench.report.friction import friction_curve
 from workbench.report.loop import judged, loop
-from workbench.report.model_tables import fit_lines, summary
-from workbench.report.page import Section, page, render
+from workbench.report.model_tables import fit_lines, next_of_model, summary
+from workbench.report.page import Section, page
 from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
-from workbench.report.validation_tables import validation_verdict
+from workbench.report.templating import render
+from workbench.report.validation_tables import then_of_validation, validation_sentence
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
 from workbench.steps.predict import fitted_run
@@ -26,35 +28,31 @@ from workbench.steps.validate import Validation
 
 def identification_report(found: Identified) -> str:
     """HTML: what was identified, how well it follows the log, what it leaves."""
-    model, log = found.model, found.sources[0].log
-    run = fitted_run(model, log, 0)
+    model, sources = found.model, found.sources
+    runs = [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
     notes = [*fit_lines(model), *found.remarks, *model.fit.remarks]
     sections = (
+        residual(model, sources, runs),
         parameters_section(model),
+        friction_curve(model, found.fit, sources),
+        fit(model, sources, runs),
         Section("In words", render("lines", lines=notes)),
-        fit(model, log, run),
-        friction_curve(model, found.fit, log),
-        residual(model, log, run),
     )
-    return page(f"Identification of {model.card}", summary(model), sections)
+    then = [next_of_model(model)]
+    return page(f"Identification of {model.card}", summary(model), sections, then)
 
 
 def design_report(found: Design, rotary: bool = False) -> str:
     """HTML: the controllers, their margins, what they do to noise, how fast they are."""
-    lead = (
-        f"{found.recommended.upper()} recommended, position loop every"
-        f" {1e3 * found.plant.h:.4g} ms; designed on the {found.plant.source} plant."
-    )
-    if found.recommendation:
-        lead += f" {found.recommendation.why}."
     sections = (
-        controllers(found, rotary),
         step_response(found),
+        controllers(found, rotary),
         sensitivity_section(found, rotary),
         coefficients(found),
         drive_section(found),
     )
-    return page(f"Design for {found.card}", lead, sections)
+    lead, then = design_sentence(found), then_of_design(found)
+    return page(f"Design for {found.card}", lead, sections, then)
 
 
 def validation_report(
@@ -62,7 +60,7 @@ def validation_report(
 ) -> str:
     """HTML: whether the design holds in simulation, and what the loop does."""
     places = dict.fromkeys(place for _, place in traces)
-    sections = (judged(found, rotary), *(loop(found, traces, place, rotary) for place in places))
-    return page(
-        f"Validation for {found.card}", f"{validation_verdict(found)}. {found.why}.", sections
-    )
+    drawn = [one for place in places for one in loop(found, traces, place, rotary)]
+    sections = (*drawn[:1], judged(found, rotary), *drawn[1:])
+    lead, then = validation_sentence(found), then_of_validation(found)
+    return page(f"Validation for {found.card}", lead, sections, then)

@@ -35,8 +35,10 @@ SYMBOLS = {
     "chi-square": "square of what the model leaves over that of the noise; 1: noise alone",
 }
 # A name of one letter is a symbol only where it stands alone in a cell.
-_NAMES = "|".join(re.escape(name) for name in sorted(SYMBOLS, key=len, reverse=True) if name != "m")
-_SYMBOL = re.compile(rf"(?<![\w/.\-])({_NAMES})(?![\w/]|\.\w)")
+_SYMBOL_NAMES = "|".join(
+    re.escape(name) for name in sorted(SYMBOLS, key=len, reverse=True) if name != "m"
+)
+_SYMBOL = re.compile(rf"(?<![\w/.\-])({_SYMBOL_NAMES})(?![\w/]|\.\w)")
 _ALONE = re.compile(r">m</td>|>m</th>|>m</abbr>")
 
 

@@ -1,7 +1,9 @@
 """The report of a trace: verdict, residual before and after, what explains it, rivals."""
 
 from workbench.output import Row
-from workbench.report.page import Section, page, render
+from workbench.report.free_curves import free_curves
+from workbench.report.page import Section, page
+from workbench.report.templating import render
 from workbench.report.trace_friction import friction_before_after
 from workbench.report.trace_pictures import (
     Picture,
@@ -21,11 +23,9 @@ from workbench.report.trace_tables import (
     effect_rows,
     error_rows,
     errors_head,
-    next_run,
     rival_rows,
-    trace_sentence,
-    words,
 )
+from workbench.report.trace_words import then_of, trace_sentence, words
 from workbench.steps.trace import Traced
 
 HIDDEN = (
@@ -38,9 +38,10 @@ def trace_report(traced: Traced) -> str:
     """HTML: what is missing, how it shows, and the errors before and after."""
     found, model = traced.trace, traced.model
     drawn = pictures(found)
-    sections = [*_drawn(drawn, model.rotary), *_hidden(traced, drawn)]
+    logs = [source.file for source in traced.train]
+    sections = [*_drawn(traced, drawn), *_hidden(traced, drawn)]
     if found.run is not None:
-        sections.append(over_time(found.run, model.rotary))
+        sections.append(over_time(found.run, model.rotary, logs))
     sections.append(
         _table(
             "Before and after",
@@ -52,6 +53,8 @@ def trace_report(traced: Traced) -> str:
         title = "The effect" if len(found.effects) == 1 else "The effects"
         rows = effect_rows(found, model.rig)
         sections.append(_table(title, EFFECT_HEAD, rows, effect_lines(found)))
+    if found.curves:
+        sections.append(free_curves(found.curves, model.rotary, model.rig.command_unit))
     sections.append(friction_before_after(traced))
     plain = "Parameters before and after" if found.effects else "Parameters"
     for title, head, rows in (
@@ -61,25 +64,18 @@ def trace_report(traced: Traced) -> str:
     ):
         if rows:
             sections.append(_table(title, head, rows))
-    if found.next_experiment:
-        sections.append(Section("Next experiment", render("lines", lines=[next_run(found)])))
     notes = [*traced.remarks, *found.remarks]
     if notes:
         sections.append(Section("Notes", render("lines", lines=notes)))
-    lead = f"{trace_sentence(traced)} {next_run(found)}".strip()
-    return page(f"Trace of {model.card}", lead, sections)
+    return page(f"Trace of {model.card}", trace_sentence(traced), sections, then_of(traced))
 
 
-def _drawn(drawn: list[Picture], rotary: bool) -> list[Section]:
-    """Each equation over time, and its residual against every signal that explains it."""
-    out: list[Section] = []
-    shown: set[str] = set()
-    for picture in drawn:
-        if picture.residual.equation not in shown:
-            out.append(over_time(picture.residual, rotary))
-            shown.add(picture.residual.equation)
-        out.append(against_signal(picture, rotary))
-    return out
+def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
+    """The residual of each equation against every signal that explains it, then over time."""
+    model, logs = traced.model, [source.file for source in traced.train]
+    out = [against_signal(picture, model.rotary, model.rig.command_unit) for picture in drawn]
+    of = {picture.residual.equation: picture.residual for picture in drawn}
+    return [*out, *(over_time(residual, model.rotary, logs) for residual in of.values())]
 
 
 def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:

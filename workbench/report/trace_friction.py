@@ -1,7 +1,6 @@
 """Section of a trace: friction against velocity, by the model before and after."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -10,45 +9,35 @@ from identification.effects._base import Acting
 from identification.model.karnopp import NAMES, Karnopp
 from identification.simulation.effect_along_motion import contribution
 from identification.tracing.result import Trace
-from workbench.cards.parameter_units import shown
+from workbench.cards.readable import units_of
 from workbench.documents.model import used
-from workbench.report.figures import (
-    MEASURED,
-    MODEL,
-    REFERENCE,
-    evenly_spread,
-    figure,
-    inline,
-    label,
-    style,
+from workbench.report.chart import Chart, Colour, Line, chart_html
+from workbench.report.friction import (
+    SHOWN_RANGE,
+    friction_data,
+    friction_panel,
+    low_speeds,
+    with_bar,
 )
-from workbench.report.friction import SHOWN_RANGE, friction_data
-from workbench.report.page import Section, render
-from workbench.report.trace_tables import words
+from workbench.report.page import Section
+from workbench.report.trace_words import words
 from workbench.steps.trace import Traced
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-Curve = tuple[Karnopp, list[Acting], str, str]  # a model, its effects of speed, colour and name
+Curve = tuple[Karnopp, list[Acting], Colour, str]  # a model, its effects of speed, colour and name
 CURVE = 160  # points of a friction curve
 
 
 def friction_before_after(traced: Traced) -> Section:
-    """Friction against velocity, the whole and without its viscous part, before and after.
+    """Friction against velocity at all speeds and at low ones, before and after.
 
     Where the machine has drifted without lacking an effect, on training and test logs.
     """
-    with style():
-        drawn = friction_figure(traced)
-        svg = inline(drawn, "trace-friction", "friction against velocity, before and after")
     speeds = _of_speed(traced)
     other = [words(a.key) for a in traced.model.acting if a not in speeds]
-    caption = "Dots: the log's samples, smoothed. The bar at 0 spans the breakaway limits."
+    caption = "Dots: the logs' samples, smoothed. The bar at 0 spans the breakaway limits."
     if other:
         caption += f" Not a function of velocity, so not in the curve: {', '.join(other)}."
-    return Section("Friction", render("figure", svg=svg, caption=caption))
+    return Section("Friction", chart_html(friction_chart(traced), caption))
 
 
 def _of_speed(traced: Traced) -> list[Acting]:
@@ -57,33 +46,39 @@ def _of_speed(traced: Traced) -> list[Acting]:
     return [a for a in every if a.effect.place.rubs and a.effect.depends_on == ("v",)]
 
 
-def friction_figure(traced: Traced) -> "Figure":
-    """The figure of `friction_before_after`."""
+def friction_chart(traced: Traced) -> Chart:
+    """The chart of `friction_before_after`."""
     found, model = traced.trace, traced.model
-    units, after = shown(model.rotary), model.karnopp
-    speeds = _of_speed(traced)
-    curves = _curves(found, after, speeds)
-    source = traced.test[0] if _drifted(found) and traced.test else traced.train[0]
-    data = friction_data(model, source.log)
-    reach = max(float(np.quantile(np.abs(data.v), 0.999)), 2 * max(after.dv_p, -after.dv_n))
-    keep = evenly_spread(len(data.v))
-    v, F_f = data.v[keep], data.F_f[keep]
-    with style():
-        drawn = figure(9.0, 3.8)
-        whole, dry = drawn.subplots(1, 2)
-        for axes, bare in ((whole, False), (dry, True)):
-            axes.plot(
-                v, F_f - bare * viscous(v, after), ".", ms=3.0, color=MEASURED, alpha=0.3, mew=0,
-                rasterized=True, label=f"{source.file}: F_e − m a",
-            )  # fmt: skip
-            _friction_lines(axes, curves, reach, after if bare else None)
-        label(whole, f"velocity [{units.velocity}]", f"friction force [{units.force}]")
-        label(dry, f"velocity [{units.velocity}]", "", "less the viscous part")
-        lines = dict(zip(*reversed(whole.get_legend_handles_labels()), strict=True))
-        drawn.legend(
-            lines.values(), lines.keys(), loc="outside upper right", ncols=3, markerscale=3
-        )
-    return drawn
+    after, curves = model.karnopp, _curves(found, model.karnopp, _of_speed(traced))
+    sources = traced.test if _drifted(found) and traced.test else traced.train
+    data = [friction_data(model, one.log) for one in sources]
+    v, F_f = (np.concatenate([getattr(one, name) for one in data]) for name in ("v", "F_f"))
+    reach = max(float(np.quantile(np.abs(v), 0.999)), 2 * max(after.dv_p, -after.dv_n))
+    name = "logs: F_e − m a" if len(sources) > 1 else f"{sources[0].file}: F_e − m a"
+    dots = Line(name, v, F_f, "measured", "dots")
+    panels = []
+    for title, high in (
+        ("all speeds", reach),
+        ("low speeds", low_speeds(after, (-reach, reach))[1]),
+    ):
+        lines = [_line(curve, high) for curve in curves]
+        top = max(float(np.nanmax(np.abs(one.y))) for one in lines)
+        panels.append(
+            friction_panel(
+                title, units_of(model.rotary), dots, lines, (-high, high),
+                (-SHOWN_RANGE * top, SHOWN_RANGE * top), after,
+            )
+        )  # fmt: skip
+    what = "friction force against velocity, before and after"
+    return Chart("trace-friction", what, panels, columns=2, shared_x=False)
+
+
+def _line(curve: Curve, high: float) -> Line:
+    """Friction of a model at speeds up to `high` [m/s]."""
+    p, acting, colour, name = curve
+    v_n, v_p = np.linspace(-high, p.dv_n, CURVE), np.linspace(p.dv_p, high, CURVE)
+    F_n, F_p = (sliding_friction(v, p, acting) for v in (v_n, v_p))
+    return Line(name, *with_bar(v_n, F_n, v_p, F_p, p, 2 * high), colour, "bold")
 
 
 def _drifted(found: Trace) -> bool:
@@ -94,28 +89,14 @@ def _curves(found: Trace, after: Karnopp, speeds: list[Acting]) -> list[Curve]:
     """Models whose friction is drawn."""
     if found.effects:
         before = Karnopp(**{name: used(found.parameters_before[name]) for name in NAMES})
-        return [(before, [], REFERENCE, "before"), (after, speeds, MODEL, "after")]
+        return [(before, [], "reference", "before"), (after, speeds, "model", "after")]
     if not _drifted(found):
-        return [(after, speeds, MODEL, "model")]
+        return [(after, speeds, "model", "model")]
     changed = {one.name: max(one.after, 0.0) for one in found.drift if one.name in NAMES}
     return [
-        (after, [], REFERENCE, "on the training logs"),
-        (replace(after, **changed), [], MODEL, "on the test logs"),
+        (after, [], "reference", "on the training logs"),
+        (replace(after, **changed), [], "model", "on the test logs"),
     ]
-
-
-def _friction_lines(axes: "Axes", curves: list[Curve], reach: float, less: Karnopp | None) -> None:
-    """Friction of each model up to `reach` [m/s]; less: without the viscous part of this one."""
-    top = 0.0
-    for p, acting, colour, name in curves:
-        for low, high in ((-reach, p.dv_n), (p.dv_p, reach)):
-            at = np.linspace(low, high, CURVE)
-            F = sliding_friction(at, p, acting) - (viscous(at, less) if less else 0.0)
-            axes.plot(at, F, color=colour, lw=1.8, label=name)
-            top = max(top, float(np.max(np.abs(F))))
-        axes.plot([0, 0], [p.F_sn, p.F_sp], color=colour, marker="_", ms=9, lw=1.2)
-        top = max(top, p.F_sp, -p.F_sn)
-    axes.set_ylim(-SHOWN_RANGE * top, SHOWN_RANGE * top)
 
 
 def viscous(v: Array, p: Karnopp) -> Array:

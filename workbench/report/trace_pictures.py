@@ -1,7 +1,8 @@
 """Pictures of a trace: the residual before and after over time and against what explains it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -10,44 +11,31 @@ from identification.effects._base import Acting, Effect
 from identification.model.karnopp import Karnopp
 from identification.simulation.effect_along_motion import contribution
 from identification.tracing.result import Residual, Trace
-from workbench.cards.parameter_units import shown
-from workbench.report.figures import (
-    MEASURED,
-    MODEL,
-    OTHER,
-    REFERENCE,
-    evenly_spread,
-    figure,
-    inline,
-    label,
-    style,
-)
-from workbench.report.page import Section, render
-from workbench.report.trace_tables import words
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from workbench.cards.readable import units_of
+from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
+from workbench.report.figures import SHOWN_SHARE, evenly_spread
+from workbench.report.page import Section
+from workbench.report.trace_words import words
 
 Equation = Literal["mechanical", "actuator"]
-BEFORE = "#8a8a8a"
 LEVELS = 30  # of a signal, over which the running median is taken
 FINE = 90  # of a signal, for the curve of what the effect takes away, which has no noise
 DOTS = 3000
-SHOWN_SHARE = 0.995  # share of the points that the axes hold
+# Name of a signal, and the quantity whose unit it has.
 SIGNALS = {
-    "v": "velocity [{velocity}]",
-    "y": "position [{position}]",
-    "t": "time [s]",
-    "F": "applied force [{force}]",
-    "u": "command [V]",
-    "p_p": "pressure p_p [Pa]",
-    "p_n": "pressure p_n [Pa]",
-    "a": "acceleration [{velocity}/s]",
-    "phase": "part of the swing's period [1]",
-    "reversal": "time since the last reversal [s]",
-    "du": "rate of the command [V/s]",
+    "v": ("velocity", "{velocity}"),
+    "y": ("position", "{position}"),
+    "t": ("time", "s"),
+    "F": ("applied force", "{force}"),
+    "u": ("command", "{command}"),
+    "p_p": ("pressure p_p", "bar"),
+    "p_n": ("pressure p_n", "bar"),
+    "a": ("acceleration", "{velocity}/s"),
+    "phase": ("part of the swing's period", "1"),
+    "reversal": ("time since the last reversal", "s"),
+    "du": ("rate of the command", "{command}/s"),
 }
+PASCALS = 1e-5  # bar
 # Sign with which an effect enters the residual; 0: that of the motion.
 GAP = 0.2  # of a signal's range, over which a running median is not drawn
 EQUATION_TITLES = {
@@ -184,30 +172,9 @@ def signal_of(effect: Effect, residual: Residual) -> str:
     return next(iter(residual.signals))
 
 
-def over_time(residual: Residual, rotary: bool) -> Section:
+def over_time(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Section:
     """Residual against time before and after, with the band of the sensors' noise."""
-    noise = 2 * float(np.median(residual.noise))
-    with style():
-        drawn = figure(9.0, 3.2)
-        axes = drawn.subplots()
-        keep = evenly_spread(len(residual.t))
-        for values, colour, name in _both(residual):
-            axes.plot(
-                residual.t[keep], values[keep], ".", ms=3, mew=0, color=colour, label=name,
-                rasterized=True,
-            )  # fmt: skip
-        axes.axhspan(
-            -noise, noise, color=REFERENCE, alpha=0.3, lw=0, zorder=3, label="±2σ of the sensors"
-        )
-        for at in log_starts(residual)[1:]:
-            axes.axvline(at, color="#bbbbbb", lw=0.8, ls="--")
-        _limits(axes, residual)
-        drawn.legend(
-            *axes.get_legend_handles_labels(), loc="outside upper right", ncols=3, markerscale=4
-        )
-        label(axes, "time, training logs in a row [s]", f"residual [{_unit(residual, rotary)}]")
-        name = f"trace-time-{residual.equation}"
-        svg = inline(drawn, name, "residual against time, before and after")
+    chart = time_chart(residual, rotary, logs)
     shares = [
         f"{share_inside(values, residual.noise):.0f} % ({name})"
         for values, _, name in _both(residual)
@@ -217,16 +184,37 @@ def over_time(residual: Residual, rotary: bool) -> Section:
         f"{equation.capitalize()}, {ROWS_TAKEN.get(residual.equation, WINDOWS)}; a complete model"
         f" has 95 % of its points in the band, here {', '.join(shares)}."
     )
-    title = f"What the model leaves over time: {equation}"
-    return Section(title, render("figure", svg=svg, caption=caption))
+    return Section(f"What the model leaves over time: {equation}", chart_html(chart, caption))
 
 
-def _both(residual: Residual) -> list[tuple[Array, str, str]]:
+def time_chart(residual: Residual, rotary: bool, logs: Sequence[str] = ()) -> Chart:
+    """The chart of `over_time`; logs: names of the logs in a row."""
+    unit, factor = residual_unit(residual.equation, rotary)
+    noise = 2 * factor * float(np.median(residual.noise))
+    keep = evenly_spread(len(residual.t))
+    lines = [
+        Line(name, residual.t[keep], factor * values[keep], colour, "dots")
+        for values, colour, name in _both(residual)
+    ]
+    starts = log_starts(residual)
+    ends = np.append(starts[1:], residual.t.max())
+    names = logs if len(logs) == len(starts) > 1 else ()
+    parts = [Part(*one) for one in zip(names, starts.tolist(), ends.tolist(), strict=False)]
+    panel = Panel(
+        "time, training logs in a row [s]", f"residual [{unit}]", lines,
+        bands=[Band("±2σ of the sensors' noise", -noise, noise)],
+        marks=[Mark(float(at), "x") for at in starts[1:]],
+        y_range=_limits(residual, factor),
+    )  # fmt: skip
+    what = f"residual of the {EQUATION_TITLES[residual.equation]} against time, before and after"
+    return Chart(f"trace-time-{residual.equation}", what, [panel], parts=parts)
+
+
+def _both(residual: Residual) -> list[tuple[Array, Colour, str]]:
     """Residual before and after, their colours and names; one, where nothing was added."""
-    after = (residual.after, MODEL, "after")
     if np.array_equal(residual.before, residual.after):
-        return [(residual.after, MODEL, "model")]
-    return [(residual.before, BEFORE, "before"), after]
+        return [(residual.after, "model", "model")]
+    return [(residual.before, "before", "before"), (residual.after, "model", "after")]
 
 
 def share_inside(values: Array, noise: Array) -> float:
@@ -239,49 +227,53 @@ def log_starts(residual: Residual) -> Array:
     return np.array([residual.t[residual.log == k].min() for k in np.unique(residual.log)])
 
 
-def against_signal(picture: Picture, rotary: bool) -> Section:
+def against_signal(picture: Picture, rotary: bool, command: str = "V") -> Section:
     """Residual against the signal that explains it, before and after, with running medians."""
-    with style():
-        drawn = signal_figure(picture, rotary)
-        name = f"trace-{picture.residual.equation}-{picture.signal}"
-        svg = inline(drawn, name, "residual against a signal")
-    signal = axis_label(picture.signal, rotary).split(" [")[0]
+    signal = axis_of(picture.signal, rotary)[0].split(" [")[0]
     alone = len(_both(picture.residual)) == 1
     title = f"Against {signal}" if alone else f"What it depends on: {signal}"
-    return Section(title, render("figure", svg=svg, caption=_caption(picture)))
+    return Section(title, chart_html(signal_chart(picture, rotary, command), _caption(picture)))
 
 
-def signal_figure(picture: Picture, rotary: bool) -> "Figure":
-    """The figure of `against_signal`."""
-    residual, x = picture.residual, picture.residual.signals[picture.signal]
-    panels = _both(residual)
-    if len(panels) > 1:
-        panels[0] = (picture.without, BEFORE, picture.how)
-    with style():
-        drawn = figure(9.0, 3.6)
-        every = drawn.subplots(1, len(panels), sharey=True, squeeze=False)[0]
-        for axes, (values, colour, title) in zip(every, panels, strict=True):
-            _cloud(axes, residual, x, values, colour)
-            unit = f"residual [{_unit(residual, rotary)}]" if axes is every[0] else ""
-            label(axes, axis_label(picture.signal, rotary), unit, title)
-        if picture.curve is not None and picture.effect:
-            for at, _ in by_direction(residual).values():
-                every[0].plot(
-                    *running_median(x[at], picture.curve[at], FINE), color=MEASURED, lw=1.0,
-                    ls="--", label=f"fitted: {words(picture.effect.key)}",
-                )  # fmt: skip
-        _limits(every[0], residual, panels[0][0])
-        lines = dict(zip(*reversed(every[0].get_legend_handles_labels()), strict=True))
-        drawn.legend(lines.values(), lines.keys(), loc="outside upper right", ncols=3)
-    return drawn
+def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
+    """The chart of `against_signal`; command: unit of u."""
+    residual = picture.residual
+    label, x_factor = axis_of(picture.signal, rotary, command)
+    unit, factor = residual_unit(residual.equation, rotary)
+    x = x_factor * residual.signals[picture.signal]
+    both = _both(residual)
+    if len(both) > 1:
+        both[0] = (picture.without, "before", picture.how)
+    limits = _limits(residual, factor, both[0][0])
+    panels: list[Panel] = []
+    for values, colour, name in both:
+        title = name if len(both) > 1 else ""
+        lines = _cloud(residual, x, factor * values, colour)
+        if picture.curve is not None and picture.effect and not panels:
+            lines += _fitted(picture, x, factor)
+        panels.append(Panel(label, f"residual [{unit}]", lines, title, y_range=limits, height=260))
+    what = f"residual of the {EQUATION_TITLES[residual.equation]} against {label}, before and after"
+    return Chart(f"trace-{residual.equation}-{picture.signal}", what, panels, columns=2)
 
 
-def _cloud(axes: "Axes", residual: Residual, x: Array, values: Array, colour: str) -> None:
+def _cloud(residual: Residual, x: Array, values: Array, colour: Colour) -> list[Line]:
     """Points against a signal, and their running median in each direction of motion."""
     keep = evenly_spread(len(x), DOTS)
-    axes.plot(x[keep], values[keep], ".", ms=3, mew=0, color=colour, alpha=0.6, rasterized=True)
+    out = [Line("rows", x[keep], values[keep], colour, "dots")]
     for name, (at, way) in by_direction(residual).items():
-        axes.plot(*running_median(x[at], values[at], LEVELS), color=way, lw=1.8, label=name)
+        out.append(Line(name, *running_median(x[at], values[at], LEVELS), way, "bold"))
+    return out
+
+
+def _fitted(picture: Picture, x: Array, factor: float) -> list[Line]:
+    """What the fitted effect takes away, in each direction of motion."""
+    assert picture.curve is not None and picture.effect
+    name = f"fitted: {words(picture.effect.key)}"
+    out: list[Line] = []
+    for at, _ in by_direction(picture.residual).values():
+        curve = running_median(x[at], factor * picture.curve[at], FINE)
+        out.append(Line("" if out else name, *curve, "measured", "dashed"))
+    return out
 
 
 def _caption(picture: Picture) -> str:
@@ -296,41 +288,52 @@ def _caption(picture: Picture) -> str:
     return text
 
 
-def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, str]]:
+def by_direction(residual: Residual) -> dict[str, tuple[BoolArray, Colour]]:
     """Rows of each direction of motion and its colour; those of too few points are left out."""
     v = residual.signals.get("v")
     if v is None:
         every: BoolArray = np.ones(len(residual.t), dtype=np.bool_)
-        return {"running median": (every, REFERENCE)}
-    ways = {"moving towards +": (v > 0, REFERENCE), "moving towards −": (v < 0, OTHER)}
+        return {"running median": (every, "reference")}
+    ways: dict[str, tuple[BoolArray, Colour]] = {
+        "moving towards +": (v > 0, "reference"),
+        "moving towards −": (v < 0, "other"),
+    }
     return {name: way for name, way in ways.items() if np.count_nonzero(way[0]) > LEVELS}
 
 
 def running_median(x: Array, values: Array, levels: int) -> tuple[Array, Array]:
     """Medians of `values` over equally filled stretches of `x`, at most `levels` of them.
 
-    NaN parts them where `x` has a wide gap, across which no line is to be drawn.
+    A NaN in the medians parts them where `x` has a wide gap, across which no line is to be drawn.
     """
     parts = np.array_split(np.argsort(x), min(levels, len(x)))
     at = np.array([np.median(x[p]) for p in parts])
     found = np.array([np.median(values[p]) for p in parts])
     gaps = 1 + np.flatnonzero(np.diff(at) > GAP * max(float(np.ptp(x)), 1e-300))
-    return np.insert(at, gaps, np.nan), np.insert(found, gaps, np.nan)
+    return np.insert(at, gaps, (at[gaps - 1] + at[gaps]) / 2), np.insert(found, gaps, np.nan)
 
 
-def axis_label(signal: str, rotary: bool) -> str:
-    """A signal's name and unit."""
-    return SIGNALS.get(signal, signal).format(**shown(rotary)._asdict())
+def axis_of(signal: str, rotary: bool, command: str = "V") -> tuple[str, float]:
+    """Label of a signal's axis, and what its values are multiplied by; command: unit of u."""
+    if signal not in SIGNALS:
+        return signal, 1.0
+    name, unit = SIGNALS[signal]
+    units = units_of(rotary)
+    known = {key: getattr(units, key) for key in ("position", "velocity", "force")}
+    shown = unit.format(**{key: one.name for key, one in known.items()}, command=command)
+    factor = next((one.factor for key, one in known.items() if f"{{{key}}}" in unit), 1.0)
+    return f"{name} [{shown}]", PASCALS if shown == "bar" else factor
 
 
-def _unit(residual: Residual, rotary: bool) -> str:
-    units = shown(rotary)
-    of = {"actuator": f"{units.force}/s", "position": units.position}
-    return of.get(residual.equation, units.force)
+def residual_unit(equation: str, rotary: bool) -> tuple[str, float]:
+    """Unit of an equation's residual, and what its values are multiplied by."""
+    units = units_of(rotary)
+    of = {"actuator": (f"{units.force.name}/s", 1.0), "position": units.position}
+    return of.get(equation, units.force)
 
 
-def _limits(axes: "Axes", residual: Residual, values: Array | None = None) -> None:
+def _limits(residual: Residual, factor: float, values: Array | None = None) -> tuple[float, float]:
     """Range that holds all but the rarest points (by default of the residual before), and noise."""
     top = float(np.quantile(np.abs(residual.before if values is None else values), SHOWN_SHARE))
-    top = 1.25 * max(top, 2 * float(np.median(residual.noise)), 1e-300)
-    axes.set_ylim(-top, top)
+    top = 1.25 * factor * max(top, 2 * float(np.median(residual.noise)), 1e-300)
+    return -top, top

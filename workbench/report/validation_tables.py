@@ -4,14 +4,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from workbench.cards.parameter_units import Shown, shown
-from workbench.output import Row, table, written
+from workbench.cards.readable import length
+from workbench.output import Row, next_step, table, written
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
-from workbench.steps.recommend import in_thousandths, percent, settled
+from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
 from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
     from rich.console import Group
-    from rich.table import Table
+    from rich.padding import Padding
 
 
 def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
@@ -23,7 +24,7 @@ def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
         "loop",
         *where,
         "ok",
-        "modulus",
+        "margin",
         "delay",
         "at rest",
         "over",
@@ -45,7 +46,7 @@ def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
     ]
 
 
-def validation_table(found: Validation, rotary: bool = False) -> "Table":
+def validation_table(found: Validation, rotary: bool = False) -> "Padding":
     """The table for a terminal."""
     return table(validation_head(found, rotary), validation_rows(found, rotary), right=())
 
@@ -67,7 +68,7 @@ def _row(one: LoopFigures, units: Shown) -> Row:
     modulus, delay = f"{m.modulus:.3f}" if m else "unstable", "-"
     command = () if one.command_peak is None else (_command(one),)
     if m:
-        delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g} h"
+        delay = "any" if m.delay_samples is None else f"{m.delay_samples:.2g}"
     if not one.stable:
         return (passes, modulus, delay, *["-"] * (6 + len(command)))
     return (
@@ -99,7 +100,8 @@ def _cycle(one: LoopFigures, units: Shown) -> str:
 def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     """What fails and what to know, in words."""
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
-    lines = [found.why] if found.why else []
+    others = other_figures(found.why)
+    lines = [others] if others else []
     lines += [line for name in alone for line in _missed(found, name)]
     one, units = _any(found), shown(rotary)
     limit = (
@@ -107,8 +109,9 @@ def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     )
     limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
     lines.append(
-        f"steps of {one.step:.3g} {units.position}; error at rest and overshoot relative to the"
-        f" step, smooth error to its amplitude; +comp with the compensator{limit}"
+        f"steps of {length(one.step, rotary)}; at rest, over (overshoot): error relative to the"
+        " step; smooth: to the amplitude of the smooth reference; margin: modulus margin; delay:"
+        f" delay margin in sampling periods; +comp: with the compensator{limit}"
     )
     return [*lines, *(f"note: {line}" for line in found.remarks)]
 
@@ -132,12 +135,28 @@ def validation_verdict(found: Validation) -> str:
     return f"{found.judged.upper()} {word} in simulation"
 
 
+def validation_sentence(found: Validation) -> str:
+    """Whether the judged controller passed and with which figures; what it misses."""
+    said = validation_verdict(found)
+    if not found.passed:
+        return f"{said}: {missed(found)}."
+    return f"{said}: {own_figures(found.why)}." if found.why else f"{said}."
+
+
+def then_of_validation(found: Validation) -> list[str]:
+    """What to do next with a design that was checked."""
+    if found.passed:
+        return ["`workbench export DESIGN --to c` writes it as code for the drive"]
+    return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"]
+
+
 def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> "Group":
     """The validation for a terminal."""
     from rich.console import Group
 
     return Group(
-        validation_verdict(found),
+        validation_sentence(found),
+        *map(next_step, then_of_validation(found)),
         validation_table(found, rotary),
         *validation_lines(found, rotary),
         *([] if folder is None else [written(folder, "validation.json", "report.html")]),

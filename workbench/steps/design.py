@@ -14,6 +14,7 @@ from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
 from identification.model.plant import Actuator
 from workbench.cards.parameter_units import Shown, shown
+from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design import (
     CompensatorValues,
     Controller,
@@ -257,10 +258,10 @@ def _notes(tuned: Tuned, units: Shown) -> Iterator[str]:
         yield f"set-point weights b = {b:.3g}, c = {c:.3g}"
     yield f"follows a ramp {1e3 * tuned.followed.lag:.3g} ms behind"
     if rate is not None:
-        step = rate * tuned.rst.h
+        step, (speed, factor) = rate * tuned.rst.h, shown_unit(units.velocity)
         yield (
-            f"move the reference by at most {step:.4g} {units.position} in a sample"
-            f" ({rate:.3g} {units.velocity})"
+            f"move the reference by at most {length(step, units.position == 'rad')} in a sample"
+            f" ({number(factor * rate)} {speed})"
         )
     if pid is not None and (said := pid.note or pid.reason):
         yield said

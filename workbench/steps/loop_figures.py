@@ -15,6 +15,7 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.model.plant import Motor
 from workbench.cards.parameter_units import shown
+from workbench.cards.readable import length
 from workbench.documents.design import Design, MarginValues, margin_values
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
@@ -275,7 +276,6 @@ def _linear_margins(machine: Model, loop: DrivenLoop, arx: bool) -> MarginValues
 
 def _missed(result: LoopFigures, limits: Limits, machine: Model) -> tuple[str, ...]:
     """What a controller does not keep, in words."""
-    unit = shown(machine.rotary).position
     if not result.stable:
         return ("the simulated loop runs away",)
     missed: list[str] = []
@@ -290,7 +290,7 @@ def _missed(result: LoopFigures, limits: Limits, machine: Model) -> tuple[str, .
             missed.append(f"delay margin {samples:.4g} samples, at least {limits.delay:g} needed")
     if not (result.standstill_relative <= limits.standstill):
         missed.append(
-            f"error at standstill {result.standstill:.3g} {unit},"
+            f"error at standstill {length(result.standstill, machine.rotary)},"
             f" {100 * result.standstill_relative:.1f} % of the step, at most"
             f" {100 * limits.standstill:g} % allowed"
         )

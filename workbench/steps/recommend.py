@@ -1,5 +1,6 @@
 """Which of several controllers, by what their loops come to in simulation, and why, in one line."""
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
@@ -84,6 +85,20 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
         for other, it in ((other, figures[other]) for other in others)
     ]
     return f"{said} ({'; '.join(beside)})" if beside else said
+
+
+OTHERS = re.compile(r" \(([^()]*)\)(?=:|$)")  # what `reasons` says of the other controllers
+
+
+def own_figures(why: str) -> str:
+    """A reason of `reasons` without the controller's name and the figures of the others."""
+    return OTHERS.sub("", why).partition(": ")[2] or why
+
+
+def other_figures(why: str) -> str:
+    """The figures of the other controllers in a reason, in the order of its own; "" of none."""
+    found = OTHERS.search(why)
+    return f"the others, in the same order: {found[1]}" if found else ""
 
 
 def settled(one: LoopFigures) -> str:

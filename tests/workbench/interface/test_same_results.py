@@ -115,7 +115,7 @@ def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     the_same(found, bench.folder / "design", tmp_path)
     asked = bench.ran("asked", "design", bench.path("model/model.json"), "--poles", "15,1")
     the_same(wb.design(model, poles=(15.0, 1.0)), asked, tmp_path / "asked")
-    shown_well(found, "recommended: ")
+    shown_well(found, " recommended, position loop every")
 
 
 def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from identification.arrays import Array
 from workbench.report.chart import (
     ALL_POINTS,
-    FINEST,
+    FINEST_POINTS,
     FIRST_VIEW,
     Area,
     Band,
@@ -106,7 +106,7 @@ def test_a_chart_is_bounded_whatever_the_log(lines: int) -> None:
     panel = Panel("t", "y", [Line(str(k), t, np.sin(t + k)) for k in range(lines)])
     (found,) = chart_data(Chart("long", "long", [panel]))["panels"]
     counts = [len(decoded(y)) for table in found["tables"] for y in table["y"]]
-    assert max(counts) <= FINEST and min(counts) > 0.9 * FIRST_VIEW
+    assert max(counts) <= FINEST_POINTS and min(counts) > 0.9 * FIRST_VIEW
     assert sum(counts) <= max(ALL_POINTS, lines * FIRST_VIEW)
 
 

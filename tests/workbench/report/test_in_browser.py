@@ -10,8 +10,10 @@ from typing import Any
 
 import pytest
 
+from tests.chain import identified
 from tests.workbench.report.test_chart import example
 from workbench.report.chart import chart_assets, chart_html
+from workbench.report.reports import identification_report
 
 CHROMIUM = next(
     filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
@@ -39,11 +41,15 @@ def browser() -> Iterator[Any]:
 
 
 def opened(browser: Any, address: str, width: int) -> None:
+    from selenium.webdriver.support.ui import WebDriverWait
+
     browser.execute_cdp_cmd(
         "Emulation.setDeviceMetricsOverride",
         {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": width < 600},
     )
     browser.get(address)
+    undrawn = "return document.querySelectorAll('.chart:not([data-drawn])').length"
+    WebDriverWait(browser, 30).until(lambda one: one.execute_script(undrawn) == 0)
 
 
 def faults(browser: Any) -> list[str]:
@@ -60,6 +66,16 @@ def inked(browser: Any) -> list[int]:
         "return [...document.querySelectorAll('canvas')].map(c => c.getContext('2d')"
         ".getImageData(0, 0, c.width, c.height).data.filter((v, k) => k % 4 === 3 && v > 0).length)"
     ))  # fmt: skip
+
+
+@pytest.mark.parametrize("width", [420, 1400])
+def test_a_report_is_drawn_and_fits_the_screen(browser: Any, tmp_path: Path, width: int) -> None:
+    (tmp_path / "report.html").write_text(identification_report(identified()), encoding="utf-8")
+    opened(browser, (tmp_path / "report.html").as_uri(), width)
+    assert faults(browser) == []
+    found = inked(browser)
+    assert found and min(found) > 1000
+    assert browser.execute_script("return document.documentElement.scrollWidth") == width
 
 
 class Strict(SimpleHTTPRequestHandler):

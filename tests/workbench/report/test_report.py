@@ -11,7 +11,7 @@ from identification.model.plant import Actuator, actuator_units
 from tests.chain import TABLES, identified, model_of
 from workbench.cards.parameter_units import friction_units
 from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
-from workbench.report.fit import liveliest
+from workbench.report.in_a_row import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_report, identification_report, validation_report
 from workbench.report.validation_tables import (
@@ -50,8 +50,9 @@ def checked(html: str, figures: int) -> str:
     parser.feed(html)
     assert parser.open == []
     assert len(html) < LARGEST
-    assert html.count("<svg") == figures
-    assert "<script" not in html
+    assert html.count("<svg") + html.count('<figure class="chart">') == figures
+    # Only our own scripts, and only where there is a chart to draw.
+    assert ("uPlot" in html) == ('<figure class="chart">' in html)
     # Names of XML vocabularies are no addresses that a browser would fetch.
     fetched = re.findall(r'(?:src|href)="(?!#|data:)([^"]+)"|url\((?!#)([^)]+)\)', html)
     assert fetched == []
@@ -63,7 +64,7 @@ def checked(html: str, figures: int) -> str:
 
 def test_identification_report() -> None:
     html = checked(identification_report(identified()), 3)
-    for text in ("position [m]", "applied force [N]", "velocity [m/s]", "friction force [N]",
+    for text in ("position [mm]", "applied force [N]", "velocity [mm/s]", "friction force [N]",
                  "time [s]", "moving mass", "95 % interval", "short.csv", "a remark"):  # fmt: skip
         assert text in html
 
@@ -74,7 +75,7 @@ def test_a_rotary_report_shows_rotary_units() -> None:
     for text in ("position [rad]", "applied force [N m]", "velocity [rad/s]", "N m s/rad",
                  "kg m^2", "moment of inertia", "breakaway torque", "N m/(V s)"):  # fmt: skip
         assert text in html
-    for text in ("[m]", "[N]", "[m/s]", ">kg<", ">N s/m<", "moving mass", " m rms", " N/m "):
+    for text in ("[mm]", "[N]", "[mm/s]", ">kg<", ">N s/m<", "moving mass", " mm rms", " N/m "):
         assert text not in html
 
 
@@ -100,7 +101,7 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     assert "N/m" not in html and "V/N," not in html
     result, _ = validate(model, found, np.random.default_rng(0))
     assert any(re.match(r"steps of [\d.]+ rad;", line) for line in validation_lines(result, True))
-    assert any(re.match(r"steps of [\d.]+ m;", line) for line in validation_lines(result))
+    assert any(re.match(r"steps of [\d.]+ mm;", line) for line in validation_lines(result))
 
 
 def test_design_report() -> None:
@@ -118,10 +119,10 @@ def test_design_report() -> None:
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
     result, traces = validate(model, design(model), np.random.default_rng(0), plant=other)
-    html = checked(validation_report(result, traces, rotary=False), 2)
-    assert "Loop on the identified plant" in html and "Loop on the other plant" in html
+    html = checked(validation_report(result, traces, rotary=False), 4)
+    assert "Steps on the identified plant" in html and "Steps on the other plant" in html
     rotary = validation_report(result, traces, rotary=True)
-    assert "position [rad]" in rotary and "applied force [N m]" in rotary
+    assert "position [rad]" in rotary and "force N m" in rotary
 
 
 def test_text_is_escaped() -> None:

@@ -13,7 +13,14 @@ from identification.errors import BadLog
 from identification.estimation.estimates import HELD, of_effect
 from identification.log import Rig
 from identification.model.karnopp import NAMES
-from identification.tracing.result import Dependence, Errors, Left, Residual, TraceVerdict
+from identification.tracing.result import (
+    Dependence,
+    Errors,
+    FreeCurve,
+    Left,
+    Residual,
+    TraceVerdict,
+)
 from tests.told import broken_in
 from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
@@ -23,7 +30,7 @@ from workbench.report.trace import trace_report
 from workbench.report.trace_friction import sliding_friction
 from workbench.report.trace_pictures import (
     along_rows,
-    axis_label,
+    axis_of,
     log_starts,
     pictures,
     running_median,
@@ -35,11 +42,10 @@ from workbench.report.trace_tables import (
     drift_rows,
     effect_rows,
     error_rows,
-    percent,
     rival_rows,
-    trace_sentence,
     trace_view,
 )
+from workbench.report.trace_words import percent, trace_sentence
 from workbench.steps import trace as tracing
 from workbench.steps.trace import named_logs, trace_document, trace_sources, traced_model
 
@@ -48,8 +54,8 @@ CONTRACT = {
     "next_experiment",
 }  # fmt: skip
 BESIDE = {
-    "bad_samples", "complete", "left", "not_tried", "remarks", "parameters", "card", "log",
-    "test_log", "versions",
+    "bad_samples", "complete", "curves", "left", "not_tried", "remarks", "parameters", "card",
+    "log", "test_log", "versions",
 }  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
@@ -115,7 +121,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
     ]
     assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in trace_sentence(found)
     html = checked(trace_report(found), 4)
-    assert "velocity [rad/s]" in html and "residual [N m]" in html and "[m/s]" not in html
+    assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
 
 def test_a_test_log_that_is_a_training_log_is_refused() -> None:
@@ -167,7 +173,7 @@ def test_logs_that_are_not_named_are_the_cards() -> None:
         ("effect", ("stribeck", "spring"), "They explain all of what was missing"),
         ("drift", (), "Drift: between training and test logs the machine changed in F_cp from 12 "),
         ("unknown", (), "what is left depends on y (which accounts for 40 % of it)"),
-        ("unknown", ("stribeck",), "Part of it is stribeck"),
+        ("unknown", ("stribeck",), "Found in part: stribeck – friction falls"),
         ("inseparable", ("stribeck",), "They do not tell it from spring."),
     ],
 )
@@ -209,7 +215,7 @@ def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     assert text.startswith("Unknown: the model leaves 0.07 N of force")
     assert "depends on none of the signals" in text
     text = trace_sentence(traced(found))  # no more force than the sensors' noise: it is in the run
-    assert text.startswith("Unknown: the free run is off by") and "m in 2 s" in text
+    assert text.startswith("Unknown: the free run is off by") and "10 µm in 2 s" in text
 
 
 def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:
@@ -275,9 +281,10 @@ def test_the_view_for_a_terminal() -> None:
     with console.capture() as shown:
         console.print(trace_view(traced(trace_of("unknown")), Path("out")))
     text = " ".join(shown.get().split())
-    for part in ("Unknown: what is left depends on y", "held out before", "stribeck F_s", "why not",
+    for part in ("Found in part: stribeck", "What is left depends on y", "held out before",
+                 "stribeck F_s", "why not",
                  "F_s*(1 + asymmetry*d)*exp(-(Abs(v)/v_s)**delta)",
-                 "Next run: the same stroke at several", "note: a remark of the trace",
+                 "next: record more, the same stroke at several", "note: a remark of the trace",
                  "written: out/trace.json"):  # fmt: skip
         assert part in text
 
@@ -299,7 +306,7 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
     if verdict == "drift":
         wanted += ["14.4 ± 0.2", "on the test logs"]
     if verdict == "unknown":
-        wanted += ["Next experiment", "position [m]"]
+        wanted += ["record more, the same stroke", "position [mm]"]
     for text in wanted:
         assert text in html, text
 
@@ -315,9 +322,18 @@ def test_the_free_run_is_drawn_before_and_after() -> None:
     t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
     run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
     html = checked(trace_report(traced(replace(found, run=run))), 2)
-    assert "rising stiction shows in neither" in html and "residual [m]" in html
+    assert "rising stiction shows in neither" in html and "residual [mm]" in html
     assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
     assert "residual [rad]" in trace_report(traced(replace(found, run=run), rotary=True))
+
+
+def test_a_law_is_drawn_beside_what_the_logs_say_without_it() -> None:
+    at = np.linspace(0.01, 0.3, 12)
+    curve = FreeCurve("stribeck", "mechanical", "v", at, np.exp(-at), 0.01 + 0 * at, np.exp(-at))
+    found = replace(trace_of("effect", ("stribeck",)), curves=(curve,))
+    html = checked(trace_report(traced(found)), 4)
+    for text in ("Law and logs", "stribeck [N]", "by the logs alone", "velocity [mm/s]"):
+        assert text in html
 
 
 def test_an_effect_is_shown_in_its_equation_against_its_signal() -> None:
@@ -342,15 +358,19 @@ def test_what_an_effect_takes_away_is_its_own_share_of_the_residual() -> None:
 def test_the_running_median_is_not_drawn_across_a_gap() -> None:
     x = np.concatenate([np.linspace(0.0, 1.0, 300), np.linspace(9.0, 10.0, 300)])
     at, values = running_median(x, np.ones(600), 30)
-    assert np.count_nonzero(np.isnan(at)) == 1
+    assert np.count_nonzero(np.isnan(values)) == 1 and np.all(np.diff(at) > 0)
+    assert 1.0 < at[np.isnan(values)][0] < 9.0
     assert set(values[~np.isnan(values)]) == {1.0}
 
 
 def test_shares_starts_and_labels() -> None:
     assert share_inside(np.array([0.0, 1.9, -2.1, 5.0]), np.ones(4)) == 50.0
     assert log_starts(residual("mechanical", ()))[0] == 0.1
-    assert axis_label("temperature", False) == "temperature"
-    assert axis_label("v", True) == "velocity [rad/s]"
+    assert axis_of("temperature", False) == ("temperature", 1.0)
+    assert axis_of("v", True) == ("velocity [rad/s]", 1.0)
+    assert axis_of("v", False) == ("velocity [mm/s]", 1e3)
+    assert axis_of("p_n", False) == ("pressure p_n [bar]", 1e-5)
+    assert axis_of("du", False, "A") == ("rate of the command [A/s]", 1.0)
 
 
 def test_friction_of_speed_joins_the_curve() -> None:

@@ -13,11 +13,15 @@ const servoCharts = (() => {
   const colour = (name, alpha = "") => token(name) + alpha;
 
   function numbers(coded) {
-    if (coded.step !== undefined)
-      return Array.from({length: coded.count}, (_, k) => coded.start + k * coded.step);
-    const bytes = Uint8Array.from(atob(coded.base64), (c) => c.charCodeAt(0));
+    if (coded.step !== undefined) {
+      const x = new Float64Array(coded.count);
+      for (let k = 0; k < x.length; k++) x[k] = coded.start + k * coded.step;
+      return x;
+    }
+    const text = atob(coded.base64), bytes = new Uint8Array(text.length);
+    for (let k = 0; k < bytes.length; k++) bytes[k] = text.charCodeAt(k);
     const values = coded.type === "f8" ? new Float64Array(bytes.buffer) : new Float32Array(bytes.buffer);
-    return Array.from(values, (v) => (Number.isNaN(v) ? null : v));
+    return values.some(Number.isNaN) ? Array.from(values, (v) => (Number.isNaN(v) ? null : v)) : values;
   }
 
   /* Four digits and no exponent, however small or large. */
@@ -29,12 +33,17 @@ const servoCharts = (() => {
   }
 
   function seriesOf(panel) {
-    const list = [{label: panel.x, value: (u, v) => shown(v), class: panel.x ? "chart-x" : "chart-unseen"}], fills = [];
+    const list = [{label: panel.x, value: (u, v) => shown(v), class: panel.x ? "chart-x" : "chart-unseen"}];
+    const fills = [];
+    const kind = (line) => {
+      if (!line.name || (line.look === "edge" && !line.upper)) return "chart-unseen";
+      return line.look === "edge" ? `chart-shade-${line.colour}` : `chart-${line.look}-${line.colour}`;
+    };
     for (const line of panel.lines) {
       const dots = line.look === "dots", edge = line.look === "edge";
       list.push({
         label: line.name, value: (u, v) => shown(v),
-        class: edge ? (line.upper ? `chart-shade-${line.colour}` : "chart-unseen") : `chart-line-${line.colour}`,
+        class: kind(line),
         stroke: edge ? undefined : () => colour(line.colour),
         width: dots || edge ? 0 : line.look === "bold" ? 2 : 1.3,
         dash: {dashed: [7, 4], dotted: [2, 3]}[line.look],
@@ -57,23 +66,28 @@ const servoCharts = (() => {
     return [...data, ...panel.bands.map(() => new Array(data[0].length).fill(null))];
   }
 
-  /* Shaded stretches of an axis below the lines, marks and their names above the grid. */
-  function background(panel) {
+  /* Stretches of x lie below the lines; those of y above, since noise would hide them. */
+  function shading(panel, axis) {
     return (u) => {
       const {left, top, width, height} = u.bbox, c = u.ctx;
       c.save();
       c.beginPath(); c.rect(left, top, width, height); c.clip();
-      for (const band of panel.bands) {
-        const [a, b] = [band.low, band.high].map((v) => u.valToPos(v, band.axis, true));
+      for (const band of panel.bands.filter((one) => one.axis === axis)) {
+        const [a, b] = [band.low, band.high].map((v) => u.valToPos(v, axis, true));
+        const begin = Math.min(a, b), wide = Math.max(Math.abs(b - a), 1);
         c.fillStyle = colour(band.colour, "38");
-        if (band.axis === "x") c.fillRect(Math.min(a, b), top, Math.abs(b - a), height);
-        else c.fillRect(left, Math.min(a, b), width, Math.max(Math.abs(b - a), 1));
+        if (axis === "x") c.fillRect(begin, top, wide, height);
+        else {
+          c.fillRect(left, begin, width, wide);
+          c.strokeStyle = colour(band.colour); c.lineWidth = devicePixelRatio; c.setLineDash([]);
+          c.strokeRect(left - 2, begin, width + 4, wide);
+        }
       }
       c.strokeStyle = colour("quiet"); c.lineWidth = devicePixelRatio; c.setLineDash([5, 4]);
-      for (const mark of panel.marks) {
-        const at = u.valToPos(mark.at, mark.axis, true);
+      for (const mark of panel.marks.filter((one) => one.axis === axis)) {
+        const at = u.valToPos(mark.at, axis, true);
         c.beginPath();
-        if (mark.axis === "x") { c.moveTo(at, top); c.lineTo(at, top + height); }
+        if (axis === "x") { c.moveTo(at, top); c.lineTo(at, top + height); }
         else { c.moveTo(left, at); c.lineTo(left + width, at); }
         c.stroke();
       }
@@ -104,19 +118,20 @@ const servoCharts = (() => {
     const [series, bands] = seriesOf(panel);
     const first = data[0][0], last = data[0][data[0].length - 1];
     const whole = panel.x_range || [first, last];
+    const xRange = (u, low, high) => (low === null || (low === first && high === last) ? whole : [low, high]);
     const plain = (u, ticks) => ticks.map((v) => (v === null ? "" : String(+v.toPrecision(6))));
     return {
       width, height: panel.height || HEIGHT, series, bands,
       legend: {live: true}, cursor: {sync: sync ? {key: sync, setSeries: false} : undefined, drag: {x: true, y: false}},
       scales: {
-        x: {time: false, distr: panel.log_x ? 3 : 1, range: (u, low, high) => (low === null || (low === first && high === last) ? whole : [low, high])},
+        x: {time: false, distr: panel.log_x ? 3 : 1, range: xRange},
         y: {range: yRange(panel, whole)},
       },
       axes: [
         axisOf(panel.x || null, {size: 30, labelSize: 18, ...(panel.log_x ? {} : {values: plain})}),
         axisOf(panel.y, {size: 58, labelSize: 18, values: plain}),
       ],
-      hooks: {drawAxes: [background(panel)], setScale: [(u, key) => key === "x" && onZoom(u)]},
+      hooks: {drawAxes: [shading(panel, "x")], draw: [shading(panel, "y")], setScale: [(u, key) => key === "x" && onZoom(u)]},
       whole,
     };
   }
@@ -133,13 +148,15 @@ const servoCharts = (() => {
   function toolsOf(chart, say) {
     const tools = document.createElement("div");
     tools.className = "chart-tools";
-    const by = (change) => () => {
-      const {min, max} = chart.plots[0].scales.x, span = max - min, [a, b] = change;
-      say([min + a * span, max + b * span]);
+    const by = (left, right) => () => {
+      const {scales: {x}, whole: [begin, end]} = chart.plots[0], span = x.max - x.min;
+      // Moved no further than the ends, and by the same on both sides where it is moved.
+      const most = left === right ? Math.min(Math.max(left * span, begin - x.min), end - x.max) : 0;
+      say(left === right ? [x.min + most, x.max + most] : [x.min + left * span, x.max + right * span]);
     };
     tools.append(
-      button("+", "zoom in", by([0.25, -0.25])), button("−", "zoom out", by([-0.5, 0.5])),
-      button("◀", "earlier part", by([-0.4, -0.4])), button("▶", "later part", by([0.4, 0.4])),
+      button("+", "zoom in", by(0.25, -0.25)), button("−", "zoom out", by(-0.5, 0.5)),
+      button("◀", "further left", by(-0.4, -0.4)), button("▶", "further right", by(0.4, 0.4)),
       button("whole", "show the whole", () => say(null)),
     );
     if (chart.parts.length) {
@@ -164,7 +181,8 @@ const servoCharts = (() => {
       for (const plot of chart.plots) {
         if (plot === from || (from && !chart.shared_x)) continue;
         const [low, high] = range || plot.whole;
-        plot.setScale("x", {min: Math.max(low, plot.whole[0]), max: Math.min(high, plot.whole[1])});
+        const min = Math.max(low, plot.whole[0]), max = Math.min(high, plot.whole[1]);
+        if (min < max) plot.setScale("x", {min, max});
       }
       busy = false;
     };
@@ -198,13 +216,20 @@ const servoCharts = (() => {
     });
     panels.after(toolsOf(chart, zoomAll));
     new ResizeObserver(() => printing || chart.fit()).observe(panels);
-    root.dataset.drawn = "yes";
+    root.dataset.drawn = Math.round(performance.now());
     drawn.add(chart);
   }
 
   const redraw = () => drawn.forEach((chart) => chart.fit());
   function draw(root = document) {
-    root.querySelectorAll(".chart:not([data-drawn])").forEach(drawOne);
+    // One after the other, so that the first is on the screen before the last is read.
+    const next = () => {
+      const one = root.querySelector(".chart:not([data-drawn])");
+      if (!one) return;
+      drawOne(one);
+      setTimeout(next);
+    };
+    next();
   }
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redraw);
   matchMedia("print").addEventListener("change", (e) => { printing = e.matches; redraw(); });

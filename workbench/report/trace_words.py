@@ -1,0 +1,243 @@
+"""A trace in words: its verdict, and what to do next."""
+
+import math
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from identification.tracing.result import Change, Dependence, Errors, Trace
+from identification.tracing.verdict import listed
+from workbench.cards.readable import force, length, number, shown_unit
+from workbench.steps.trace import Traced
+
+LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
+MOST = 1000.0  # change shown [%]
+NOISE = 1.5  # times the sensors' noise, up to which nothing is left
+
+
+class Told(NamedTuple):
+    """The error by which a trace is told: its name, before, after, its noise, and how each is
+    written."""
+
+    name: str
+    before: float
+    after: float
+    noise: float | None
+    write: Callable[[float], str]
+
+
+def words(key: str) -> str:
+    """An effect's key as words."""
+    return key.replace("_", " ")
+
+
+def trace_sentence(traced: Traced) -> str:
+    """The verdict in one or two plain sentences, and whether it is one for the time being."""
+    left_out = traced.trace.not_tried
+    early = f" Ended early, so this is for now; not tried: {'; '.join(left_out)}."
+    return _verdict_sentence(traced) + (early if left_out else "")
+
+
+def _verdict_sentence(traced: Traced) -> str:
+    found = traced.trace
+    names = "; and ".join(f"{words(e.effect.key)} – {e.effect.meaning}" for e in found.effects)
+    told = fall_of_error(traced) if found.effects else ""
+    errors = f" {told}" if told else ""
+    changed = ", ".join(_changed(change) for change in found.drift)
+    match found.verdict:
+        case "unknown" if found.not_tried and not found.effects:
+            return f"Open: {unexplained(traced, found.unknown.depends_on)}"
+        case "none":
+            return nothing_missing(found, traced.model.rotary)
+        case "effect":
+            also = f" The test logs also differ in {changed}." if changed else ""
+            return f"Missing: {names}.{share_explained(traced)}{errors}{also}"
+        case "drift":
+            return (
+                f"Drift: between training and test logs the machine changed in {changed};"
+                " its structure holds."
+            )
+        case "inseparable":
+            others = " or ".join(words(key) for key in dict.fromkeys(equal_rival_keys(found)))
+            rival = f" They do not tell it from {others}." if others else ""
+            return f"Inseparable: these logs call for {names}.{rival}{errors}"
+        case _:
+            return _partly(traced, names, errors) if found.effects else _unknown(traced)
+
+
+def _unknown(traced: Traced) -> str:
+    unknown = traced.trace.unknown
+    if not unknown.depends_on:
+        return f"Unknown: {unexplained(traced)}"
+    return (
+        f"Unknown: what is left {_on_signals(unknown)}, and no effect of the library explains it."
+    )
+
+
+def _partly(traced: Traced, names: str, errors: str) -> str:
+    """What was found comes before what is still missing."""
+    unknown = traced.trace.unknown
+    rest = _on_signals(unknown) if unknown.depends_on else "depends on none of the signals"
+    return (
+        f"Found in part: {names}.{errors} What is left {rest}, and no effect of the library"
+        " explains that."
+    )
+
+
+def _on_signals(unknown: Dependence) -> str:
+    share = f"{100 * unknown.explained:.0f} %"
+    return f"depends on {listed(unknown.depends_on)} (which accounts for {share} of it)"
+
+
+def share_explained(traced: Traced) -> str:
+    """How much of what was missing the effects explain, and on what the rest depends."""
+    found = traced.trace
+    if told_by(traced) is None:  # no error in which they would show
+        return ""
+    share = 100 * found.left.share
+    it, where = (
+        "It explains" if len(found.effects) == 1 else "They explain",
+        "on the held-out logs" if traced.test else "on the stretches left out",
+    )
+    if found.complete:
+        return f" {it} all of what was missing {where}, down to the sensors' noise."
+    rest = "the rest depends on none of the signals"
+    if found.left.depends_on:
+        rest = f"the rest depends on {listed(found.left.depends_on)}"
+    return f" {it} {100 - share:.3g} % of what was missing {where}; {rest}."
+
+
+def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
+    """What is left where it is far more than noise; signals: on which it depends."""
+    depends = f"depends on {listed(signals)}" if signals else "depends on none of the signals"
+    found, rotary = traced.trace, traced.model.rotary
+    left, off = found.after["train"].force_rms, found.after["train"].position_rms
+    if left is not None and left <= NOISE * found.noise_force and off is not None:
+        return (
+            f"the free run is off by {length(off, rotary)} in 2 s (sensors' noise"
+            f" {length(found.noise_y, rotary)}), and it {depends}."
+        )
+    said = "an unknown part" if left is None else force(left, rotary)
+    return (
+        f"the model leaves {said} of force, the sensors' noise alone"
+        f" {force(found.noise_force, rotary)}, and it {depends}."
+    )
+
+
+def nothing_missing(found: Trace, rotary: bool) -> str:
+    """The verdict "none" in words; what is left may be more than noise, without a structure."""
+    left, noise = found.after["test"].force_rms, force(found.noise_force, rotary)
+    if left is None:
+        return "Nothing is missing."
+    if left <= NOISE * found.noise_force:
+        where = "" if found.noise_actuator is not None else " in the equation of motion"
+        return (
+            f"Nothing is missing{where}: the model leaves {force(left, rotary)} of force, the"
+            f" sensors' noise alone {noise}."
+        )
+    return (
+        f"No effect is missing that these logs show: what is left ({force(left, rotary)}, sensors'"
+        f" noise {noise}) depends on none of their signals."
+    )
+
+
+def fall_of_error(traced: Traced) -> str:
+    """How the error fell in which the effects show."""
+    told = told_by(traced)
+    if told is None:
+        return ""
+    noise = "" if told.noise is None else f" (sensors' noise {told.write(told.noise)})"
+    return f"{told.name} {told.write(told.before)} -> {told.write(told.after)}{noise}."
+
+
+def told_by(traced: Traced) -> Told | None:
+    """The force error, or where that hardly falls the one that falls most."""
+    found, rotary = traced.trace, traced.model.rotary
+    before, after = found.before["test"], found.after["test"]
+    where = "Held-out" if traced.test else "On stretches left out,"
+    noise, rate = found.noise_force, found.noise_actuator
+    every = (
+        Told(
+            f"{where} force error",
+            *_both(before, after, "force_rms"),
+            noise,
+            lambda x: force(x, rotary),
+        ),
+        Told(
+            f"{where} error of the actuator equation",
+            *_both(before, after, "actuator_rms"),
+            rate,
+            lambda x: f"{force(x, rotary)}/s",
+        ),
+        Told(
+            f"{where} position error in 2 s",
+            *_both(before, after, "position_rms"),
+            found.noise_y,
+            lambda x: length(x, rotary),
+        ),
+    )
+    known = [told for told in every if math.isfinite(told.before) and told.before > 0]
+    if not known:
+        return None
+    if known[0] is every[0] and known[0].after <= LEFT_IN_FORCE * known[0].before:
+        return known[0]
+    return min(known, key=lambda told: told.after / told.before)
+
+
+def _both(before: Errors, after: Errors, key: str) -> tuple[float, float]:
+    values = (getattr(before, key), getattr(after, key))
+    return values if None not in values else (math.nan, math.nan)
+
+
+def equal_rival_keys(found: Trace) -> tuple[str, ...]:
+    """Keys of the rivals that explain as much as an effect taken; the first, where none says so."""
+    keys = [r.key for r in found.rivals if r.why_not.startswith("explains as much")]
+    return tuple(keys or [r.key for r in found.rivals[:1]])
+
+
+def percent(before: float, after: float) -> str:
+    """Change in percent; empty where there is nothing to compare with."""
+    if before == 0:
+        return ""
+    change = 100 * (after - before) / before
+    if abs(change) > MOST:
+        return f"over {MOST:+.0f} %" if change > 0 else f"below {-MOST:+.0f} %"
+    if round(change, 4) == 0:
+        return "0 %"
+    return f"{change:+.0f} %" if abs(change) >= 10 else f"{change:+.2g} %"
+
+
+def _changed(change: Change) -> str:
+    """One change in words."""
+    by = percent(change.before, change.after)
+    unit, factor = shown_unit(change.unit)
+    before, after = (number(factor * value, 4) for value in (change.before, change.after))
+    return f"{change.name} from {before} to {after} {unit}{f' ({by})' if by else ''}"
+
+
+def then_of(traced: Traced, folder: Path | None = None) -> list[str]:
+    """What to do next, and the command that does it; `folder` in which the model lies."""
+    found = traced.trace
+    model = "model.json" if folder is None else str(folder / "model.json")
+    design = f"`workbench design {model}` makes a controller"
+    out = []
+    if found.not_tried:
+        out.append("trace again without `--budget`, to try what was left out")
+    if found.next_experiment:
+        out.append(f"record more, {found.next_experiment.rstrip('.')}; then trace with it too")
+    if found.verdict == "drift":
+        out.append("`workbench identify` the newer logs: a model of the machine as it is now")
+    elif found.effects:
+        out.append(f"{design} on the model with {_them(found)} in it")
+    elif found.verdict == "none":
+        out.append(f"{design}; the model is as good as these logs can make it")
+    if found.verdict == "unknown" and found.unknown.depends_on:
+        out.append(
+            "if you know what it is, write it as an effect of your own: `workbench effects check"
+            " FOLDER`, then `workbench trace ... --effects FOLDER`"
+        )
+    return out
+
+
+def _them(found: Trace) -> str:
+    return "the effect" if len(found.effects) == 1 else "the effects"
