@@ -20,21 +20,26 @@ from workbench.documents.model import Model, model_document
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, REPORT_FILE, RESULT_FILE
-from workbench.page.result_charts import identify_charts, trace_charts
 from workbench.registry.bench import TaskKind
-from workbench.report.chart import Chart, chart_html
+from workbench.report.fit import fit
 from workbench.report.model_tables import MODEL_HEAD, fit_lines, parameter_rows, summary
+from workbench.report.page import Section
 from workbench.report.reports import identification_report
+from workbench.report.residual import residual
 from workbench.report.trace import trace_report
-from workbench.report.trace_tables import error_rows, errors_head, trace_sentence
+from workbench.report.trace_pictures import against_signal, pictures
+from workbench.report.trace_tables import error_rows, errors_head
+from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
+from workbench.steps.predict import fitted_run
 from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import Traced, trace_document, trace_sources
 from workbench.steps.validate import validate, validation_document
 
 MODEL_SHARE = 0.9  # of the bar, for the model; the rest for its design
 LAST_STAGES = {"designing": (MODEL_SHARE, 0.95), "validating": (0.95, 1.0)}
+MOST_PICTURES = 3  # of a trace: residuals against the signals that explain them
 WORK_STAGES = {"identify": IDENTIFY_STAGES, "trace": TRACE_STAGES}
 
 
@@ -72,7 +77,7 @@ def done(work: Work, course: Course) -> str:
         for name, document in documents.items():
             folder.write_json(f"{name}.json", document)
         folder.write_text(REPORT_FILE, result.pop("report"))
-        folder.write_text(CHARTS_FILE, "".join(str(chart_html(chart)) for chart in charts))
+        folder.write_text(CHARTS_FILE, "".join(one.html for one in charts))
         rows = [row[: len(MODEL_HEAD)] for row in parameter_rows(model)]
         folder.write_json(
             RESULT_FILE,
@@ -81,7 +86,7 @@ def done(work: Work, course: Course) -> str:
     return str(result["summary"])
 
 
-Made = tuple[Model, dict[str, Any], dict[str, Any], Sequence[Chart]]
+Made = tuple[Model, dict[str, Any], dict[str, Any], Sequence[Section]]
 
 
 def _identified(sources: Sources, course: Course) -> Made:
@@ -93,7 +98,9 @@ def _identified(sources: Sources, course: Course) -> Made:
         "errors": None,
         "report": identification_report(found),
     }
-    return model, {"model": model_document(model)}, result, identify_charts(model, found)
+    runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
+    drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs))
+    return model, {"model": model_document(model)}, result, drawn
 
 
 def _traced(sources: Sources, course: Course) -> Made:
@@ -106,7 +113,9 @@ def _traced(sources: Sources, course: Course) -> Made:
         "report": trace_report(found),
     }
     documents = {"trace": trace_document(found), "model": model_document(model)}
-    return model, documents, result, trace_charts(found)
+    command = model.rig.command_unit
+    shown = pictures(found.trace)[:MOST_PICTURES]
+    return model, documents, result, [against_signal(one, rotary, command) for one in shown]
 
 
 def _with_design(
