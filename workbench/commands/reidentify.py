@@ -62,7 +62,7 @@ def pass_view(done: "PassReport") -> "Group":
     """What a pass did, for a terminal."""
     from rich.console import Group, RenderableType
 
-    from workbench.jobs.alarms import ALARMING
+    from workbench.registry.values import ALARMING
     from workbench.registry.views import outcomes_view
 
     judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"

@@ -28,7 +28,7 @@ class Person:
         for one in ("--headless", "--no-sandbox", "--disable-gpu", "--hide-scrollbars"):
             options.add_argument(one)
         options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-        self.driver = webdriver.Chrome(options=options, service=Service(DRIVER))
+        self.driver: Any = webdriver.Chrome(options=options, service=Service(DRIVER))
         self.driver.set_script_timeout(60)
         self.address = address
         self.wide()
