@@ -36,6 +36,7 @@ from workbench.registry.store import Registry
 QUERIES = 15
 WARMING = 3.0  # s
 SECONDS_READ = 15.0
+LOOKED_AT = 30_000  # samples
 PATHS = ("/", "/?order=moved&down=1", "/?state=drifting", "/?page=150", "/?text=99",
          "/machine/axis-00042")  # fmt: skip
 
@@ -143,6 +144,10 @@ def _plots(address: str, where: str, folder: Path, samples: int) -> None:
             size = path.stat().st_size / 1e6
             said = f"{samples} samples, {path.suffix[1:]} ({size:.0f} MB)"
             print(f"first plot of {said}: {statistics.median(taken):.2f} s")
+        print(
+            f"doctor's picture of {LOOKED_AT} samples after 'Save the card':"
+            f" {_doctor(person, folder):.2f} s"
+        )
     finally:
         person.quit()
 
@@ -154,6 +159,20 @@ def _plot(person: Person, path: Path) -> float:
     person.find("#zone button").click()
     person.until(lambda: person.inked("#columns"), "not drawn")
     return time.perf_counter() - begun
+
+
+def _doctor(person: Person, folder: Path) -> float:
+    """Median time from a corrected card to the doctor's picture."""
+    (path, _), taken = _logs(folder, LOOKED_AT), list[float]()
+    _plot(person, path)
+    person.until(lambda: person.inked("#picture"), "no picture")
+    for _ in range(3):
+        person.driver.execute_script("document.getElementById('picture').replaceChildren()")
+        begun = time.perf_counter()
+        person.find("#card button[type=submit]").click()
+        person.until(lambda: person.inked("#picture"), "no picture")
+        taken.append(time.perf_counter() - begun)
+    return statistics.median(taken)
 
 
 def _logs(folder: Path, samples: int) -> list[Path]:

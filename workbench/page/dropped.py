@@ -4,7 +4,6 @@ A file's name on the page is a text alone; on the disk it is made of letters tha
 """
 
 import hashlib
-import os
 import re
 import secrets
 import shutil
@@ -87,8 +86,6 @@ def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
             digest.update(block)
             file.write(block)
             size += len(block)
-        file.flush()
-        os.fsync(file.fileno())
     return size, digest.hexdigest()
 
 

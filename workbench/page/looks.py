@@ -3,7 +3,7 @@
 Each takes paths and texts and gives plain values; errors of the user are `UserError`.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from workbench.steps.first_card.proposal import Proposal
 
 MOST_COLUMNS = 12  # that the first picture shows
+FIRST_POINTS = 8000  # of each column's line, every peak kept
 LOGS_REMEMBERED = 1
 
 
@@ -62,17 +63,19 @@ def refuse_no_log(path: Path) -> None:
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
     """Every column of the file over its clock, as HTML, and how many rows it has."""
-    from workbench.report.chart import Chart, Line, Panel, chart_html
+    from workbench.report.chart import Chart, Line, Panel, chart_html, thinned_together
 
     found = _unknown(path)
     rows = max(len(one.values) for one in found.columns)
     x, label, at = _clock(found)
     shown = [one for k, one in enumerate(found.columns) if k != at and not one.unusable]
+    shown = shown[:MOST_COLUMNS]
+    places, values = thinned_together(x, [one.values for one in shown], FIRST_POINTS)
     panels = [
-        Panel(label if k == len(shown[:MOST_COLUMNS]) - 1 else "", _label(one),
-              [Line(_label(one), x, one.values, "measured")], height=150)
-        for k, one in enumerate(shown[:MOST_COLUMNS])
-    ]  # fmt: skip
+        Panel("", _label(one), [Line(_label(one), places, y, "measured")], height=150)
+        for one, y in zip(shown, values, strict=True)
+    ]
+    panels[-1:] = [replace(one, x=label) for one in panels[-1:]]
     chart = Chart("columns", f"the columns of {file} over time", panels)
     return str(chart_html(chart)), rows
 
