@@ -35,7 +35,7 @@ from workbench.registry.store import Registry
 
 QUERIES = 15
 WARMING = 3.0  # s
-SECONDS_READ = 15.0
+WARMING_PLOTS = 2  # until every server has its helper
 LOOKED_AT = 30_000  # samples
 PATHS = ("/", "/?order=moved&down=1", "/?state=drifting", "/?page=150", "/?text=99",
          "/machine/axis-00042")  # fmt: skip
@@ -48,6 +48,7 @@ def main() -> None:
     asked.add_argument("--readers", type=int, default=50)
     asked.add_argument("--samples", type=int, default=1_000_000)
     asked.add_argument("--servers", type=int, default=2)
+    asked.add_argument("--seconds", type=float, default=15.0, help="that the readers read")
     asked.add_argument("--postgresql", action="store_true")
     given = asked.parse_args()
     print(f"{os.cpu_count()} processors, load {os.getloadavg()[0]:.1f} before")
@@ -60,7 +61,7 @@ def main() -> None:
         _queries(where, given.machines)
         with serving(where, root, "--servers", str(given.servers)) as served:
             for pause in (0.0, 1.0):
-                _readers(served.address, given.readers, pause)
+                _readers(served.address, given.readers, pause, given.seconds)
             _plots(served.address, where, Path(name), given.samples)
 
 
@@ -90,10 +91,10 @@ def _queries(where: str, count: int) -> None:
             print(f"fleet of {count} by {order}: query {1e3 * statistics.median(taken):.1f} ms")
 
 
-def _readers(address: str, readers: int, pause: float) -> None:
+def _readers(address: str, readers: int, pause: float, seconds: float) -> None:
     """Median and 95th percentile of what readers wait, each asking again after `pause` s."""
     split, waits = urlsplit(address), list[float]()
-    end = time.monotonic() + WARMING + SECONDS_READ
+    end = time.monotonic() + WARMING + seconds
     counts_from = time.monotonic() + WARMING
     lock = threading.Lock()
 
@@ -121,7 +122,7 @@ def _readers(address: str, readers: int, pause: float) -> None:
         one.join()
     how = f"again after {pause:g} s" if pause else "again at once"
     median, late = statistics.median(waits), float(np.quantile(waits, 0.95))
-    rate = len(waits) / SECONDS_READ
+    rate = len(waits) / seconds
     print(f"{readers} readers, {how}: median {1e3 * median:.0f} ms, 95 % {1e3 * late:.0f} ms,"
           f" {rate:.0f} pages a second")  # fmt: skip
 
@@ -140,7 +141,7 @@ def _plots(address: str, where: str, folder: Path, samples: int) -> None:
         person.find("form.narrow button").click()
         person.reads("bench (change)")
         for path in _logs(folder, samples):
-            taken = [_plot(person, path) for _ in range(4)][1:]
+            taken = [_plot(person, path) for _ in range(WARMING_PLOTS + 3)][WARMING_PLOTS:]
             size = path.stat().st_size / 1e6
             said = f"{samples} samples, {path.suffix[1:]} ({size:.0f} MB)"
             print(f"first plot of {said}: {statistics.median(taken):.2f} s")
@@ -158,7 +159,10 @@ def _plot(person: Person, path: Path) -> float:
     begun = time.perf_counter()
     person.find("#zone button").click()
     person.until(lambda: person.inked("#columns"), "not drawn")
-    return time.perf_counter() - begun
+    took = time.perf_counter() - begun
+    rests = "return document.getElementById('words').childElementCount > 0"
+    person.until(lambda: person.driver.execute_script(rests), "the doctor has no words")
+    return took
 
 
 def _doctor(person: Person, folder: Path) -> float:

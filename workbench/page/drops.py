@@ -79,13 +79,15 @@ def dropped(request: Request, visitor: Visitor) -> Response:
 
 
 def columns(request: Request, visitor: Visitor) -> Response:
-    """Every column over time, before anything is known of it."""
+    """Every column over time, before anything is known of it; the card is looked for after it."""
     upload, path = _upload(request), _log(request)
     try:
         html, rows = request.app.state.helpers(looks.columns_chart, path, upload.file)
+        response = show(request, visitor, "chart", html=html, said=f"{rows} rows")
     except UserError as error:
-        return show(request, visitor, "said", said=str(error), bad=True)
-    return show(request, visitor, "chart", html=html, said=f"{rows} rows")
+        response = show(request, visitor, "said", said=str(error), bad=True)
+    response.headers["HX-Trigger-After-Settle"] = "columns-ready"
+    return response
 
 
 def card(request: Request, visitor: Visitor) -> Response:
@@ -132,7 +134,7 @@ def words(request: Request, visitor: Visitor) -> Response:
     if not place.exists():
         return show(request, visitor, "said", said="", bad=False)
     try:
-        found = request.app.state.helpers(looks.doctor_words, path, place)
+        found = request.app.state.helpers.slowly(looks.doctor_words, path, place)
     except UserError as error:
         return show(request, visitor, "said", said=str(error), bad=True)
     return show(request, visitor, "words", found=found)
@@ -161,7 +163,7 @@ def _proposed(request: Request) -> tuple[CardForm, str]:
     path, upload = _log(request), _upload(request)
     helpers = request.app.state.helpers
     try:
-        return form_of(helpers(looks.proposal, path), upload.file), ""
+        return form_of(helpers.slowly(looks.proposal, path), upload.file), ""
     except UserError as error:
         return empty_form(helpers(looks.headers, path), path.stem), str(error)
 

@@ -28,6 +28,8 @@ class Here(Helpers):
     def __call__(self, look: Callable[..., Any], *arguments: Any) -> Any:
         return look(*arguments)
 
+    slowly = __call__
+
 
 class Page:
     """The page of a test: `client` without a token, `as_` with one."""
