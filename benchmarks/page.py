@@ -160,7 +160,7 @@ def _plot(person: Person, path: Path) -> float:
     person.find("#zone button").click()
     person.until(lambda: person.inked("#columns"), "not drawn")
     took = time.perf_counter() - begun
-    rests = "return document.getElementById('words').childElementCount > 0"
+    rests = "return document.getElementById('words')?.childElementCount > 0"
     person.until(lambda: person.driver.execute_script(rests), "the doctor has no words")
     return took
 

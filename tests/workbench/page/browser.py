@@ -66,7 +66,7 @@ class Person:
 
     def text(self) -> str:
         """What stands on the page."""
-        return str(self.driver.execute_script("return document.body.innerText"))
+        return str(self.driver.execute_script("return document.body?.innerText ?? ''"))
 
     def type(self, selector: str, text: str) -> None:
         """Put a text into a field in place of what is there."""
