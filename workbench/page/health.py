@@ -37,11 +37,6 @@ class Counted:
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
 
-    @property
-    def state(self) -> object:
-        """That of the application."""
-        return self._app.state  # type: ignore[attr-defined]
-
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Answer and count."""
         if scope["type"] != "http":

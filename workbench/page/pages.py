@@ -33,8 +33,7 @@ def show(
     filled = environment().get_template(f"{template}.html.j2")
     prefix = request.app.state.settings.prefix
     text = filled.render(
-        visitor=visitor, url=lambda path, **query: address_of(prefix, path, query),
-        here=request.url.path, **values,
+        visitor=visitor, url=lambda path, **query: address_of(prefix, path, query), **values,
     )  # fmt: skip
     return HTMLResponse(text, status)
 
