@@ -45,6 +45,9 @@ COMMANDS = {
     "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",
     "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
+    "serve": "Serve the page: fleet, machines, and a place to drop a log.",
+    "work": "Do what was asked for on the page.",
+    "token": "Make and revoke the tokens of the page.",
 }
 ENDING = tuple(one for one in signal.Signals if one.name in ("SIGTERM", "SIGHUP"))
 TAB_VARIABLE = "_WORKBENCH_COMPLETE"  # set by the shell's completion script

@@ -8,6 +8,9 @@ from identification.errors import UserError
 CARD_FILE = "card.toml"
 """Name of a card in a machine's folder."""
 
+LOGS = "logs"
+"""Name of the folder of a machine's logs, beside its card."""
+
 CARD_BYTES = 1_000_000
 """Size above which a file is no card; the largest that ships has 8 kB."""
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from workbench.commands.trace import TRACE_STAGES
 from workbench.course import Course, moving
 from workbench.ending import StatusCommand
 from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.steps.stages import TRACE_STAGES
 
 RECIPE = "demo"
 DEMO_STAGES = {stage: (0.85 * a, 0.85 * b) for stage, (a, b) in TRACE_STAGES.items()}

@@ -1,9 +1,9 @@
 """`workbench export`: a design -> code for the machine."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
@@ -77,6 +77,7 @@ def command(
     """
     from workbench.documents.design import read_design
     from workbench.export.exported import exported
+    from workbench.export.targets import writers
 
     wide = [target for target in targets if target not in SINGLE]
     if precision == "single" and wide:
@@ -86,7 +87,7 @@ def command(
     now = datetime.now()
     files: dict[str, str | bytes] = {}
     for target in dict.fromkeys(targets):
-        files |= _writers(now)[target](what)
+        files |= writers(now)[target](what)
     with OutputFolder("export", out, now=now) as folder:
         for file, content in files.items():
             folder.write(file, content)
@@ -96,24 +97,6 @@ def command(
         lambda: _view(what, dict.fromkeys(targets), tuple(files), folder.final),
     )
     return 0
-
-
-def _writers(now: datetime) -> Mapping[str, Callable[["Exported"], Mapping[str, Any]]]:
-    """What makes the files of a target, by its name."""
-    from workbench.export.c import c_files
-    from workbench.export.data import json_file, mat_file
-    from workbench.export.fmu import fmu_file
-    from workbench.export.plcopen import plcopen_file
-    from workbench.export.structured_text import st_file
-
-    return {
-        "c": c_files,
-        "st": st_file,
-        "plcopen": lambda what: plcopen_file(what, now),
-        "fmu": fmu_file,
-        "json": json_file,
-        "mat": mat_file,
-    }
 
 
 def _document(what: "Exported", files: tuple[str, ...], folder: Path) -> dict[str, object]:

@@ -11,15 +11,7 @@ from workbench.course import Course, moving
 from workbench.ending import StatusCommand, refused_with
 from workbench.options import POSITIVE, card_option, complete_file
 from workbench.output import OutputFolder, emit, output_options, progress
-
-IDENTIFY_STAGES = {
-    "refining": (0.0, 0.4),
-    "searching": (0.4, 0.6),
-    "searching stretches": (0.4, 0.6),
-    "searching near": (0.6, 0.65),
-    "weighing": (0.5, 0.95),
-    "posterior": (0.6, 1.0),
-}
+from workbench.steps.stages import IDENTIFY_STAGES
 
 
 @click.command(

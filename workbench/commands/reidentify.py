@@ -54,7 +54,7 @@ def command(as_json: bool, **given: Any) -> int:
 def after_pass(done: "PassReport", where: str | None) -> Step | None:
     """Look at the first machine with an alarm."""
     from workbench.addresses import shown
-    from workbench.jobs.alarms import ALARMING
+    from workbench.registry.values import ALARMING
 
     alarmed = [one for one in done.outcomes if one.verdict in ALARMING]
     if not alarmed:
@@ -78,7 +78,7 @@ def pass_view(done: "PassReport") -> "Group":
     """What a pass did, for a terminal."""
     from rich.console import Group, RenderableType
 
-    from workbench.jobs.alarms import ALARMING
+    from workbench.registry.values import ALARMING
     from workbench.registry.views import outcomes_view
 
     judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"

@@ -11,20 +11,7 @@ from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
 from workbench.options import SECONDS_ABOVE_0, card_option, complete_file, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
-
-TRACE_STAGES = {
-    "recording": (0.0, 0.03),
-    "refining": (0.03, 0.35),
-    "tracing": (0.35, 0.55),
-    "refitting": (0.55, 0.75),
-    "judging": (0.75, 0.9),
-    "settling": (0.45, 0.5),
-    "searching": (0.5, 0.7),
-    "searching stretches": (0.5, 0.7),
-    "searching near": (0.7, 0.75),
-    "weighing": (0.6, 0.95),
-    "telling": (0.95, 1.0),
-}
+from workbench.steps.stages import TRACE_STAGES
 
 
 @click.command(

@@ -30,8 +30,6 @@ import numpy as np
 from identification.errors import BadCard, BadModel
 from workbench.cards.card import Card, load_card
 from workbench.cards.own_effects import library
-from workbench.commands.identify import IDENTIFY_STAGES
-from workbench.commands.trace import TRACE_STAGES
 from workbench.course import Course, moving, watched
 from workbench.documents.design import Design, read_design
 from workbench.documents.model import Model, read_model
@@ -61,6 +59,7 @@ from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
 from workbench.steps.present import present_of_card
 from workbench.steps.simulate import as_columns, record, truth
+from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import named_logs, trace_sources
 from workbench.steps.validate import validate as validate_design
 

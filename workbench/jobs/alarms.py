@@ -21,9 +21,8 @@ from identification.errors import UserError
 from workbench.jobs.lease import Clock
 from workbench.jobs.passes import Report
 from workbench.registry.outbox import Outbox
-from workbench.registry.values import Alarm, LogVerdict
+from workbench.registry.values import ALARMING, Alarm
 
-ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
 KEPT_FOR = timedelta(days=1)  # an alarm older than this is given up
 IN_HAND = timedelta(minutes=2)  # for so long no other worker sends an alarm that one has taken
 IN_A_ROW = 3  # alarms that do not get through, after which the others are left

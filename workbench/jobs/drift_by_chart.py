@@ -14,7 +14,7 @@ from identification.drift.drift_test import DriftTest, Shift
 from identification.drift.mewma import DriftState
 from identification.errors import BadModel
 from workbench.documents.model import Model
-from workbench.jobs.drift_verdict import Drift, Moved
+from workbench.jobs.drift_verdict import Drift, Moved, Reading
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
 from workbench.report.drift_tables import seen_sentence
@@ -41,6 +41,7 @@ def drift_by_chart(
         state=_plain(found),
         unsure=worst.unsure,
         could_have_seen=seen_sizes(worst),
+        parameters=tuple(_reading(one) for one in worst.shifts.values()),
     )
 
 
@@ -71,6 +72,14 @@ def _plain(found: Drifted) -> Mapping[str, Any]:
     plain = strict(found.stream.state)
     assert isinstance(plain, dict)
     return plain
+
+
+def _reading(shift: Shift) -> Reading:
+    half = float(norm.ppf(0.975)) * shift.after_sd
+    low, high = shift.after - half, shift.after + half
+    return Reading(
+        shift.name, shift.unit, shift.before, shift.after, low, high, shift.change, shift.sd
+    )
 
 
 def _moved(shift: Shift) -> Moved:

@@ -31,13 +31,30 @@ class Moved:
 
 
 @dataclass(frozen=True)
+class Reading:
+    """A parameter by one log, with its 95 % interval, beside its value in force.
+
+    change: relative to that, with its standard deviation.
+    """
+
+    name: str
+    unit: str
+    before: float
+    after: float
+    low: float
+    high: float
+    change: float
+    sd: float
+
+
+@dataclass(frozen=True)
 class Drift:
     """Verdict of a test: which parameters moved, and why.
 
     p_value: of the smallest kind, over all parameters. unsure: parameters of which some have
     changed, and nobody can say which; could_have_seen: smallest relative change of each that would
     have been found, None where none would. state: what the same test wants to be given with the
-    next log; plain JSON.
+    next log; plain JSON. parameters: what the log told of each, moved or not.
     """
 
     verdict: JudgedDrift
@@ -47,6 +64,7 @@ class Drift:
     state: Mapping[str, Any] = field(default_factory=dict)
     unsure: tuple[str, ...] = ()
     could_have_seen: Mapping[str, float | None] = field(default_factory=dict)
+    parameters: tuple[Reading, ...] = ()
 
 
 class DriftJudge(Protocol):

@@ -13,11 +13,10 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
-from workbench.files import CARD_FILE
+from workbench.files import CARD_FILE, LOGS
 from workbench.logs.runs import shown_name
 from workbench.registry.values import SeenLog
 
-LOGS = "logs"
 SUFFIXES = (".csv", ".txt", ".tsv", ".parquet", ".mat", ".h5", ".hdf5", ".json")
 Known = Mapping[tuple[str, int, int], str]
 

@@ -12,9 +12,10 @@ from apscheduler.triggers.date import DateTrigger
 from watchfiles import Change, watch
 
 from identification.errors import UserError
+from workbench.files import LOGS
 from workbench.jobs.lease import Clock
 from workbench.jobs.passes import Report
-from workbench.jobs.scan import LOGS, SUFFIXES
+from workbench.jobs.scan import SUFFIXES
 
 SOON = "soon"
 PATIENCE = timedelta(hours=1)  # a pass that is late by less is made up for

@@ -23,6 +23,7 @@ _END = "EOF"  # the last line of some scopes'
 MANY = 10  # rows of a wrong length that make the header suspect instead
 TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
 _LOOK = 262_144  # characters looked at to find the layout
+_LOOK_BYTES = 8 * _LOOK  # in which they are, whatever the letters
 
 
 @dataclass(frozen=True)
@@ -81,11 +82,26 @@ def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
     For who does not know yet which line is the header. Raises BadLog where the file is not text.
     """
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
-    text = _decode(path, spec.encoding)
+    text = _head(path, spec.encoding)
     lines = text[:_LOOK].splitlines()
     lines = lines if len(text) <= _LOOK else lines[:-1]
     marks = _marks([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
     return [_split(line, marks) for line in lines]
+
+
+def _head(path: Path, encoding: str) -> str:
+    """More than `_LOOK` characters of the file, or all that it has."""
+    with path.open("rb") as file:
+        content = file.read(_LOOK_BYTES)
+    if len(content) == _LOOK_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        whole = content[: content.rfind(b"\n") + 1]
+        try:
+            text = whole.decode(encoding).removeprefix("\ufeff")
+        except (LookupError, UnicodeDecodeError):
+            text = ""
+        if len(text) > _LOOK and "\0" not in text:
+            return text
+    return _decode(path, encoding)
 
 
 def _decode(path: Path, encoding: str) -> str:

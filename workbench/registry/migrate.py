@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Connection, inspect, text
 
 from workbench.registry.errors import BadRegistry
+from workbench.registry.page_tables import PAGE_APPEND_ONLY
 from workbench.registry.tables import APPEND_ONLY, Base
 
 if TYPE_CHECKING:
     from alembic.config import Config
 
-HEAD = "0003"  # known without importing Alembic, which most starts do not need
+HEAD = "0004"  # known without importing Alembic, which most starts do not need
 RESTORE = "somebody has changed the database by hand; restore it from a copy"
 LAYOUT_LOCK = 0x5E7A0  # of PostgreSQL's advisory locks, held while the layout changes
 
@@ -62,7 +63,7 @@ def _refuse_damaged(connection: Connection, where: str) -> None:
         " WHERE NOT t.tgisinternal AND pg_table_is_visible(c.oid)"
     )
     kept = set(connection.execute(text(query)).scalars())
-    open_to_change = sorted({*APPEND_ONLY, "in_force"} - kept)
+    open_to_change = sorted({*APPEND_ONLY, *PAGE_APPEND_ONLY, "in_force"} - kept)
     if open_to_change:
         raise BadRegistry(
             f"registry {where}: nothing keeps its table {open_to_change[0]!r} from being changed"

@@ -19,6 +19,7 @@ from sqlalchemy.orm import Session
 from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.glances import glance_heard, glance_judged
 from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
     add_version,
@@ -82,6 +83,8 @@ class Queue:
                 if log.sha256 not in have:
                     new.setdefault(log.sha256, log)
             session.add_all(_log_row(machine, log, now) for log in new.values())
+            if new:
+                glance_heard(session, machine, len(new), now)
             return len(new)
 
     def claim(self, machine: str, *, owner: str, lease: timedelta, now: datetime) -> Claim | None:
@@ -211,6 +214,8 @@ class Queue:
                 at=now,
             )
             session.add(done)
+            if newer is None:
+                glance_judged(session, claim.machine, judgement.verdict, judgement.evidence)
             session.flush()
             return _outcome(session, row, done)
 

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session, aliased
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
 from workbench.registry.errors import BadRegistry
+from workbench.registry.glances import begin_glance, glance_moved
 from workbench.registry.tables import (
     DecisionRow,
     InForceRow,
@@ -39,11 +40,10 @@ def lock_machine(session: Session, name: str, now: datetime) -> None:
     if session.scalar(query) is not None:
         return
     values = {"name": name, "added_at": now}
-    if session.get_bind().dialect.name == "postgresql":
-        session.execute(postgresql.insert(MachineRow).values(values).on_conflict_do_nothing())
-        session.scalar(query)
-    else:
-        session.execute(sqlite.insert(MachineRow).values(values))
+    insert = postgresql.insert if session.get_bind().dialect.name == "postgresql" else sqlite.insert
+    session.execute(insert(MachineRow).values(values).on_conflict_do_nothing())
+    session.scalar(query)
+    begin_glance(session, name)
 
 
 def need_machine(session: Session, name: str, *, lock: bool = False) -> None:
@@ -141,6 +141,8 @@ def decide(
         else:
             pointer.version_id, pointer.decision_id = version.id, row.id
         session.flush()
+        if log_id is None:
+            glance_moved(session, version.machine)
     return row
 
 

@@ -1,4 +1,7 @@
-"""Tables of the registry. All but `in_force`, `claim` and `outbox` are append-only, by triggers."""
+"""Tables of the registry. All but `in_force`, `claim` and `outbox` are append-only, by triggers.
+
+Those of the page are in `page_tables`.
+"""
 
 from datetime import UTC, datetime
 

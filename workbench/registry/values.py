@@ -9,6 +9,7 @@ Document = Mapping[str, Any]
 Kind = Literal["model", "design", "validation"]
 DecisionKind = Literal["added", "promoted", "rolled_back", "refused"]
 LogVerdict = Literal["none", "not_judged", "structure", "promoted", "refused", "set_aside"]
+ALARMING: tuple[LogVerdict, ...] = ("structure", "promoted", "refused", "set_aside")
 
 
 @dataclass(frozen=True)

@@ -126,8 +126,31 @@ class Examined:
         return "ready" if all(can) else "in part" if any(can) else "nothing"
 
 
-def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
-    """What the log in the file shows, read by its card; effects: also which effects it could show.
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """A log as far as it is seen without asking what it tells: the first and quick part of a look.
+
+    raw: signals as recorded; log: the longest run, None where there is none.
+    """
+
+    file: str
+    rig: Rig
+    clock: Clock
+    bad: tuple[BadSamples, ...]
+    refused: str
+    remarks: tuple[str, ...]
+    command_unit: str
+    raw: Log = field(repr=False)
+    runs: tuple[Log, ...] = field(repr=False)
+
+    @property
+    def log(self) -> Log | None:
+        """The longest run."""
+        return max(self.runs, key=len) if self.runs else None
+
+
+def looked(path: Path, card: Card) -> Looked:
+    """The log in the file, read by its card, repaired and cut into runs.
 
     A log that `identify` would refuse is looked at as far as it goes. Raises BadLog or BadCard
     where the file cannot be read at all.
@@ -147,28 +170,52 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     except BadLog as error:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)
-    log = max(runs, key=len) if runs else None
     bad += [one for name in LIMITED if name in raw for one in limits(raw, name)]
-    found = _moved(runs, rig, effects) if runs and not refused else _Moved(reason=refused)
-    if log is not None and not refused:
-        remarks += log_remarks(runs, rig, card.signals)
-    return Examined(
+    return Looked(
         file=path.name,
         rig=rig,
         clock=clock,
-        sensors=tuple(_sensor(name, x) for name, x in raw.signals.items() if name != "t"),
         bad=tuple(dict.fromkeys(bad)),
-        delays=_delays(log, found.motion) if log is not None and found.motion else (),
-        ways=found.ways,
-        told=found.told,
-        add=tuple(dict.fromkeys(one.add for one in found.told if one.add)),
-        refused=refused or found.reason,
-        remarks=tuple(dict.fromkeys([*remarks, *found.remarks])),
+        refused=refused,
+        remarks=tuple(remarks),
         command_unit=_command_unit(card),
-        times=raw["t"],
+        raw=raw,
+        runs=runs,
+    )
+
+
+def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
+    """What the log in the file shows, read by its card; effects: also which effects it could show.
+
+    Raises as `looked` does.
+    """
+    found = looked(path, card)
+    log, runs = found.log, found.runs
+    seen = (
+        _moved(runs, found.rig, effects)
+        if runs and not found.refused
+        else _Moved(reason=found.refused)
+    )
+    remarks = list(found.remarks)
+    if log is not None and not found.refused:
+        remarks += log_remarks(runs, found.rig, card.signals)
+    return Examined(
+        file=found.file,
+        rig=found.rig,
+        clock=found.clock,
+        sensors=tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t"),
+        bad=found.bad,
+        delays=_delays(log, seen.motion) if log is not None and seen.motion else (),
+        ways=seen.ways,
+        told=seen.told,
+        add=tuple(dict.fromkeys(one.add for one in seen.told if one.add)),
+        refused=found.refused or seen.reason,
+        remarks=tuple(dict.fromkeys([*remarks, *seen.remarks])),
+        command_unit=found.command_unit,
+        times=found.raw["t"],
         log=log,
-        motion=found.motion,
-        effects=found.effects,
+        motion=seen.motion,
+        effects=seen.effects,
     )
 
 

@@ -16,7 +16,6 @@ from tests.workbench.jobs.listener import Listener
 from tests.workbench.jobs.machines import in_force, machine
 from tests.workbench.jobs.worker import clock, ignore, judge, settings
 from workbench.jobs.alarms import (
-    ALARMING,
     IN_A_ROW,
     KEPT_FOR,
     BadWebhook,
@@ -30,7 +29,7 @@ from workbench.jobs.metrics import MachineFigures, write_metrics
 from workbench.jobs.passes import Pass, Report
 from workbench.registry.outbox import FIRST_DELAY, LONGEST_DELAY, Outbox
 from workbench.registry.store import Registry
-from workbench.registry.values import Alarm
+from workbench.registry.values import ALARMING, Alarm
 
 MINUTE = timedelta(minutes=1)
 

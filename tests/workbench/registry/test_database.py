@@ -3,7 +3,7 @@
 import multiprocessing
 import os
 import sqlite3
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -16,12 +16,18 @@ from tests.workbench.registry.postgres import Server
 from workbench.registry.database import location
 from workbench.registry.errors import BadRegistry, RegistryAway
 from workbench.registry.migrate import HEAD, config
+from workbench.registry.overview import FleetAsked, fleet_page
+from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 from workbench.registry.tables import Base
-from workbench.registry.values import Candidate
+from workbench.registry.values import Candidate, Judgement, SeenLog
 
 NOW = datetime(2026, 3, 1, tzinfo=UTC)
 PROCESSES, EACH = 6, 15
+PAGE_TABLES = (  # those that refer to others first
+    *("access_token_end", "access_token", "task", "upload", "audit"),
+    *("machine_now", "machine_trend"),
+)
 
 
 def test_steps_and_tables_agree(registry: Registry) -> None:
@@ -36,14 +42,29 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
 
 
 def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> None:
+    log = SeenLog("f" * 64, "a.csv", 1, 1)
+    moved = {"name": "F_cp", "before": 10.0, "after": 12.0}
+    found = Judgement("structure", "r", evidence={"drift": {"moved": [moved]}})
     with Registry(where) as registry:
         registry.add("a", Candidate({"m": 1}), reason="r", by="t", now=NOW)
+        queue = Queue(registry.database)
+        queue.announce("a", [log], now=NOW)
+        claim = queue.claim("a", owner="w", lease=timedelta(hours=1), now=NOW)
+        assert claim is not None
+        queue.finish(claim, log, found, by="w", now=NOW)
+        before = fleet_page(registry.database, FleetAsked(NOW))
         with registry.database.writing() as session:
-            session.execute(text("DROP TABLE outbox"))
+            for table in ("outbox", *PAGE_TABLES):
+                session.execute(text(f"DROP TABLE {table}"))
             session.execute(text("UPDATE alembic_version SET version_num = '0002'"))
     with Registry(where) as registry:
         test_steps_and_tables_agree(registry)
         assert [v.number for v in registry.versions("a")] == [1]
+        after = fleet_page(registry.database, FleetAsked(NOW))
+    assert after == before
+    (line,) = after.lines
+    assert (line.state, line.moved, line.logs, line.heard_at) == ("structure", "F_cp", 1, NOW)
+    assert list(line.trend) == [12.0]
 
 
 def test_a_newer_layout_is_refused(where: str) -> None:

@@ -1,0 +1,160 @@
+"""The fleet at a glance: states by the last log, what moved most, pages cut by the database."""
+
+from datetime import timedelta
+from typing import Any
+
+import pytest
+
+from tests.workbench.page.conftest import NOW, Page
+from workbench.page.fleet import asked_for
+from workbench.registry.at_a_glance import TREND_LOGS, glance, state_of, with_log
+from workbench.registry.overview import FleetAsked, fleet_page
+from workbench.registry.queue import Queue
+from workbench.registry.results import condition, last_logs
+from workbench.registry.store import Registry
+from workbench.registry.values import Candidate, Judgement, LogVerdict, SeenLog
+
+HOUR = timedelta(hours=1)
+
+
+def told(name: str, change: float, sd: float = 0.01) -> dict[str, Any]:
+    after = 10.0 * (1.0 + change)
+    return {"name": name, "unit": "N", "before": 10.0, "after": after, "low": after - 0.2,
+            "high": after + 0.2, "change": change, "sd": sd}  # fmt: skip
+
+
+def evidence(*parameters: dict[str, Any], verdict: str = "none") -> dict[str, Any]:
+    return {"drift": {"verdict": verdict, "parameters": list(parameters), "moved": []}}
+
+
+def judge(
+    registry: Registry, machine: str, number: int, verdict: LogVerdict, found: dict[str, Any]
+) -> None:
+    """A further log of the machine and its result, an hour after the one before."""
+    queue, now = Queue(registry.database), NOW + number * HOUR
+    log = SeenLog(f"{number:064d}", f"run{number}.csv", 10, int(now.timestamp() * 1e9))
+    queue.announce(machine, [log], now=now)
+    claim = queue.claim(machine, owner="w", lease=HOUR, now=now)
+    assert claim is not None
+    queue.finish(claim, log, Judgement(verdict, "why", evidence=found), by="w", now=now)
+    queue.release(claim)
+
+
+def asked(**given: Any) -> FleetAsked:
+    return FleetAsked(**{"silent_since": NOW, **given})
+
+
+def names(registry: Registry, **given: Any) -> list[str]:
+    return [one.machine for one in fleet_page(registry.database, asked(**given)).lines]
+
+
+def test_a_state_is_that_of_the_last_log(where: str) -> None:
+    with Registry(where) as registry:
+        for name in ("tuned", "drifts", "changed", "bad", "unsure", "new"):
+            registry.add(name, Candidate({"m": 1.0}), reason="r", by="t", now=NOW)
+        judge(registry, "tuned", 1, "refused", evidence(verdict="drift"))
+        judge(registry, "tuned", 2, "none", evidence(told("F_cp", 0.01)))
+        judge(registry, "drifts", 1, "refused", evidence(told("F_cp", 0.3), verdict="drift"))
+        judge(registry, "changed", 1, "structure", evidence(verdict="structure"))
+        judge(registry, "bad", 1, "set_aside", {})
+        judge(registry, "unsure", 1, "not_judged", {})
+        lines = {one.machine: one for one in fleet_page(registry.database, asked()).lines}
+        assert {name: one.state for name, one in lines.items()} == {
+            "tuned": "in_tune", "drifts": "drifting", "changed": "structure", "bad": "log_bad",
+            "unsure": "not_judged", "new": "no_log",
+        }  # fmt: skip
+        assert (lines["tuned"].logs, lines["new"].logs) == (2, 0)
+        assert lines["drifts"].moved == "F_cp" and lines["drifts"].moved_by == pytest.approx(0.3)
+        later = fleet_page(registry.database, asked(silent_since=NOW + 90 * timedelta(minutes=1)))
+        silent = {one.machine for one in later.lines if one.state == "silent"}
+        assert silent == {"unsure"} and later.counts["silent"] == 1  # an alarm stays one
+        registry.promote("drifts", 1, reason="r", by="t", now=NOW)
+        assert condition(registry.database, "drifts") == "not_judged"
+
+
+def test_pages_are_filtered_sorted_and_cut(where: str) -> None:
+    with Registry(where) as registry:
+        for k in range(7):
+            registry.add(f"m{k}", Candidate({"m": 1.0}), reason="r", by="t", now=NOW)
+        for k, moved in ((1, -0.2), (3, 0.1), (5, 0.4)):
+            judge(registry, f"m{k}", k, "refused", evidence(told("m", moved), verdict="drift"))
+        judge(registry, "m2", 2, "structure", evidence())
+        assert names(registry, order="machine", per_page=3) == ["m0", "m1", "m2"]
+        assert names(registry, order="machine", per_page=3, page=3) == ["m6"]
+        assert names(registry, order="machine", down=True)[0] == "m6"
+        assert names(registry, order="moved", down=True)[:3] == ["m5", "m1", "m3"]
+        assert names(registry, order="heard")[:2] == ["m1", "m2"]
+        assert names(registry, order="state")[:2] == ["m2", "m1"]
+        assert names(registry, state="drifting", order="machine") == ["m1", "m3", "m5"]
+        assert names(registry, text="M3") == ["m3"]
+        assert names(registry, text="%") == [] and names(registry, text="_") == []
+        found = fleet_page(registry.database, asked(state="drifting", text="m", per_page=2))
+        assert (found.found, len(found.lines)) == (3, 2)
+        assert found.counts == {"drifting": 3, "structure": 1, "no_log": 3}
+        assert last_logs(registry.database, "m5", 5)[0].parameters[0]["name"] == "m"
+
+
+def test_what_moved_most_is_what_surely_moved() -> None:
+    assert glance({}) == (None, None)
+    assert glance(evidence(told("a", 0.5, 0.5), told("b", -0.1, 0.01))) == ("b", -0.1)
+    assert glance(evidence(told("a", 0.01, 0.01), told("b", 0.015, 0.1)))[0] == "a"
+    old = {"drift": {"moved": [{"name": "F_cp", "before": 10.0, "after": 12.0}]}}
+    name, by = glance(old)
+    assert name == "F_cp" and by == pytest.approx(0.2)
+    trend: dict[str, list[float]] = {}
+    for k in range(TREND_LOGS + 5):
+        trend = with_log(trend, evidence(told("a", k / 10)))
+    assert len(trend["a"]) == TREND_LOGS and trend["a"][-1] == pytest.approx(10 * (1 + 3.6))
+    assert state_of("refused", {}) == "not_judged"
+    assert state_of("refused", evidence(verdict="structure")) == "structure"
+
+
+def test_an_older_log_does_not_move_the_state(where: str) -> None:
+    with Registry(where) as registry:
+        registry.add("a", Candidate({"m": 1.0}), reason="r", by="t", now=NOW)
+        log = SeenLog("f" * 64, "new.csv", 1, int((NOW + 9 * HOUR).timestamp() * 1e9))
+        queue = Queue(registry.database)
+        queue.announce("a", [log], now=NOW)
+        claim = queue.claim("a", owner="w", lease=HOUR, now=NOW)
+        assert claim is not None
+        made = Judgement("promoted", "r", Candidate({"m": 2.0}), evidence(told("m", 0.2)))
+        queue.finish(claim, log, made, by="w", now=NOW)
+        queue.release(claim)
+        assert condition(registry.database, "a") == "in_tune"
+        judge(registry, "a", 1, "refused", evidence(verdict="drift"))
+        assert condition(registry.database, "a") == "in_tune"
+
+
+def test_the_table_and_the_machine_show_it(page: Page) -> None:
+    registry = page.registry
+    for name in ("a/b", "c d", "x&y"):
+        if "/" in name:
+            continue
+        registry.add(name, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
+        for k in range(1, 4):
+            judge(registry, name, k, "none", evidence(told("F_cp", k / 100), told("m", 0.001)))
+    text = page.client.get("/?order=machine").text
+    assert 'href="/machine/c%20d"' in text and "x&amp;y" in text and "<polyline" in text
+    part = page.client.get("/?state=no_log", headers={"HX-Target": "fleet"}).text
+    assert "<html" not in part and "No machine of 2 is so" in part
+    shown = page.client.get("/machine/x%26y").text
+    assert "run3.csv" in shown and '"y": "F_cp [N]"' in shown
+    assert page.client.get("/machine/x%26y/compare?a=1&b=1").status_code == 200
+    assert page.client.get("/machine/x%26y/compare?a=x&b=1").status_code == 400
+    assert page.client.get("/machine/x%26y/version/1/model.json").json() == {"m": 1.0}
+
+
+@pytest.mark.parametrize(
+    "query",
+    [
+        {"page": "-1"},
+        {"page": "9" * 30},
+        {"page": "²"},
+        {"order": "x; drop"},
+        {"state": "x"},
+        {"text": "a" * 10_000},
+    ],
+)
+def test_an_odd_question_is_answered(page: Page, query: dict[str, str]) -> None:
+    assert page.client.get("/", params=query).status_code == 200
+    assert len(asked_for(query, 7.0).text) <= 100

@@ -1,0 +1,81 @@
+"""`workbench token`: who may read and change through the page."""
+
+import getpass
+from datetime import UTC, datetime
+from typing import TYPE_CHECKING
+
+import click
+
+from workbench.commands.registry import registry_options
+from workbench.output import emit
+
+if TYPE_CHECKING:
+    from workbench.registry.store import Registry
+
+
+@click.group(epilog="Example: workbench token add anna --role change")
+def command() -> None:
+    """Tokens of the page: whoever has one reads, or changes, under its name.
+
+    The registry keeps a hash of each; a token is shown once, when it is made.
+    """
+
+
+@command.command("add", epilog="Example: workbench token add anna --role change")
+@click.argument("name")
+@click.option("--role", type=click.Choice(["read", "change"]), default="read", show_default=True)
+@click.option("--by", metavar="NAME", help="Who makes it.  [default: you]")
+@registry_options
+def add_token(name: str, role: str, by: str | None, where: str | None, as_json: bool) -> None:
+    """Make a token and show it, this once."""
+    from workbench.registry.access import Access, Role
+
+    wanted: Role = "change" if role == "change" else "read"
+    with _open(where) as found:
+        secret = Access(found.database).add(name, wanted, by=by or getpass.getuser(), now=_now())
+    shown = f"{secret}\nThe token of {name} ({role}); it is shown this once and kept nowhere."
+    emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
+
+
+@command.command("list", epilog="Example: workbench token list --json")
+@registry_options
+def list_tokens(where: str | None, as_json: bool) -> None:
+    """List the tokens by name, role and who made them; not the tokens themselves."""
+    from workbench.output import table
+    from workbench.registry.access import Access
+    from workbench.registry.views import moment
+
+    with _open(where) as found:
+        tokens = Access(found.database).tokens()
+    rows = [
+        (one.name, one.role, one.made_by, moment(one.at),
+         "in force" if one.ended is None else f"revoked {moment(one.ended)}")
+        for one in tokens
+    ]  # fmt: skip
+    head = ("token", "role", "made by", "at", "state")
+    emit({"tokens": tokens}, as_json,
+         lambda: table(head, rows, ()) if rows else "no token yet")  # fmt: skip
+
+
+@command.command("revoke", epilog="Example: workbench token revoke anna")
+@click.argument("name")
+@click.option("--by", metavar="NAME", help="Who revokes it.  [default: you]")
+@registry_options
+def revoke_token(name: str, by: str | None, where: str | None, as_json: bool) -> None:
+    """Take a token no more; its name stays taken."""
+    from workbench.registry.access import Access
+
+    with _open(where) as found:
+        Access(found.database).revoke(name, by=by or getpass.getuser(), now=_now())
+    emit({"name": name, "revoked": True}, as_json, lambda: f"{name}: revoked")
+
+
+def _open(where: str | None) -> "Registry":
+    from workbench.registry.database import location
+    from workbench.registry.store import Registry
+
+    return Registry(location(where))
+
+
+def _now() -> datetime:
+    return datetime.now(UTC)

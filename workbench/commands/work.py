@@ -1,0 +1,40 @@
+"""`workbench work`: a worker of the page, on this machine or another."""
+
+import sys
+from pathlib import Path
+
+import click
+
+
+@click.command(
+    epilog="Example: workbench work --registry postgresql://... --machines /srv/machines"
+)
+@click.option(
+    "--registry",
+    "where",
+    metavar="FILE|URL",
+    help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
+)
+@click.option(
+    "--machines",
+    type=click.Path(path_type=Path),
+    default=Path("machines"),
+    metavar="FOLDER",
+    show_default=True,
+    help="Folder of the machines, as of 'serve'.",
+)
+@click.option("--once", is_flag=True, help="End when no task waits.")
+@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+def command(where: str | None, machines: Path, once: bool) -> None:
+    """Identify and trace the logs that were dropped on the page, one after the other.
+
+    Any number may run, on any machine that sees the registry and the folder. Ends on Ctrl-C or
+    SIGTERM and gives back what it has in hand; one that is killed loses nothing either.
+    """
+    from workbench.jobs.events import reporter
+    from workbench.page.settings import PageSettings
+    from workbench.page.worker import run_worker
+    from workbench.registry.database import location
+
+    settings = PageSettings(location(where), str(machines.absolute()))
+    run_worker(settings, reporter(sys.stderr, "work"), once=once)

@@ -1,0 +1,127 @@
+"""The page put together: its routes, what they share, and what an error becomes."""
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+from markupsafe import escape
+from starlette.applications import Starlette
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, JSONResponse, Response
+from starlette.routing import Mount
+from starlette.staticfiles import StaticFiles
+
+from identification.errors import UserError
+from workbench.page import deeds, drops, fleet, health, machine, sign_in, work
+from workbench.page.brief import Moment
+from workbench.page.guard import Guard
+from workbench.page.helpers import Helpers
+from workbench.page.pages import show
+from workbench.page.settings import PageSettings, handed_over
+from workbench.page.visitors import Doorkeeper, Visitor
+from workbench.registry.access import Access
+from workbench.registry.errors import BadRegistry, RegistryAway
+from workbench.registry.store import Registry
+
+HERE = Path(__file__).parent
+ASSETS = HERE.parent / "assets"
+TITLES = {
+    400: "That cannot be",
+    401: "A token is needed",
+    403: "Not allowed",
+    404: "Not found",
+    405: "Not that way",
+    413: "Too large",
+    429: "Too often",
+    503: "The registry does not answer",
+}
+
+
+def served() -> Guard:
+    """The application by the settings that were handed over to this process."""
+    return application(handed_over())
+
+
+def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard:
+    """The application on its registry; raises BadRegistry and RegistryAway.
+
+    helpers: processes for heavy looks, by default of its own.
+    """
+    registry = Registry(settings.where)
+    helpers = helpers or Helpers()
+
+    @asynccontextmanager
+    async def life(_app: Starlette) -> AsyncIterator[None]:
+        async with helpers:
+            yield
+        registry.close()
+
+    app = Starlette(
+        routes=[
+            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *deeds.DEED_ROUTES,
+            *drops.DROP_ROUTES, *work.WORK_ROUTES,
+            *sign_in.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
+            Mount("/static/assets", StaticFiles(directory=ASSETS)),
+            Mount("/static", StaticFiles(directory=HERE / "static")),
+        ],
+        exception_handlers={
+            HTTPException: _http_error,
+            BadRegistry: _not_there,
+            RegistryAway: _away,
+            UserError: _user_error,
+        },
+        lifespan=life,
+    )  # fmt: skip
+    app.state.settings, app.state.registry, app.state.helpers = settings, registry, helpers
+    app.state.moment = Moment()
+    access = Access(registry.database)
+    app.state.access = access
+    app.state.doorkeeper = Doorkeeper(access, open_reading=settings.open_reading)
+    return Guard(health.Counted(app), settings)
+
+
+async def _http_error(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    return await _said(request, error.status_code, error.detail, dict(error.headers or {}))
+
+
+async def _not_there(request: Request, error: Exception) -> Response:
+    reading = request.method in ("GET", "HEAD")
+    return await _said(request, 404 if reading else 400, str(error))
+
+
+async def _user_error(request: Request, error: Exception) -> Response:
+    return await _said(request, 400, str(error))
+
+
+async def _away(request: Request, error: Exception) -> Response:
+    return await _said(request, 503, str(error), {"Retry-After": "10"})
+
+
+async def _said(
+    request: Request, status: int, said: str, headers: dict[str, str] | None = None
+) -> Response:
+    """One line, as the one who asks takes it: a page, a part of one, or JSON."""
+    if "application/json" in request.headers.get("accept", ""):
+        return JSONResponse({"error": said}, status, headers)
+    if request.headers.get("hx-request"):
+        return HTMLResponse(str(escape(said)), status, headers)
+    visitor = await run_in_threadpool(_known, request)
+    title = TITLES.get(status, "Something is wrong")
+    page = show(request, visitor, "error", status=status, title=title, said=said)
+    page.headers.update(headers or {})
+    return page
+
+
+def _known(request: Request) -> Visitor:
+    """Who asks, for the head of an error's page; whatever goes wrong with that is nobody."""
+    asked: Visitor | None = getattr(request.state, "visitor", None)
+    if asked is not None:  # a token is not tried twice
+        return asked
+    try:
+        keeper: Doorkeeper = request.app.state.doorkeeper
+        return keeper.visitor(request, to_change=False)
+    except (HTTPException, UserError):
+        return Visitor()

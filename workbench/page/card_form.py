@@ -1,0 +1,162 @@
+"""A card as the fields of a form: filled from `init`'s proposal, corrected, and written as TOML."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from identification.errors import BadCard
+from workbench.cards.card_text import Line, card_text
+from workbench.output import write_whole
+
+if TYPE_CHECKING:
+    from workbench.steps.first_card.proposal import Proposal
+
+FORM_FILE = "form.json"
+FORM_SIGNALS = ("t", "y", "r", "F", "u", "p_p", "p_n")
+SIGNAL_WORDS = {
+    "t": "time",
+    "y": "position",
+    "r": "reference of the position",
+    "F": "force on the body",
+    "u": "command",
+    "p_p": "pressure, positive side",
+    "p_n": "pressure, negative side",
+}
+KIND_WORDS = {
+    "electro-pneumatic": "two pressures make the force",
+    "force": "the force is logged",
+    "motor": "the force is a constant times the command",
+}
+RIG_NUMBERS = {  # key of the card: label, and unit
+    "area_p_m2": ("area, positive side", "m^2"),
+    "area_n_m2": ("area, negative side", "m^2"),
+    "supply_pressure_pa": ("supply pressure", "Pa"),
+    "force_per_command": ("force per command", "N, or N m, for one unit of u"),
+    "control_limit": ("limit of the command", "unit of u"),
+}
+LONGEST_FIELD = 200
+_TEXTS = ("force_per_command", "control_limit")  # that may be "35 N/A" too
+
+
+@dataclass(frozen=True)
+class CardForm:
+    """The fields by name, each a text; columns: key and words of each column that may be chosen.
+
+    why: by field, how sure the proposal is of it and why; layout: the card's [file].
+    """
+
+    fields: Mapping[str, str]
+    columns: Sequence[tuple[str, str]]
+    why: Mapping[str, tuple[bool, str]] = field(default_factory=dict)
+    remarks: Sequence[str] = ()
+    layout: Mapping[str, Any] = field(default_factory=dict)
+
+    def __getitem__(self, name: str) -> str:
+        return self.fields.get(name, "")
+
+    def with_fields(self, given: Mapping[str, Any]) -> "CardForm":
+        """The form with what a visitor has put into its fields; others are left aside."""
+        texts = {
+            name: " ".join(str(given.get(name, "")).split())[:LONGEST_FIELD] for name in _names()
+        }
+        changed = {name for name in texts if texts[name] != self[name]}
+        why = {name: said for name, said in self.why.items() if name not in changed}
+        return CardForm(texts, self.columns, why, self.remarks, self.layout)
+
+    def text(self, file: str) -> str:
+        """The card; raises BadCard where a field can be none."""
+        signals = [line for name in FORM_SIGNALS if (line := self._signal(name)) is not None]
+        rig = [Line("kind", self["kind"]), Line("motion", self["motion"] or "linear")]
+        rig += [Line(key, self._number(key)) for key in RIG_NUMBERS if self[key]]
+        tables: dict[str, list[Line]] = {
+            "card": [Line("name", self["name"])], "rig": rig, "signals": signals,
+        }  # fmt: skip
+        if self.layout:
+            tables["file"] = [Line(key, value) for key, value in self.layout.items()]
+        return card_text([f"Made on the page from {file}."], tables, self.remarks)
+
+    def _signal(self, name: str) -> Line | None:
+        column = self[f"column_{name}"]
+        if not column:
+            return None
+        if column not in [key for key, _ in self.columns]:
+            raise BadCard(f"{SIGNAL_WORDS[name]}: the log has no such column; choose one")
+        value: dict[str, Any] = {"column": json.loads(column), "unit": self[f"unit_{name}"]}
+        gain = self[f"gain_{name}"]
+        if gain:
+            try:
+                value["gain"] = float(gain.replace(",", "."))
+            except ValueError:
+                value["gain"] = gain
+        if self[f"bits_{name}"].isdigit():
+            value |= {"bits": int(self[f"bits_{name}"]), "signed": True}
+        sure, why = self.why.get(f"column_{name}", (True, ""))
+        return Line(name, value, f"{'sure' if sure else 'guess'}: {why}" if why else "")
+
+    def _number(self, key: str) -> float | str:
+        text = self[key]
+        try:
+            return float(text.replace(",", "."))
+        except ValueError:
+            if key in _TEXTS:
+                return text
+            label, unit = RIG_NUMBERS[key]
+            raise BadCard(f"{label}: {text!r} is no number; give it in {unit}") from None
+
+    def keep(self, folder: Path) -> None:
+        """Write the form beside its log."""
+        content = {"fields": dict(self.fields), "columns": list(self.columns),
+                   "why": dict(self.why), "remarks": list(self.remarks),
+                   "layout": dict(self.layout)}  # fmt: skip
+        write_whole(folder / FORM_FILE, json.dumps(content), "form")
+
+
+def kept_form(folder: Path) -> CardForm | None:
+    """The form that was kept beside a log; None where there is none."""
+    path = folder / FORM_FILE
+    if not path.exists():
+        return None
+    found = json.loads(path.read_text(encoding="utf-8"))
+    columns = [(str(key), str(words)) for key, words in found["columns"]]
+    why = {name: (bool(sure), str(said)) for name, (sure, said) in found["why"].items()}
+    return CardForm(found["fields"], columns, why, found["remarks"], found["layout"])
+
+
+def form_of(of: "Proposal", file: str) -> CardForm:
+    """The proposal as a form; file: name of the log, of which the machine's is made."""
+    fields = {"name": of.name, "kind": of.kind, "motion": of.motion}
+    why: dict[str, tuple[bool, str]] = {}
+    for one in of.rig:
+        name = "control_limit" if one.key == "control_limit_v" else one.key
+        fields[name] = "" if one.value is None else _written(one.value)
+        why[name] = (one.sure, one.why)
+    for signal in of.signals:
+        name = signal.name
+        fields[f"column_{name}"] = json.dumps(signal.column)
+        fields[f"unit_{name}"] = signal.unit
+        fields[f"gain_{name}"] = "" if signal.gain is None else _written(signal.gain)
+        fields[f"bits_{name}"] = "" if signal.bits is None else str(signal.bits)
+        why[f"column_{name}"] = (signal.sure, signal.why)
+    columns = [(json.dumps(one.key), one.header or one.shown) for one in of.columns]
+    unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
+    layout = of.spec.model_dump(exclude_defaults=True)
+    return CardForm(fields, columns, why, [*of.remarks, *unused], layout)
+
+
+def empty_form(columns: Sequence[tuple[str, str | int, str]], name: str) -> CardForm:
+    """A form to be filled by hand, where `init` proposes nothing."""
+    fields = {"name": name, "kind": "force", "motion": "linear"}
+    return CardForm(fields, [(json.dumps(key), shown) for shown, key, why in columns if not why])
+
+
+def _names() -> list[str]:
+    """Every field of the form."""
+    parts = [f"{part}_{name}" for name in FORM_SIGNALS for part in ("column", "unit", "gain",
+                                                                    "bits")]  # fmt: skip
+    return ["name", "kind", "motion", *RIG_NUMBERS, *parts]
+
+
+def _written(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.12g}"

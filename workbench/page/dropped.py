@@ -1,0 +1,113 @@
+"""Where dropped logs lie: a folder each below the machines, the log, its card, and what was found.
+
+A file's name on the page is a text alone; on the disk it is made of letters that no path uses.
+"""
+
+import hashlib
+import re
+import secrets
+import shutil
+from collections.abc import Iterable
+from pathlib import Path
+from typing import BinaryIO
+
+from identification.errors import BadLog
+from workbench.files import CARD_FILE
+from workbench.registry.errors import BadRegistry
+
+LOG_FOLDER = "log"  # of an upload, in which nothing else lies
+DROPS = ".drops"  # no machine's name begins so, and no pass looks into it
+ENDINGS = (
+    ".csv", ".txt", ".tsv", ".dat", ".log", ".parquet", ".mat", ".h5", ".hdf5", ".json", ".tdms",
+    ".mdf", ".mf4", ".mcap", ".ulg", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods",
+)  # fmt: skip
+RESULT_FILE, CHARTS_FILE, REPORT_FILE = "result.json", "charts.html", "report.html"
+COPIED_AT_ONCE = 1 << 20
+LONGEST_FILE_NAME = 80
+_ID = re.compile(r"[0-9a-f]{16}")
+_ODD = re.compile(r"[^A-Za-z0-9_.-]+")
+
+
+def new_id() -> str:
+    """A name that nobody guesses."""
+    return secrets.token_hex(8)
+
+
+def folder_of(root: Path, upload: str) -> Path:
+    """The folder of an upload; raises BadRegistry where the name is none."""
+    if not _ID.fullmatch(upload):
+        raise BadRegistry("no such upload")
+    return root / DROPS / upload
+
+
+def file_name(given: str) -> str:
+    """The name under which a log is kept: what follows the last slash, without odd characters.
+
+    Raises BadLog where its ending is that of no log.
+    """
+    last = re.split(r"[/\\]", given)[-1]
+    plain = _ODD.sub("_", last).strip("._-") or "log"
+    stem, dot, end = plain.rpartition(".")
+    ending = dot + end
+    if ending.lower() not in ENDINGS:
+        raise BadLog(
+            f"{plain[:LONGEST_FILE_NAME]}: no log by its ending; one of {' '.join(ENDINGS)}"
+        )
+    return (stem[: LONGEST_FILE_NAME - len(ending)].strip("._-") or "log") + ending.lower()
+
+
+def keep(root: Path, upload: str, name: str, content: BinaryIO) -> tuple[int, str]:
+    """Write the log, whole or not at all: its size [bytes] and fingerprint.
+
+    Raises BadLog where it is empty.
+    """
+    folder = folder_of(root, upload)
+    part = folder.with_name(f"{folder.name}.part")
+    (part / LOG_FOLDER).mkdir(parents=True)
+    try:
+        size, digest = _written(part / LOG_FOLDER / name, content)
+        if size == 0:
+            raise BadLog(f"{name}: is empty")
+        part.rename(folder)
+    finally:
+        shutil.rmtree(part, ignore_errors=True)
+    return size, digest
+
+
+def drop_again(root: Path, upload: str) -> None:
+    """Remove an upload that is no log."""
+    shutil.rmtree(folder_of(root, upload), ignore_errors=True)
+
+
+def _written(path: Path, content: BinaryIO) -> tuple[int, str]:
+    digest, size = hashlib.sha256(), 0
+    with path.open("wb") as file:
+        while block := content.read(COPIED_AT_ONCE):
+            digest.update(block)
+            file.write(block)
+            size += len(block)
+    return size, digest.hexdigest()
+
+
+def log_of(root: Path, upload: str) -> Path:
+    """The log's file; raises BadRegistry where it is gone."""
+    for path in (folder_of(root, upload) / LOG_FOLDER).glob("*"):
+        return path
+    raise BadRegistry("this upload's file is gone")
+
+
+def card_of(root: Path, upload: str) -> Path:
+    """The card's file, whether it is there or not."""
+    return folder_of(root, upload) / CARD_FILE
+
+
+def results_of(root: Path, upload: str, task: int) -> Path:
+    """The folder of a task's results, whether it is there or not."""
+    return folder_of(root, upload) / f"task-{task}"
+
+
+def without_path(said: str, paths: Iterable[Path]) -> str:
+    """A message without the folders of the server in it."""
+    for path in paths:
+        said = said.replace(f"{path.parent}/", "")
+    return said

@@ -1,0 +1,98 @@
+"""Whether the page and its registry are well, and figures of both for Prometheus."""
+
+import time
+from collections.abc import Iterator
+
+from prometheus_client import CONTENT_TYPE_LATEST, CollectorRegistry, Counter, Histogram
+from prometheus_client import generate_latest as written
+from prometheus_client.core import GaugeMetricFamily
+from prometheus_client.registry import Collector
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from workbench.jobs.metrics import PREFIX, MachineFigures
+from workbench.page.visitors import Visitor, reading
+from workbench.registry.bench import Bench
+from workbench.registry.errors import RegistryAway
+from workbench.registry.overview import any_machine
+from workbench.registry.store import Registry
+
+REQUESTS = CollectorRegistry()
+ANSWERED = Counter(
+    f"{PREFIX}_page_requests", "Requests that this server has answered.", ["method", "status"],
+    registry=REQUESTS,
+)  # fmt: skip
+SECONDS_TAKEN = Histogram(
+    f"{PREFIX}_page_seconds", "Time that an answer took.", registry=REQUESTS,
+    buckets=(0.005, 0.01, 0.025, 0.05, 0.1, 0.2, 0.5, 1.0, 2.5, 10.0),
+)  # fmt: skip
+
+
+class Counted:
+    """The application, its answers counted."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Answer and count."""
+        if scope["type"] != "http":
+            await self._app(scope, receive, send)
+            return
+        begun = time.perf_counter()
+
+        async def noted(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                ANSWERED.labels(_method(scope), str(message["status"])).inc()
+                SECONDS_TAKEN.observe(time.perf_counter() - begun)
+            await send(message)
+
+        await self._app(scope, receive, noted)
+
+
+class TaskFigures(Collector):
+    """How many tasks the page has in each state."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._bench = Bench(registry.database)
+
+    def collect(self) -> Iterator[GaugeMetricFamily]:
+        """The figure; nothing where the registry is away, which its own figures tell."""
+        out = GaugeMetricFamily(f"{PREFIX}_page_tasks", "Tasks by state.", labels=["state"])
+        try:
+            counts = self._bench.counts()
+        except RegistryAway:
+            return
+        for state, count in sorted(counts.items()):
+            out.add_metric([state], count)
+        yield out
+
+
+async def health(request: Request) -> Response:
+    """200 where page and registry answer, 503 where the registry does not."""
+    registry: Registry = request.app.state.registry
+    try:
+        await run_in_threadpool(any_machine, registry.database)
+    except RegistryAway:
+        return JSONResponse({"page": "ok", "registry": "away"}, 503)
+    return JSONResponse({"page": "ok", "registry": "ok"})
+
+
+def metrics(request: Request, _visitor: Visitor) -> Response:
+    """All figures in Prometheus' text format."""
+    registry: Registry = request.app.state.registry
+    own = CollectorRegistry(auto_describe=False)
+    own.register(MachineFigures(registry))
+    own.register(TaskFigures(registry))
+    return Response(written(own) + written(REQUESTS), media_type=CONTENT_TYPE_LATEST)
+
+
+def _method(scope: Scope) -> str:
+    """The method; what is none of the usual ones would make figures without end."""
+    return scope["method"] if scope["method"] in ("GET", "HEAD", "POST") else "other"
+
+
+HEALTH_ROUTES = [Route("/health", health), Route("/metrics", reading(metrics))]

@@ -1,0 +1,73 @@
+"""Heavy looks at a log in processes of their own, warm, and killed where they take too long."""
+
+from collections.abc import Callable
+from contextlib import AsyncExitStack, suppress
+from types import TracebackType
+from typing import Any, Self, TypeVar
+
+import anyio
+from anyio import to_process
+
+from identification.errors import UserError
+from workbench.page.looks import warm
+
+Result = TypeVar("Result")
+QUICK_LOOKS, SLOW_LOOKS = 2, 1  # at once; a slow one never keeps a first picture waiting
+LONGEST_LOOK = 60.0  # s
+KEPT_WARM = 120.0  # s between two calls; after five minutes without one a process would end
+
+
+class TooLong(UserError):
+    """A look at a log that does not come to its end."""
+
+
+class Helpers:
+    """The processes, from the first use until the server ends."""
+
+    def __init__(self) -> None:
+        self._quick: anyio.CapacityLimiter | None = None
+        self._slow: anyio.CapacityLimiter | None = None
+        self._held = AsyncExitStack()
+
+    async def __aenter__(self) -> Self:
+        self._quick = anyio.CapacityLimiter(QUICK_LOOKS)
+        self._slow = anyio.CapacityLimiter(SLOW_LOOKS)
+        group = await self._held.enter_async_context(anyio.create_task_group())
+        group.start_soon(self._keep_warm)
+        self._held.callback(group.cancel_scope.cancel)
+        return self
+
+    async def __aexit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        await self._held.aclose()
+
+    def __call__(self, look: Callable[..., Result], *arguments: Any) -> Result:
+        """What the look gives, asked for in a thread of the server; raises what it raises."""
+        return anyio.from_thread.run(self._asked, self._quick, look, *arguments)
+
+    def slowly(self, look: Callable[..., Result], *arguments: Any) -> Result:
+        """The same of a look that may take seconds of a long log."""
+        return anyio.from_thread.run(self._asked, self._slow, look, *arguments)
+
+    async def _asked(
+        self, limit: anyio.CapacityLimiter | None, look: Callable[..., Result], *arguments: Any
+    ) -> Result:
+        try:
+            with anyio.fail_after(LONGEST_LOOK):
+                return await to_process.run_sync(look, *arguments, cancellable=True, limiter=limit)
+        except TimeoutError:
+            raise TooLong(
+                f"the log was not read within {LONGEST_LOOK:.0f} s; cut it, or use the commands"
+            ) from None
+        except anyio.BrokenWorkerProcess:
+            raise TooLong("the log could not be read: its reader has died; cut it") from None
+
+    async def _keep_warm(self) -> None:
+        while True:
+            with suppress(anyio.BrokenWorkerProcess):  # the next call starts another
+                await to_process.run_sync(warm, cancellable=True, limiter=self._quick)
+            await anyio.sleep(KEPT_WARM)

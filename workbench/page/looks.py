@@ -1,0 +1,161 @@
+"""What the page asks of a log, as functions that run in a process of their own.
+
+Each takes paths and texts and gives plain values; errors of the user are `UserError`.
+"""
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from identification.errors import UserError
+from workbench.page.dropped import without_path
+
+if TYPE_CHECKING:
+    from identification.arrays import Array
+    from workbench.logs.unknown import UnknownLog
+    from workbench.steps.first_card.proposal import Proposal
+
+MOST_COLUMNS = 12  # that the first picture shows
+FIRST_POINTS = 8000  # of each column's line, every peak kept
+LOGS_REMEMBERED = 1
+
+
+class BadLook(UserError):
+    """What is wrong with a log or its card, without the server's folders in it."""
+
+
+@dataclass(frozen=True)
+class DoctorFound:
+    """The doctor's words: verdict, lines by label, and what each parameter can be known by."""
+
+    verdict: str
+    lines: tuple[str, ...]
+    told: tuple[tuple[str, bool, str], ...]
+
+
+def warm() -> None:
+    """Import what the looks need, and compile or load their kernels' module."""
+    import matplotlib  # noqa: F401
+    import pandas  # noqa: F401
+    import pyarrow.parquet  # noqa: F401
+
+    import workbench.export.targets
+    import workbench.report.chart
+    import workbench.report.controllers
+    import workbench.report.doctor
+    import workbench.steps.doctor
+    import workbench.steps.first_card.proposal  # noqa: F401
+
+
+def refuse_no_log(path: Path) -> None:
+    """Raises BadLook where the file's first bytes are of something else than its name says."""
+    from workbench.cards.card import FileSpec
+    from workbench.logs.formats import checked_format
+
+    try:
+        checked_format(path, FileSpec())
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path])) from None
+
+
+def columns_chart(path: Path, file: str) -> tuple[str, int]:
+    """Every column of the file over its clock, as HTML, and how many rows it has."""
+    from workbench.report.chart import Chart, Line, Panel, chart_html, thinned_together
+
+    found = _unknown(path)
+    rows = max(len(one.values) for one in found.columns)
+    x, label, at = _clock(found)
+    shown = [one for k, one in enumerate(found.columns) if k != at and not one.unusable]
+    shown = shown[:MOST_COLUMNS]
+    places, values = thinned_together(x, [one.values for one in shown], FIRST_POINTS)
+    panels = [
+        Panel("", _label(one), [Line(_label(one), places, y, "measured")], height=150)
+        for one, y in zip(shown, values, strict=True)
+    ]
+    panels[-1:] = [replace(one, x=label) for one in panels[-1:]]
+    chart = Chart("columns", f"the columns of {file} over time", panels)
+    return str(chart_html(chart)), rows
+
+
+def proposal(path: Path) -> "Proposal":
+    """The card that `init` proposes; raises BadLook."""
+    from workbench.steps.first_card.proposal import proposed
+
+    try:
+        return proposed(path)
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path])) from None
+
+
+def headers(path: Path) -> list[tuple[str, str | int, str]]:
+    """The columns of the file: how each is shown, and what a card calls it."""
+    found = _unknown(path)
+    return [(_label(one), one.key, one.unusable) for one in found.columns]
+
+
+def card_refused(card: Path, path: Path) -> str:
+    """Why the card is none or does not read the log, in one line; empty where it does."""
+    from workbench.steps.first_card.written import refusal
+
+    return without_path(refusal(path, card), [path, card])
+
+
+def doctor_chart(path: Path, card: Path) -> str:
+    """The doctor's picture, as HTML; raises BadLook."""
+    from workbench.cards.card import load_card
+    from workbench.page.doctor_chart import chart_of
+    from workbench.report.chart import chart_html
+    from workbench.steps.doctor import looked
+
+    try:
+        found = looked(path, load_card(card, with_recipe=False))
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path, card])) from None
+    return "".join(str(chart_html(chart)) for chart in chart_of(found))
+
+
+def doctor_words(path: Path, card: Path) -> DoctorFound:
+    """The doctor's words; raises BadLook."""
+    from workbench.cards.card import load_card
+    from workbench.report.doctor import doctor_view
+    from workbench.steps.doctor import examine
+
+    try:
+        found = examine(path, load_card(card, with_recipe=False))
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path, card])) from None
+    lines = without_path(doctor_view(found, None), [path, card]).splitlines()
+    told = tuple((one.name, one.can, one.why if one.can else one.add or one.why)
+                 for one in found.told)  # fmt: skip
+    return DoctorFound(found.verdict, tuple(lines), told)
+
+
+def _unknown(path: Path) -> "UnknownLog":
+    try:
+        return _read(path, path.stat().st_mtime_ns)
+    except UserError as error:
+        raise BadLook(without_path(str(error), [path])) from None
+
+
+@lru_cache(maxsize=LOGS_REMEMBERED)
+def _read(path: Path, _mtime_ns: int) -> "UnknownLog":
+    from workbench.logs.unknown import read_unknown
+
+    return read_unknown(path)
+
+
+def _clock(found: "UnknownLog") -> "tuple[Array, str, int | None]":
+    """The first column that always goes up, its label and place; the rows' number without one."""
+    for k, one in enumerate(found.columns):
+        if not one.unusable and np.all(np.diff(one.values) > 0.0):
+            return one.values, _label(one), k
+    rows = max(len(one.values) for one in found.columns)
+    return np.arange(rows, dtype=np.float64), "row", None
+
+
+def _label(one: Any) -> str:
+    name = one.header or f"column {one.number}"
+    return f"{name} [{one.unit_below}]" if one.unit_below else name

@@ -1,0 +1,138 @@
+"""A machine: parameters over time, what was decided and why, alarms, logs, versions, reports."""
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+from starlette.routing import Route
+
+from identification.errors import UserError
+from workbench.page import version_looks
+from workbench.page.brief import briefly
+from workbench.page.machine_charts import parameter_charts
+from workbench.page.pages import show
+from workbench.page.version_looks import EXPORTS
+from workbench.page.visitors import Visitor, reading
+from workbench.page.work import report_response
+from workbench.registry.difference import difference
+from workbench.registry.results import JudgedLog, condition, last_logs, log_count
+from workbench.registry.store import Registry
+from workbench.registry.values import ALARMING, Kind, Version
+from workbench.report.chart import chart_html
+
+LAST_LOGS, MORE_LOGS = 60, 1000
+DOCUMENT_KINDS: tuple[Kind, ...] = ("model", "design", "validation")
+LAST_CHANGES = 200
+
+
+def machine(request: Request, visitor: Visitor) -> Response:
+    """The page of a machine."""
+    registry, name = _registry(request), request.path_params["machine"]
+    state = registry.machine(name)
+    versions = registry.versions(name)
+    last = MORE_LOGS if request.query_params.get("logs") == "all" else LAST_LOGS
+    logs = last_logs(registry.database, name, last)
+    current = state.in_force.number if state.in_force else None
+    other = next((v.number for v in reversed(versions) if v.number != current), None)
+    return show(
+        request, visitor, "machine", title=name, state=state, versions=list(reversed(versions)),
+        decisions=list(reversed(registry.decisions(name))), logs=logs, other=other,
+        alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
+        condition=condition(registry.database, name), total=log_count(registry.database, name),
+        reports=[path.name for path in _reports(request)], charts=_charts(logs),
+    )  # fmt: skip
+
+
+def compare(request: Request, visitor: Visitor) -> Response:
+    """Two versions side by side: every number, the margins, the step responses."""
+    registry, name = _registry(request), request.path_params["machine"]
+    numbers = [request.query_params.get(key, "") for key in ("a", "b")]
+    if not all(text.isascii() and text.isdigit() for text in numbers):
+        raise HTTPException(400, "Choose two versions.")
+    versions = [registry.version(name, int(text)) for text in numbers]
+    before, after = (_documents(registry, one) for one in versions)
+    designs = [
+        (one.number, json.dumps(found["design"]))
+        for one, found in zip(versions, (before, after), strict=True)
+        if found["design"] is not None
+    ]
+    try:
+        loops = request.app.state.helpers(version_looks.loops, designs[: len(set(numbers))])
+    except UserError as error:
+        return show(request, visitor, "said", said=str(error), bad=True)
+    lines = difference(before, after)
+    return show(request, visitor, "compare", lines=lines, numbers=numbers, loops=loops)
+
+
+def report(request: Request, _visitor: Visitor) -> Response:
+    """The report of a version's design."""
+    registry = _registry(request)
+    version = registry.version(request.path_params["machine"], request.path_params["number"])
+    design = json.dumps(registry.document(version, "design"))
+    return report_response(request.app.state.helpers(version_looks.design_report_of, design))
+
+
+def kept_report(request: Request, _visitor: Visitor) -> Response:
+    """A report in the machine's folder."""
+    _registry(request).machine(request.path_params["machine"])
+    for path in _reports(request):
+        if path.name == request.path_params["file"]:
+            return report_response(path.read_text("utf-8"))
+    raise HTTPException(404, "No such report.")
+
+
+def document(request: Request, _visitor: Visitor) -> Response:
+    """A version's document as it is."""
+    registry, kind = _registry(request), request.path_params["kind"]
+    if kind not in DOCUMENT_KINDS:
+        raise HTTPException(404, "No such document.")
+    number = request.path_params["number"]
+    version = registry.version(request.path_params["machine"], number)
+    found = json.dumps(registry.document(version, kind), indent=2)
+    headers = {"Content-Disposition": f'attachment; filename="{kind}-{number}.json"'}
+    return Response(found, headers=headers, media_type="application/json")
+
+
+def changes(request: Request, visitor: Visitor) -> Response:
+    """The last changes that somebody made through the page, or of its tokens."""
+    found = request.app.state.access.audited(last=LAST_CHANGES)
+    return show(request, visitor, "changes", title="Changes", changes=found)
+
+
+def _charts(logs: Sequence[JudgedLog]) -> str:
+    shown = list(reversed(logs[:LAST_LOGS]))
+    return "".join(str(chart_html(one)) for one in parameter_charts(shown))
+
+
+def _documents(registry: Registry, version: Version) -> dict[str, dict[str, Any] | None]:
+    return {
+        kind: registry.document(version, kind) if getattr(version, kind) else None
+        for kind in DOCUMENT_KINDS
+    }
+
+
+def _reports(request: Request) -> list[Path]:
+    root: Path = request.app.state.settings.root
+    name = request.path_params["machine"]
+    if name in (".", "..") or "/" in name or "\0" in name:
+        return []
+    return sorted((root / name / "reports").glob("*.html"))
+
+
+def _registry(request: Request) -> Registry:
+    found: Registry = request.app.state.registry
+    return found
+
+
+MACHINE_ROUTES = [
+    Route("/audit", reading(changes)),
+    Route("/machine/{machine}", reading(briefly(machine))),
+    Route("/machine/{machine}/compare", reading(compare)),
+    Route("/machine/{machine}/report/{file}", reading(kept_report)),
+    Route("/machine/{machine}/version/{number:int}/report", reading(report)),
+    Route("/machine/{machine}/version/{number:int}/{kind}.json", reading(document)),
+]

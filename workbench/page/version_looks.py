@@ -1,0 +1,99 @@
+"""What the page asks of a version's documents, as functions that run in a process of their own."""
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from identification.errors import UserError
+
+if TYPE_CHECKING:
+    from workbench.documents.design import Design
+    from workbench.report.chart import Colour, Look
+
+EXPORTS = {
+    "c": "C99",
+    "st": "Structured Text",
+    "plcopen": "PLCopen XML",
+    "fmu": "FMU 3.0",
+    "json": "JSON",
+    "mat": "MAT",
+}
+
+
+@dataclass(frozen=True)
+class LoopsFound:
+    """Designs side by side: margins as a table, and the step response of each as HTML."""
+
+    head: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    chart: str
+    said: Sequence[str]
+
+
+def export_files(design: str, target: str) -> dict[str, bytes]:
+    """The files of the target, by name, of a design's document as text; raises UserError."""
+    from workbench.export.exported import exported
+    from workbench.export.targets import writers
+
+    with _read(design) as found:
+        made = writers(datetime.now(UTC))[target](exported(found))
+    return {
+        name: content.encode("utf-8") if isinstance(content, str) else bytes(content)
+        for name, content in made.items()
+    }
+
+
+def design_report_of(design: str) -> str:
+    """The report of a design's document."""
+    from workbench.report.reports import design_report
+
+    with _read(design) as found:
+        return design_report(found, found.motion == "rotary")
+
+
+def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
+    """Designs of versions by their numbers, each as text, side by side."""
+    from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
+    from workbench.report.controllers import linear_step
+    from workbench.report.design_tables import DESIGN_HEAD, margin_rows
+
+    rows: list[Sequence[str]] = []
+    lines: list[Line] = []
+    said: list[str] = []
+    for place, (number, text) in enumerate(designs):
+        try:
+            with _read(text) as found:
+                rows += [(f"version {number}", *row) for row in margin_rows(found)]
+                for name, one in found.controllers.items():
+                    t, y = linear_step(found, one)
+                    colour: Colour = "reference" if place else "model"
+                    look: Look = "line" if name == "rst" else "dashed"
+                    lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
+                if found.recommendation:
+                    said.append(f"version {number}: {found.recommendation.why}")
+        except UserError as error:
+            said.append(f"version {number}: {error}")
+    if not lines:
+        return LoopsFound((), (), "", said)
+    panel = Panel("time [s]", "position / step", lines, marks=[Mark(1.0, "y")])
+    chart = Chart("steps", "linear step response of each version's controllers", [panel])
+    return LoopsFound(("", *DESIGN_HEAD), rows, str(chart_html(chart)), said)
+
+
+@contextmanager
+def _read(text: str) -> "Iterator[Design]":
+    """The design, read as from its file; its messages without the file's folder."""
+    from workbench.documents.design import read_design
+
+    with TemporaryDirectory(prefix="workbench-") as name:
+        path = Path(name) / "design.json"
+        path.write_text(json.dumps(json.loads(text)), encoding="utf-8")
+        try:
+            yield read_design(path)
+        except UserError as error:
+            raise type(error)(str(error).replace(f"{name}/", "")) from None

@@ -1,0 +1,223 @@
+"""Who asks: a token in a cookie or a header, what it allows, and how often it may be tried."""
+
+import hashlib
+import hmac
+import time
+from collections import OrderedDict, deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import wraps
+from threading import Lock
+from typing import Any
+
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import Response
+
+from workbench.registry.access import Access, Role
+
+TOKEN_COOKIE = "workbench_token"
+CSRF_FIELD, CSRF_HEADER = "csrf", "x-csrf"
+WRONG_TRIES, WRONG_SPAN = 10, 60.0  # wrong tokens of one address in so many seconds
+CHANGES, CHANGES_SPAN = 120, 60.0  # changes by one token
+MOST_KEYS = 10_000  # addresses that are remembered
+SEEN_FOR = 2.0  # s that a token is taken without asking the registry again, to read only
+LONGEST_TOKEN = 200
+ANYBODY = ""
+
+Handler = Callable[[Request], Awaitable[Response]]
+Endpoint = Callable[[Request, "Visitor"], Response]
+
+
+@dataclass(frozen=True)
+class Visitor:
+    """Who asks, by the name of the token, and what that allows; csrf: belongs into forms."""
+
+    name: str = ANYBODY
+    role: Role | None = None
+    csrf: str = ""
+
+    @property
+    def changes(self) -> bool:
+        """Whether the visitor may change things."""
+        return self.role == "change"
+
+
+@dataclass
+class Limiter:
+    """At most `most` events of one key within `span` seconds."""
+
+    most: int
+    span: float
+    _events: "OrderedDict[str, deque[float]]" = field(default_factory=OrderedDict)
+    _lock: Lock = field(default_factory=Lock)
+
+    def full(self, key: str, now: float) -> bool:
+        """Whether the key has had its share."""
+        with self._lock:
+            return len(self._recent(key, now)) >= self.most
+
+    def count(self, key: str, now: float) -> None:
+        """One more event of the key."""
+        with self._lock:
+            self._recent(key, now).append(now)
+            while len(self._events) > MOST_KEYS:
+                self._events.popitem(last=False)
+
+    def _recent(self, key: str, now: float) -> deque[float]:
+        events = self._events.setdefault(key, deque(maxlen=self.most))
+        self._events.move_to_end(key)
+        while events and events[0] < now - self.span:
+            events.popleft()
+        return events
+
+
+class Doorkeeper:
+    """Tells who asks by their token.
+
+    open_reading: whether somebody without one may read.
+    """
+
+    def __init__(self, access: Access, *, open_reading: bool) -> None:
+        self._access = access
+        self._open = open_reading
+        self.wrong = Limiter(WRONG_TRIES, WRONG_SPAN)
+        self.changes = Limiter(CHANGES, CHANGES_SPAN)
+        self._known: dict[str, tuple[float, Visitor]] = {}
+
+    def visitor(self, request: Request, *, to_change: bool) -> Visitor:
+        """Who asks; raises HTTPException where the token is none, or too many were tried."""
+        request.state.visitor = Visitor()  # until more is known, also for an error's page
+        request.state.visitor = self._visitor(request, to_change)
+        found: Visitor = request.state.visitor
+        return found
+
+    def _visitor(self, request: Request, to_change: bool) -> Visitor:
+        secret = bearer(request) or request.cookies.get(TOKEN_COOKIE, "")
+        if not secret:
+            return Visitor(role="read" if self._open else None)
+        if not to_change:
+            at, found = self._known.get(secret, (0.0, None))
+            if found is not None and time.monotonic() - at < SEEN_FOR:
+                return found
+        found = self.known(secret, address(request))
+        if found is None:
+            if bearer(request):
+                raise HTTPException(401, "This token is none, or was revoked.")
+            request.state.stale = True
+            return Visitor(role="read" if self._open else None)
+        return found
+
+    def known(self, secret: str, where: str) -> Visitor | None:
+        """The visitor of that token; None where it is none. Raises HTTPException after too many."""
+        now = time.monotonic()
+        if self.wrong.full(where, now):
+            raise HTTPException(
+                429, "Too many wrong tokens from here; wait a minute.", {"Retry-After": "60"}
+            )
+        token = self._access.of(secret) if len(secret) <= LONGEST_TOKEN else None
+        if token is None:
+            self.wrong.count(where, now)
+            return None
+        found = Visitor(token.name, token.role, csrf_of(secret))
+        if len(self._known) > MOST_KEYS:
+            self._known.clear()
+        self._known[secret] = (now, found)
+        return found
+
+
+def reading(endpoint: Endpoint) -> Handler:
+    """The endpoint for whoever may read; it runs in a thread."""
+
+    @wraps(endpoint)
+    async def guarded(request: Request) -> Response:
+        def answer() -> Response:
+            visitor = request.app.state.doorkeeper.visitor(request, to_change=False)
+            if visitor.role is None:
+                raise HTTPException(401, "Reading needs a token.")
+            return endpoint(request, visitor)
+
+        response = await run_in_threadpool(answer)
+        if getattr(request.state, "stale", False):  # a revoked token is not sent again and again
+            response.delete_cookie(TOKEN_COOKIE, path=cookie_path(request))
+        return response
+
+    return guarded
+
+
+def changing(endpoint: Endpoint) -> Handler:
+    """The endpoint for whoever may change, its form read; it runs in a thread.
+
+    A browser has to show that the form is ours: by its csrf field, and by where it comes from.
+    """
+
+    @wraps(endpoint)
+    async def guarded(request: Request) -> Response:
+        visitor = await run_in_threadpool(changer, request)
+        check_site(request)
+        form = await request.form(max_files=1, max_fields=500)
+        request.state.form = form
+        try:
+            check_csrf(request, visitor, str(form.get(CSRF_FIELD, "")))
+            return await run_in_threadpool(endpoint, request, visitor)
+        finally:
+            await form.close()
+
+    return guarded
+
+
+def changer(request: Request) -> Visitor:
+    """Who asks for a change; raises HTTPException where they may not."""
+    keeper: Doorkeeper = request.app.state.doorkeeper
+    visitor = keeper.visitor(request, to_change=True)
+    if not visitor.changes:
+        status = 403 if visitor.name else 401
+        raise HTTPException(status, "A change needs a token with the role 'change'.")
+    now = time.monotonic()
+    if keeper.changes.full(visitor.name, now):
+        raise HTTPException(429, "Too many changes; wait a minute.", {"Retry-After": "60"})
+    keeper.changes.count(visitor.name, now)
+    return visitor
+
+
+def check_site(request: Request) -> None:
+    """Raises HTTPException where a browser says that another site sends the form."""
+    site = request.headers.get("sec-fetch-site")
+    if site not in (None, "same-origin", "none"):
+        raise HTTPException(403, "This form was sent by another site.")
+
+
+def check_csrf(request: Request, visitor: Visitor, given: str) -> None:
+    """Raises HTTPException where a form of a browser is not one that we have made."""
+    if bearer(request):  # no browser sends that by itself
+        return
+    given = given or request.headers.get(CSRF_HEADER, "")
+    if not hmac.compare_digest(given.encode(), visitor.csrf.encode()):
+        raise HTTPException(403, "This form is from another session; load the page again.")
+
+
+def csrf_of(secret: str) -> str:
+    """What a form of this token's holder carries; nobody without the token can make it."""
+    return hmac.new(secret.encode(), b"csrf", hashlib.sha256).hexdigest()
+
+
+def bearer(request: Request) -> str:
+    """The token of the Authorization header, or nothing."""
+    kind, _, secret = request.headers.get("authorization", "").partition(" ")
+    return secret.strip() if kind.lower() == "bearer" else ""
+
+
+def address(request: Request) -> str:
+    """Where a request comes from."""
+    return request.client.host if request.client else ""
+
+
+def cookie_path(request: Request) -> str:
+    """Below which the browser sends the cookie."""
+    return f"{request.app.state.settings.prefix}/"
+
+
+def form_of(request: Request) -> Any:
+    """The form that `changing` has read."""
+    return request.state.form

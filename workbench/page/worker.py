@@ -1,0 +1,148 @@
+"""A worker of the page: takes the next task, does it, and stops where it is cancelled.
+
+It may be killed at any moment: its lease ends, and another begins the task anew.
+"""
+
+import os
+import secrets
+import signal
+import socket
+import threading
+import time
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from datetime import UTC, datetime, timedelta
+from types import FrameType
+
+from identification.errors import UserError
+from workbench.jobs.lease import Patience
+from workbench.jobs.passes import Report
+from workbench.page.dropped import card_of, log_of, results_of, without_path
+from workbench.page.settings import PageSettings
+from workbench.page.task_work import Work, course_of, done
+from workbench.registry.bench import Bench, EndState, WorkClaim
+from workbench.registry.errors import LostClaim, RegistryAway
+from workbench.registry.store import Registry
+
+TASK_LEASE = timedelta(seconds=30)
+QUEUE_LOOK = 0.5  # s between two looks at the queue, and at whether the task is still ours
+STUBBORN = 10.0  # s after which a computation that does not end is ended with its process
+STUBBORN_STATUS = 75
+
+
+@dataclass
+class _Progress:
+    """How far the task in hand is, and what goes on."""
+
+    share: float = 0.0
+    stage: str = ""
+
+
+class NotOurs(BaseException):
+    """The task in hand was cancelled, or another has taken it over."""
+
+
+def run_worker(settings: PageSettings, report: Report, *, once: bool = False) -> None:
+    """Do tasks until SIGTERM or Ctrl-C, which give the one in hand back; once: until none waits.
+
+    Runs in the main thread, as its task is ended by a signal.
+    """
+    owner = f"{socket.gethostname()}:{os.getpid()}:{secrets.token_hex(2)}"
+    signal.signal(signal.SIGUSR1, _raise)  # which only a beat sends
+    patience = Patience()
+    with patience(Registry, settings.where) as registry:
+        bench = Bench(registry.database)
+        report("worker_ready", owner=owner)
+        while True:
+            try:
+                claim = bench.claim(owner, lease=TASK_LEASE, now=_now())
+            except RegistryAway as error:
+                report("registry_away", reason=str(error))
+                time.sleep(10 * QUEUE_LOOK)
+                continue
+            if claim is not None:
+                _one(bench, claim, settings, report)
+            elif once:
+                return
+            else:
+                time.sleep(QUEUE_LOOK)
+
+
+def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report) -> None:
+    """Do one task; its end is written, unless it is no longer ours."""
+    task = claim.task
+    report("task_begun", task=task.id, kind=task.kind, upload=task.upload)
+    try:
+        state, said = _made(bench, claim, settings, report)
+        Patience()(bench.finish, claim, state, said, now=_now())
+        report("task_over", task=task.id, state=state, said=said)
+    except (NotOurs, LostClaim):
+        report("task_lost", task=task.id)
+    except BaseException:  # told to end: another begins it anew
+        bench.give_back(claim)
+        raise
+
+
+def _made(
+    bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report
+) -> tuple[EndState, str]:
+    """What came of the task: its last state, and a line."""
+    task, root = claim.task, settings.root
+    try:
+        log, card = log_of(root, task.upload), card_of(root, task.upload)
+        out = results_of(root, task.upload, task.id)
+        with _beating(bench, claim) as (advance, told):
+            return "done", done(
+                Work(task.kind, log, card, out), course_of(task.kind, advance, told)
+            )
+    except UserError as error:
+        return "failed", without_path(str(error), [log, card])
+    except (OSError, MemoryError) as error:
+        return "failed", f"{type(error).__name__}: {getattr(error, 'strerror', None) or error}"
+    except Exception as error:  # a fault of ours in one task must not stop the others
+        report("fault_of_ours", task=task.id, traceback=traceback.format_exc())
+        return "failed", f"fault of ours: {type(error).__name__}: {error}"
+
+
+@contextmanager
+def _beating(
+    bench: Bench, claim: WorkClaim
+) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
+    """Within the block the task's progress is written, and NotOurs raised once it is not ours."""
+    over, state = threading.Event(), _Progress()
+
+    def advance(step: float) -> None:
+        state.share = min(state.share + step, 1.0)
+
+    def told(words: str) -> None:
+        state.stage = words
+
+    def beat() -> None:
+        while not over.wait(QUEUE_LOOK):
+            try:
+                bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=_now())
+            except RegistryAway:
+                continue  # the next one comes before the lease ends, or the claim is lost
+            except LostClaim:
+                os.kill(os.getpid(), signal.SIGUSR1)
+                if not over.wait(STUBBORN):
+                    os._exit(STUBBORN_STATUS)
+                return
+
+    thread = threading.Thread(target=beat, name="beat", daemon=True)
+    thread.start()
+    try:
+        yield advance, told
+    finally:
+        over.set()
+        thread.join()
+
+
+def _raise(_number: int, _frame: FrameType | None) -> None:
+    raise NotOurs
+
+
+def _now() -> datetime:
+    return datetime.now(UTC)

@@ -1,0 +1,136 @@
+"""Tokens that let somebody read or change through the page, and the audit of what they did."""
+
+import hashlib
+import re
+import secrets
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+from sqlalchemy import select
+from sqlalchemy.orm import Session
+
+from workbench.registry.database import Database
+from workbench.registry.errors import BadRegistry
+from workbench.registry.page_tables import AccessTokenEndRow, AccessTokenRow, AuditRow
+from workbench.registry.rows import storable_text
+
+Role = Literal["read", "change"]
+TOKEN_PREFIX = "wb_"  # by which a token is known as one where it should not be
+RANDOM_BYTES = 32
+_PERSON = re.compile(r"[\w.@+-]{1,64}")
+
+
+@dataclass(frozen=True)
+class AccessToken:
+    """A token as the registry knows it; ended: when it was revoked."""
+
+    name: str
+    role: Role
+    made_by: str
+    at: datetime
+    ended: datetime | None
+
+
+@dataclass(frozen=True)
+class Audited:
+    """A change: who made it, of which kind, to what."""
+
+    at: datetime
+    made_by: str
+    kind: str
+    subject: str
+    detail: str
+
+
+class Access:
+    """The tokens of a registry."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+
+    def add(self, name: str, role: Role, *, by: str, now: datetime) -> str:
+        """A new token, which is told this once; the registry keeps its hash.
+
+        Raises BadRegistry where the name is taken or none.
+        """
+        if not _PERSON.fullmatch(name):
+            raise BadRegistry(
+                f"token {name!r}: letters, digits and . _ @ + - needed, at most 64, as anna"
+            )
+        secret = TOKEN_PREFIX + secrets.token_urlsafe(RANDOM_BYTES)
+        with self._database.writing() as session:
+            if session.scalar(select(AccessTokenRow.id).where(AccessTokenRow.name == name)):
+                raise BadRegistry(
+                    f"token {name!r}: is there already, in force or revoked; give another name"
+                )
+            row = AccessTokenRow(name=name, role=role, sha256=hashed(secret), made_by=by, at=now)
+            session.add(row)
+            note(session, "token_added", name, role, by=by, now=now)
+        return secret
+
+    def revoke(self, name: str, *, by: str, now: datetime) -> None:
+        """From now on the token is not taken; raises BadRegistry where there is no such."""
+        with self._database.writing() as session:
+            row = session.scalar(select(AccessTokenRow).where(AccessTokenRow.name == name))
+            if row is None or session.get(AccessTokenEndRow, row.id) is not None:
+                raise BadRegistry(f"token {name!r}: there is none; 'workbench token list' has them")
+            session.add(AccessTokenEndRow(token_id=row.id, made_by=by, at=now))
+            note(session, "token_revoked", name, row.role, by=by, now=now)
+
+    def tokens(self) -> tuple[AccessToken, ...]:
+        """Every token by name."""
+        query = (
+            select(AccessTokenRow, AccessTokenEndRow.at)
+            .outerjoin(AccessTokenEndRow, AccessTokenEndRow.token_id == AccessTokenRow.id)
+            .order_by(AccessTokenRow.name)
+        )
+        with self._database.reading() as session:
+            return tuple(_token(row, ended) for row, ended in session.execute(query))
+
+    def of(self, secret: str) -> AccessToken | None:
+        """The token of that secret; None where there is none, or it was revoked."""
+        query = (
+            select(AccessTokenRow, AccessTokenEndRow.at)
+            .outerjoin(AccessTokenEndRow, AccessTokenEndRow.token_id == AccessTokenRow.id)
+            .where(AccessTokenRow.sha256 == hashed(secret))
+        )
+        with self._database.reading() as session:
+            found = session.execute(query.where(AccessTokenEndRow.token_id.is_(None))).first()
+            return None if found is None else _token(found[0], None)
+
+    def audited(self, subject: str | None = None, *, last: int = 200) -> Sequence[Audited]:
+        """The last changes, of one subject or all; the newest first."""
+        query = select(AuditRow).order_by(AuditRow.id.desc()).limit(last)
+        if subject is not None:
+            query = query.where(AuditRow.subject == subject)
+        with self._database.reading() as session:
+            return [
+                Audited(row.at, row.made_by, row.kind, row.subject, row.detail)
+                for row in session.scalars(query)
+            ]
+
+
+def hashed(secret: str) -> str:
+    """What the registry keeps of a token: with 256 random bits in it, a plain hash is enough."""
+    return hashlib.sha256(secret.encode("utf-8", "surrogateescape")).hexdigest()
+
+
+def note(session: Session, kind: str, subject: str, detail: str, *, by: str, now: datetime) -> None:
+    """Write a change into the audit, within the transaction that makes it."""
+    texts = {"kind": kind, "subject": storable_text(subject), "detail": storable_text(detail)}
+    session.add(AuditRow(at=now, made_by=by, **texts))
+
+
+def audit(
+    database: Database, kind: str, subject: str, detail: str, *, by: str, now: datetime
+) -> None:
+    """Write a change of files, which no transaction holds, into the audit."""
+    with database.writing() as session:
+        note(session, kind, subject, detail, by=by, now=now)
+
+
+def _token(row: AccessTokenRow, ended: datetime | None) -> AccessToken:
+    role: Role = "change" if row.role == "change" else "read"
+    return AccessToken(row.name, role, row.made_by, row.at, ended)

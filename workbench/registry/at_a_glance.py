@@ -1,0 +1,72 @@
+"""What one result says of its machine at a glance: a state, and the parameter that moved most."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+MachineCondition = Literal[
+    "in_tune", "drifting", "structure", "log_bad", "not_judged", "no_log", "silent"
+]
+Trend = dict[str, list[float]]
+TREND_LOGS = 32  # logs that a trend goes back
+INTERVAL_DEVIATIONS = 1.96  # to each side, of 95 %
+_BY_VERDICT: Mapping[str, MachineCondition] = {
+    "none": "in_tune",
+    "promoted": "in_tune",
+    "structure": "structure",
+    "set_aside": "log_bad",
+}
+
+
+def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
+    """The machine's state after a log of that verdict ("refused": what was found stays so)."""
+    if verdict == "refused":
+        found = _drift(evidence).get("verdict")
+        return {"drift": "drifting", "structure": "structure"}.get(found, "not_judged")  # type: ignore[return-value, arg-type]
+    return _BY_VERDICT.get(verdict, "not_judged")
+
+
+def glance(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
+    """The parameter that moved most, with its relative change; None where the log told none.
+
+    That is the one whose change is largest beyond its own 95 % interval; where all lie within
+    theirs, the one nearest to its edge.
+    """
+    found = [one for one in _parameters(evidence) if one.get("change") is not None]
+    if not found:
+        return None, None
+
+    def most(one: Mapping[str, Any]) -> tuple[float, float]:
+        change, sd = abs(float(one["change"])), float(one.get("sd") or 0.0)
+        return max(0.0, change - INTERVAL_DEVIATIONS * sd), change / sd if sd > 0.0 else 0.0
+
+    largest = max(found, key=most)
+    return str(largest["name"]), float(largest["change"])
+
+
+def with_log(trend: Mapping[str, Sequence[float]], evidence: Mapping[str, Any]) -> Trend:
+    """The trend with what a log told of each parameter at its end."""
+    out = {name: list(values) for name, values in trend.items()}
+    for one in _parameters(evidence):
+        if one.get("after") is not None:
+            told = out.setdefault(str(one["name"]), [])
+            told.append(float(f"{float(one['after']):.6g}"))
+            del told[:-TREND_LOGS]
+    return out
+
+
+def _drift(evidence: Mapping[str, Any]) -> Mapping[str, Any]:
+    found = evidence.get("drift")
+    return found if isinstance(found, Mapping) else {}
+
+
+def _parameters(evidence: Mapping[str, Any]) -> list[Mapping[str, Any]]:
+    """What the drift test told of each parameter; of older results only of those that moved."""
+    drift = _drift(evidence)
+    found = drift.get("parameters")
+    if found:
+        return list(found)
+    return [
+        {**one, "change": (one["after"] - one["before"]) / abs(one["before"])}
+        for one in drift.get("moved", ())
+        if one.get("before")
+    ]
