@@ -18,7 +18,7 @@ from workbench.cards.recipe import Recipe
 from workbench.steps.closed_loop import DrivenLoop, servo_run
 from workbench.steps.present import present
 
-EVEN = 1e-6  # of a sample, by which clocks may differ
+CLOCKS_ALIKE = 1e-6  # of a sample, by which clocks may differ
 
 
 def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
@@ -53,7 +53,7 @@ def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
             ' give it output = "force" and a force loop'
         )
     samples = recipe.h / loop.h
-    if round(samples) < 1 or abs(samples - round(samples)) > EVEN * samples:
+    if round(samples) < 1 or abs(samples - round(samples)) > CLOCKS_ALIKE * samples:
         raise BadCard(
             f"controller: it runs every {loop.h:g} s, which must divide h_s = {recipe.h:g} s of the"
             " recipe's log"
