@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from workbench.course import Course, watched
+from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, Finite, effects_option, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
@@ -14,7 +15,9 @@ SEARCH_SECONDS = 30.0
 
 
 @click.command(
-    epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20"
+    cls=StatusCommand,
+    refusal="a simulated machine, drawn from what is not sure of the model, exceeds a limit",
+    epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20",
 )
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
 @click.option(
@@ -73,13 +76,13 @@ def command(
     """Find the run to make next: the reference, within the machine's limits, that tells most.
 
     Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
-    report.html. The run begins with the machine at rest at the first r. Exit status 1: a simulated
-    machine, drawn from what is not sure of the model, exceeds a limit.
+    report.html. The run begins with the machine at rest at the first r.
     """
     from workbench.cards.own_effects import library
     from workbench.documents.design import read_design
     from workbench.documents.model import read_model
     from workbench.report.experiment import experiment_report, experiment_view, reference_text
+    from workbench.report.next_steps import after_experiment
     from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment
     from workbench.steps.experiment.planned import Wanted, experiment_document
     from workbench.steps.experiment.rivals import read_rivals
@@ -104,5 +107,6 @@ def command(
         {**document, "out": folder.final},
         as_json,
         lambda: experiment_view(found, folder.final),
+        then := after_experiment(found, model_file, design_file),
     )
-    return 1 if found.safety.exceeding else 0
+    return 0 if then is None else 1

@@ -5,12 +5,17 @@ from pathlib import Path
 
 import click
 
+from workbench.ending import StatusCommand
 from workbench.options import Finite
 
 MEGA = 1e6
 
 
-@click.command(epilog="Example: workbench serve --registry fleet.db --machines machines")
+@click.command(
+    cls=StatusCommand,
+    done="stopped",
+    epilog="Example: workbench serve --registry fleet.db --machines machines",
+)
 @click.option(
     "--registry",
     "where",
@@ -79,6 +84,7 @@ MEGA = 1e6
     metavar="N",
     help="Processes that identify and trace; more by 'workbench work'.",
 )
+@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
 def command(
     where: str | None,
@@ -93,6 +99,7 @@ def command(
     most_megabytes: float,
     servers: int,
     workers: int,
+    as_json: bool,
 ) -> int:
     """Serve the page: the fleet, each machine, and a place to drop a log.
 

@@ -7,17 +7,19 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench.commands.registry import registry_options
+from workbench.ending import StatusGroup
 from workbench.output import emit
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
 
 
-@click.group(epilog="Example: workbench token add anna --role change")
+@click.group(cls=StatusGroup, epilog="Example: workbench token add anna --role change")
 def command() -> None:
     """Tokens of the page: whoever has one reads, or changes, under its name.
 
-    The registry keeps a hash of each; a token is shown once, when it is made.
+    The registry keeps a hash of each; a token is shown once, when it is made. Every subcommand
+    takes --registry FILE|URL and --json.
     """
 
 

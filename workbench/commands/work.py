@@ -5,9 +5,13 @@ from pathlib import Path
 
 import click
 
+from workbench.ending import StatusCommand
+
 
 @click.command(
-    epilog="Example: workbench work --registry postgresql://... --machines /srv/machines"
+    cls=StatusCommand,
+    done="stopped, or, with --once, no task waits",
+    epilog="Example: workbench work --registry postgresql://... --machines /srv/machines",
 )
 @click.option(
     "--registry",
@@ -24,8 +28,9 @@ import click
     help="Folder of the machines, as of 'serve'.",
 )
 @click.option("--once", is_flag=True, help="End when no task waits.")
+@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
-def command(where: str | None, machines: Path, once: bool) -> None:
+def command(where: str | None, machines: Path, once: bool, as_json: bool) -> None:
     """Identify and trace the logs that were dropped on the page, one after the other.
 
     Any number may run, on any machine that sees the registry and the folder. Ends on Ctrl-C or

@@ -49,8 +49,8 @@ def chart_figure(chart: Chart) -> "Figure":
         for axes, panel in zip(every, chart.panels, strict=False):
             _panel(axes, panel)
         for axes in every[len(chart.panels) :]:
-            axes.set_visible(False)
-        _legend(drawn, every.tolist())
+            axes.remove()
+        _legend(drawn, every.tolist()[: len(chart.panels)])
     return drawn
 
 
