@@ -67,8 +67,9 @@ def check_chain(workbench: Path, into: Path) -> None:
     found = json.loads((model / "model.json").read_text(encoding="utf-8"))
     if found["friction"]["m"]["value"] is None:
         sys.exit(f"wheel check: identify {RECIPE} finds no mass: {found['friction']['m']}")
-    if "<svg" not in (model / "report.html").read_text(encoding="utf-8"):
-        sys.exit("wheel check: report.html holds no figure")
+    report = (model / "report.html").read_text(encoding="utf-8")
+    if '<figure class="chart"' not in report or "uPlot" not in report:
+        sys.exit("wheel check: report.html holds no chart, or not what draws it")
 
 
 def need(*files: Path) -> None:
