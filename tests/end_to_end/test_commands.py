@@ -15,7 +15,14 @@ from workbench.steps import demo as demonstration
 from workbench.steps.loop_figures import Limits
 from workbench.steps.validate import validate
 
-WITHOUT_FILES = ("reidentify", "watch", "effects")  # they write to the registry, or nothing
+WITHOUT_FILES = (
+    "reidentify",
+    "watch",
+    "effects",
+    "serve",
+    "work",
+    "token",
+)  # they write to the registry, or nothing
 
 
 @pytest.fixture(scope="module")
