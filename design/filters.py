@@ -16,6 +16,7 @@ from identification.errors import BadSpecification
 from identification.signals.clean import RIG_A, RIG_C, Filter, fir_lowpass
 
 N_D = 5  # positions of the slope (5)
+SHORTEST_SLOPE = 2
 CUTOFF, RIG_CUTOFF = 5.0, 10.0  # Hz
 RIG_PERIOD = 10e-3  # s
 PASS = Filter((1.0,))
@@ -53,10 +54,20 @@ def filters_at(h: float) -> CompensatorFilters:
 
     At 10 ms they are the paper's 0.5/(1 - 0.5 z^-1) and 0.2/(1 - 0.8 z^-1).
     """
-    if not h > 0:
-        raise BadSpecification(f"sampling period {h:g} s, must be > 0")
-    first, last = (_first_order((-one.a[1]) ** (h / RIG_PERIOD)) for one in (RIG_A, RIG_C))
-    return CompensatorFilters(first, first, last)
+    return scaled_filters(h, 1.0)
+
+
+def scaled_filters(h: float, times: float) -> CompensatorFilters:
+    """`filters_at` with time constants and the slope's length `times` theirs.
+
+    Raises BadSpecification where h [s] or `times` is not positive.
+    """
+    if not (h > 0 and times > 0):
+        raise BadSpecification(f"sampling period {h:g} s, filters times {times:g}; need both > 0")
+    first, last = (
+        _first_order((-one.a[1]) ** (h / (times * RIG_PERIOD))) for one in (RIG_A, RIG_C)
+    )
+    return CompensatorFilters(first, first, last, max(round(times * N_D), SHORTEST_SLOPE))
 
 
 def _first_order(pole: float) -> Filter:

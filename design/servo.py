@@ -27,7 +27,7 @@ from design.servo_kernels import (
     Memory,
     friction_force,
 )
-from design.servo_loop import SERVO_ROWS, servo_kernel
+from design.servo_loop import SERVO_ROWS, plain_servo_kernel, servo_kernel
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.plant import Motor, Plant
@@ -158,11 +158,15 @@ def simulate_servo(
     shake = servo.dither.signal(t) if servo.dither else np.zeros(n)
     out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
     y_noise, f_noise = (np.ascontiguousarray(one[:, 0]) for one in (loop.noise.y, loop.noise.F))
-    servo_kernel(
-        p, h, pieces(table, h), codes, table.addresses, table.p, base, gain,
-        np.zeros(n + math.ceil(late) + 1), late, law, memory, loop.reference, shake,
-        y_noise, f_noise, loop.start, out, modes,
-    )  # fmt: skip
+    around = (law, memory, loop.reference, shake, y_noise, f_noise, loop.start, out, modes)
+    if plant.effects:
+        history = np.zeros(n + math.ceil(late) + 1)
+        servo_kernel(
+            p, h, pieces(table, h), codes, table.addresses, table.p, base, gain, history, late,
+            *around,
+        )  # fmt: skip
+    else:
+        plain_servo_kernel(p, h, *around)
     y, v, F, u, measured, *inside = out
     if not np.all(np.isfinite(y)):
         raise BadModel(

@@ -9,9 +9,11 @@ then chooses T.
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
+from design.drawn_loops import DrawnPlants, loop_margins
 from design.margins import Margins, margins
 from design.pid import PID, design_pid, pid_gains
 from design.polynomial import ComplexArray, frequency_and_damping, roots, trim
@@ -38,6 +40,8 @@ DAMPED, LEAST_DAMPED = 0.5, 0.3  # damping from which it may; the second beside 
 LAGGARD = 0.5  # decay of the slowest pole, in units of the dominant ones', below which they are not
 SLOWEST_ZERO = 0.9995  # a plant zero nearer to 1 would never decay
 SAME_AS_ZERO = 1e-4  # between a pole and the zero it was placed on
+SURELY = 0.97  # of a goal, below which a quick look at the margins settles that it is missed
+NEAREST = 12  # loops that miss a goal, of which the margins are known where none keeps all
 USUAL_DEMAND = Demand()
 
 
@@ -88,6 +92,8 @@ class Tuned(Placed):
     followed: Followed
 
 
+# The least modulus margin inside the parameters' intervals, and the goals that are missed there.
+Inside = Callable[[RST], tuple[float | None, tuple[str, ...]]]
 Design = Callable[[tuple[float, float], tuple[complex, ...]], tuple[RST, PID | None]]
 
 
@@ -99,11 +105,13 @@ def tune_rst(
     goals: Goals,
     corners: Plants = (),
     demand: Demand = USUAL_DEMAND,
+    drawn: DrawnPlants | None = None,
 ) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
-    corners: other plants (A, B) on which the modulus margin must hold too. R holds 1 + z^-1, so
-    that noise at half the sampling rate does not reach the force. T: see `design.tracking`.
+    corners: other plants (A, B) on which the modulus margin must hold too; drawn: where given, the
+    goals must hold on so many of these instead. R holds 1 + z^-1, so that noise at half the
+    sampling rate does not reach the force. T: see `design.tracking`.
     Raises BadSpecification with the first reason where no poles of the search give a stable loop.
     """
     A, B = normalised_plant(A, B)
@@ -118,11 +126,12 @@ def tune_rst(
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))
     plants = ((A, B), *corners)
-    found = _best(plants, h, asked, goals, design, others)
+    holds = _inside(plants, goals, drawn)
+    found = _best(plants, h, asked, goals, design, others, holds)
     slow = _slow_zeros(B)[:free]
     if found.missed and slow and asked.auxiliary is None:
         beside = _auxiliary(A, h, free, slow)
-        again = _best(plants, h, asked, goals, design, beside, slow)
+        again = _best(plants, h, asked, goals, design, beside, holds, slow)
         found = found if again.missed else again
     moving = [z for z in found.auxiliary if z not in slow]  # y/r has no pole at a plant zero
     poles = np.append(np.array(moving, dtype=np.complex128), pole_pair(*found.dominant, h))
@@ -138,6 +147,7 @@ def tune_pid(
     goals: Goals,
     corners: Plants = (),
     demand: Demand = USUAL_DEMAND,
+    drawn: DrawnPlants | None = None,
 ) -> Tuned:
     """The fastest digital PID within the goals, or the one asked for; see `tune_rst`.
 
@@ -154,7 +164,7 @@ def tune_pid(
 
     others = _auxiliary(A, h, min(A.size - 1, 2))
     plants = ((A, B), *corners)
-    found = _best(plants, h, asked, goals, design, others)
+    found = _best(plants, h, asked, goals, design, others, _inside(plants, goals, drawn))
     if found.pid is not None and found.pid.gains is not None:
         candidates = pid_candidates(found.pid.gains, h)
     else:
@@ -230,31 +240,37 @@ def _best(
     goals: Goals,
     design: Design,
     auxiliary: Callable[[float], tuple[complex, ...]],
+    inside: Inside,
     slow: tuple[complex, ...] = (),
 ) -> Placed:
     """The fastest that keeps every goal, or what comes nearest; slow: poles left where they are."""
-    A, B = plants[0]
     refusal: BadSpecification | None = None
     found: list[Placed] = []
+    hopeless: list[tuple[float, Callable[[], Placed]]] = []
     for dominant, candidates in _grid(h, asked, goals.fastest, auxiliary):
         for others in candidates:
             try:
                 controller, pid = design(dominant, others)
-                margin = margins(A, B, controller)
+                judge: Callable[[], Placed] = partial(
+                    _judged, plants, goals, controller, pid, (dominant, others),
+                    slow, inside,
+                    search=asked.auxiliary is None,
+                )  # fmt: skip
+                modulus, far_off = _quick_look(plants[0], controller, goals)
+                if far_off:
+                    hopeless.append((modulus, judge))
+                else:
+                    found.append(judge())
             except BadSpecification as error:
                 refusal = refusal or error
-                continue
-            missed = goals_missed(margin, goals, integrates(A, controller))
-            if asked.auxiliary is None:
-                missed = (*missed, *_laggards(margin, dominant, slow))
-            worst = margin.modulus if missed else worst_modulus(plants, controller)
-            missed = missed or _worst_missed(worst, goals)
-            if not controller.stable:
-                missed = (*missed, "the controller itself has a pole outside the unit circle")
-            found.append(Placed(controller, margin, worst, dominant, others, missed, pid))
         kept = [one for one in found if not one.missed]
         if kept:
             return max(kept, key=lambda one: one.worst or 0.0)
+    for _, judge in sorted(hopeless, key=lambda one: -one[0])[:NEAREST]:
+        try:
+            found.append(judge())
+        except BadSpecification as error:
+            refusal = refusal or error
     if not found:
         raise refusal or BadSpecification("no poles to try; give --poles w_n,zeta")
     # None keeps every goal: the one nearest to it on all plants.
@@ -262,12 +278,59 @@ def _best(
     return replace(taken, worst=worst_modulus(plants, taken.rst))
 
 
+def _quick_look(plant: tuple[Array, Array], controller: RST, goals: Goals) -> tuple[float, bool]:
+    """A loop's modulus margin, and whether it misses a goal by too much to look any closer."""
+    A, B = plant
+    quick = loop_margins(A[np.newaxis], B[np.newaxis], controller)
+    effort = np.inf if goals.effort is None else 10.0 ** (goals.effort / 20.0)
+    modulus = float(quick.modulus[0])
+    return modulus, bool(
+        modulus < SURELY * goals.modulus
+        or quick.delay[0] < SURELY * goals.delay
+        or SURELY * quick.effort[0] > effort
+    )
+
+
+def _judged(
+    plants: Plants, goals: Goals, controller: RST, pid: PID | None,
+    poles: tuple[tuple[float, float], tuple[complex, ...]], slow: tuple[complex, ...],
+    inside: Inside, *, search: bool,
+) -> Placed:  # fmt: skip
+    """A placed controller with its margins and what it misses.
+
+    Raises BadSpecification where it has no margins.
+    """
+    A, B = plants[0]
+    margin = margins(A, B, controller)
+    missed = goals_missed(margin, goals, integrates(A, controller))
+    if search:
+        missed = (*missed, *_laggards(margin, poles[0], slow))
+    worst: float | None = margin.modulus
+    if not missed:
+        worst, missed = inside(controller)
+    if not controller.stable:
+        missed = (*missed, "the controller itself has a pole outside the unit circle")
+    return Placed(controller, margin, worst, *poles, missed, pid)
+
+
 def worst_modulus(plants: Plants, controller: RST) -> float | None:
     """Least modulus margin over the plants; None where one of the loops is unstable."""
-    try:
-        return min(margins(A, B, controller).modulus for A, B in plants)
-    except BadSpecification:
-        return None
+    every = DrawnPlants.of([(A / A[0], B / A[0]) for A, B in plants], 0.5)
+    least = float(np.min(loop_margins(every.A, every.B, controller).modulus))
+    return least if least > 0.0 else None
+
+
+def _inside(plants: Plants, goals: Goals, drawn: DrawnPlants | None) -> Inside:
+    """What a controller misses on plants other than the first: on any of the corners, or on too
+    many of those drawn."""
+
+    def of(controller: RST) -> tuple[float | None, tuple[str, ...]]:
+        if drawn is not None and (missed := drawn.missed(controller, goals)):
+            return None, missed
+        worst = worst_modulus(plants, controller)
+        return worst, () if drawn is not None else _worst_missed(worst, goals)
+
+    return of
 
 
 def _worst_missed(worst: float | None, goals: Goals) -> tuple[str, ...]:

@@ -66,6 +66,23 @@ def present_card_option(command: Command) -> Command:
     )(command)
 
 
+def motion_limits(command: Command) -> Command:
+    """What a loop's motion must keep: `standstill`, `tracking`, `overshoot`, `force`."""
+    options = (
+        ("--standstill", 0.05, "Largest error at standstill, relative to the step."),
+        ("--tracking", 0.15, "Largest rms error along the smooth reference, relative to its"
+         " amplitude."),
+        ("--overshoot", 0.1, "Largest overshoot, relative to the step."),
+        ("--force", 1.2, "Largest force, relative to the largest in the logs of the machine's"
+         " model."),
+    )  # fmt: skip
+    for name, usual, said in reversed(options):
+        command = click.option(name, type=POSITIVE, default=usual, show_default=True, help=said)(
+            command
+        )
+    return command
+
+
 def effects_option(command: Command) -> Command:
     """The option `--effects`, folders of effects of the user's own, as `effects`: see
     `workbench.cards.own_effects`."""

@@ -1,14 +1,28 @@
 """`workbench design`: a model -> design.json and report.html."""
 
+import time
 from datetime import datetime
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
+from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
-from workbench.options import POSITIVE, effects_option, present_card_option
+from workbench.options import (
+    POSITIVE,
+    Finite,
+    effects_option,
+    motion_limits,
+    present_card_option,
+)
 from workbench.output import OutputFolder, emit, output_options, progress
+
+if TYPE_CHECKING:
+    from design.tune import Asked
+    from workbench.documents.design import From
+    from workbench.documents.model import Model
+    from workbench.steps.robust.robust import RobustAsked
 
 
 @click.command(
@@ -39,6 +53,32 @@ from workbench.output import OutputFolder, emit, output_options, progress
 @click.option(
     "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
 )
+@click.option(
+    "--robust", is_flag=True,
+    help="Choose by the loops of machines drawn from what the model is not sure of.",
+)  # fmt: skip
+@click.option(
+    "--draws", type=click.IntRange(20, 10_000), default=200, show_default=True,
+    help="Machines drawn, with --robust.",
+)  # fmt: skip
+@click.option(
+    "--probability", type=Finite(0.5, 1.0, max_open=True), default=0.95, show_default=True,
+    help="Share of the machines on which each limit has to hold, with --robust.",
+)  # fmt: skip
+@click.option(
+    "--staircase", type=POSITIVE, metavar="M",
+    help="Largest staircase on a slow ramp [m, rad], with --robust.  [default: any]",
+)  # fmt: skip
+@motion_limits
+@click.option(
+    "--machine", metavar="NAME",
+    help="Machine in the registry by whose drift so far the machines differ, with --robust.",
+)  # fmt: skip
+@click.option(
+    "--registry", "where", metavar="FILE|URL",
+    help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
+)  # fmt: skip
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @present_card_option
 @effects_option
 @output_options
@@ -51,6 +91,17 @@ def command(
     design_period: float | None,
     modulus: float,
     delay: float,
+    robust: bool,
+    draws: int,
+    probability: float,
+    staircase: float | None,
+    standstill: float,
+    tracking: float,
+    overshoot: float,
+    force: float,
+    machine: str | None,
+    where: str | None,
+    seed: int,
     card: str | None,
     effects: tuple[Path, ...],
     as_json: bool,
@@ -60,6 +111,9 @@ def command(
 
     Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
     keeps the margins.
+
+    With --robust: the poles, the integrator and the compensator that do best over the machines that
+    the model's errors (and the machine's drift so far) allow; robust.json holds what that promises.
     """
     from design.tune import Asked, Goals
     from workbench.cards.own_effects import library
@@ -71,11 +125,20 @@ def command(
     from workbench.report.reports import design_report
     from workbench.steps.design import design, effort_limit
     from workbench.steps.present import with_card
+    from workbench.steps.robust.robust import RobustAsked
 
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     goals = Goals(modulus, delay, effort_limit(model))
     kept = _kept(integrator, source, design_period, card, effects)
+    if robust:
+        from workbench.steps.loop_figures import Limits
+
+        limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
+        seen = _drift(where, machine) if machine else None
+        wanted = RobustAsked(draws, probability, limits, staircase, seen, seed)
+        return _robust(model, model_file, wanted, asked, (source, design_period), as_json, out)
+    _only_robust(staircase=staircase, machine=machine)
     with (
         refused_with(without_design(model, card)),
         OutputFolder("design", out, now=datetime.now()) as folder,
@@ -92,6 +155,63 @@ def command(
         after_design(found, model_file, poles is not None, kept),
     )
     return 1 if found.recommended == "none" else 0
+
+
+def _only_robust(**given: object) -> None:
+    """Raises a usage error where an option is given that has no meaning without --robust."""
+    for name, value in given.items():
+        if value is not None:
+            raise click.UsageError(f"--{name} has no meaning without --robust; add it.")
+
+
+def _robust(
+    model: "Model", model_file: Path, wanted: "RobustAsked", asked: "Asked",
+    plant: "tuple[From | None, float | None]", as_json: bool, out: Path | None,
+) -> int:  # fmt: skip
+    from workbench.documents.design import design_document
+    from workbench.report.next_steps import after_robust, without_design
+    from workbench.report.robust import robust_report, robust_view
+    from workbench.steps.robust.document import robust_document
+    from workbench.steps.robust.robust import ROBUST_STAGES, robust_design
+
+    with (
+        refused_with(without_design(model, None)),
+        OutputFolder("design", out, now=datetime.now()) as folder,
+    ):
+        with progress("robust design", 1.0, as_json=as_json) as bar:
+            course = Course(bar, ROBUST_STAGES, time.monotonic, told=bar.told)
+            with watched(course):
+                found = robust_design(model, wanted, asked, where=plant, report=course.report)
+        design, document = design_document(found.design), robust_document(found)
+        folder.write_json("design.json", design)
+        folder.write_json("robust.json", document)
+        folder.write_text("report.html", robust_report(found, model.rotary))
+    emit(
+        {**document, "design": design, "out": folder.final},
+        as_json,
+        lambda: robust_view(found, folder.final, model.rotary),
+        after_robust(found, model_file),
+    )
+    return 0 if found.passed else 1
+
+
+def _drift(where: str | None, machine: str) -> dict[str, float]:
+    """By how much the machine's parameters have changed between its models in force."""
+    from identification.model.estimates import Estimate
+    from workbench.registry.database import location
+    from workbench.registry.store import MOVES, Registry
+    from workbench.steps.robust.machines import drift_seen
+
+    with Registry(location(where), create=False) as store:
+        numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]
+        models = [store.document(store.version(machine, n), "model") for n in numbers]
+    return drift_seen(
+        [
+            {name: Estimate(one.get("value"), one["unit"], one.get("sd"))
+             for name, one in model["friction"].items()}
+            for model in models
+        ]
+    )  # fmt: skip
 
 
 def _kept(

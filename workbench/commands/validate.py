@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import POSITIVE, effects_option, present_card_option
+from workbench.options import POSITIVE, effects_option, motion_limits, present_card_option
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -30,22 +30,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
 @click.option(
     "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
 )
-@click.option(
-    "--standstill", type=POSITIVE, default=0.05, show_default=True,
-    help="Largest error at standstill, relative to the step.",
-)  # fmt: skip
-@click.option(
-    "--tracking", type=POSITIVE, default=0.15, show_default=True,
-    help="Largest rms error along the smooth reference, relative to its amplitude.",
-)  # fmt: skip
-@click.option(
-    "--overshoot", type=POSITIVE, default=0.1, show_default=True,
-    help="Largest overshoot, relative to the step.",
-)  # fmt: skip
-@click.option(
-    "--force", type=POSITIVE, default=1.2, show_default=True,
-    help="Largest force, relative to the largest in the logs of the machine's model.",
-)  # fmt: skip
+@motion_limits
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @present_card_option
 @effects_option

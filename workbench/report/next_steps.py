@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from workbench.steps.drift import Drifted
     from workbench.steps.experiment.planned import Experiment
     from workbench.steps.loop_figures import Limits, LoopFigures
+    from workbench.steps.robust.robust import Robust
     from workbench.steps.validate import Validation
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
@@ -74,6 +75,13 @@ def after_design(
         least = () if samples >= 2.0 else ("--delay", f"{samples:g}")
         return step("the goals that can be kept", *words, "--modulus", f"{modulus:g}", *least)
     return step("a slower loop", *words, "--poles", _poles(best, SLOWER))
+
+
+def after_robust(found: "Robust", model_file: Path) -> Step | None:
+    """Where no loop keeps the limits often enough: the run that narrows what is not sure."""
+    if found.passed:
+        return None
+    return step("the run that narrows what is not sure", "experiment", model_file)
 
 
 def _worst(one: "Controller") -> float:

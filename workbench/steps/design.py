@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
 from design.filters import filters_at
 from design.tracking import Demand
@@ -57,15 +58,46 @@ def design(
     Raises BadSpecification where no controller meets what was asked, NotIdentifiable where the
     model carries no design.
     """
+    first = placed_design(model, asked, goals=goals, source=source, period=period)
+    return with_choice(model, first, recommended(model, first))
+
+
+def with_choice(model: Model, first: Design, chosen: Recommendation) -> Design:
+    """The design with a controller recommended."""
+    return replace(
+        first,
+        recommended=chosen.controller,
+        recommendation=chosen,
+        remarks=(*first.remarks, *_remarks(model, first, chosen)),
+    )
+
+
+DrawnFor = Callable[[Linear, ForceLoop | None], DrawnPlants]
+
+
+def placed_design(
+    model: Model,
+    asked: Asked | None = None,
+    *,
+    goals: Goals | None = None,
+    source: From | None = None,
+    period: float | None = None,
+    drawn: DrawnFor | None = None,
+) -> Design:
+    """The controllers of `design`, of which none is recommended yet.
+
+    drawn: machines on so many of which the goals must hold, in place of the corners of the model's
+    intervals, as the loop of a linear plant sees them.
+    """
     asked = asked or Asked()
     _check_period(period, model)
     goals = goals or Goals(effort=effort_limit(model))
-    found = _placed(model, asked, goals, source, period)
+    found = _placed(model, asked, goals, (source, period), drawn)
     command = command_of(model, found.force)
     controllers = {
         name: _controller(tuned, shown(model.rotary)) for name, tuned in found.tuned.items()
     }
-    first = Design(
+    return Design(
         card=model.card,
         motion=model.rig.motion,
         plant=found.plant,
@@ -79,17 +111,11 @@ def design(
             *model.read,
             *stored_remarks(model),
             *bandwidth_remarks([one.dominant[0] for one in controllers.values()], model.rig),
+            *found.slower,
         ),
         versions=versions(),
         command=command,
         present=model.present,
-    )
-    chosen = recommended(model, first)
-    return replace(
-        first,
-        recommended=chosen.controller,
-        recommendation=chosen,
-        remarks=(*first.remarks, *found.slower, *_remarks(model, first, chosen)),
     )
 
 
@@ -109,9 +135,14 @@ class _Placed(NamedTuple):
 
 
 def _placed(
-    model: Model, asked: Asked, goals: Goals, source: From | None, period: float | None
-) -> _Placed:
-    """The controllers at the period, or the first of `periods` at which one keeps every goal."""
+    model: Model, asked: Asked, goals: Goals, where: tuple[From | None, float | None],
+    drawn: DrawnFor | None,
+) -> _Placed:  # fmt: skip
+    """The controllers at the period, or the first of `periods` at which one keeps every goal.
+
+    where: the linear plant and the period asked for.
+    """
+    source, period = where
     first, _ = linear_of(model, source, period)
     tried: list[_Placed] = []
     said: list[str] = []
@@ -119,7 +150,7 @@ def _placed(
     every = (first.h,) if period is not None or first.source == "arx" else periods(model)
     for h in every:
         try:
-            found = _placed_at(model, asked, goals, *linear_of(model, source, h))
+            found = _placed_at(model, asked, goals, linear_of(model, source, h), drawn)
         except BadSpecification as error:
             refusal = refusal or error
             said.append(f"not every {1e3 * h:.4g} ms: {error}")
@@ -157,8 +188,11 @@ def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -
 
 
 def _placed_at(
-    model: Model, asked: Asked, goals: Goals, plant: Linear, force: ForceLoop | None
-) -> _Placed:
+    model: Model, asked: Asked, goals: Goals, linear: tuple[Linear, ForceLoop | None],
+    drawn: DrawnFor | None,
+) -> _Placed:  # fmt: skip
+    plant, force = linear
+    machines = None if drawn is None else drawn(plant, force)
     found: dict[str, Tuned] = {}
     refused: dict[str, str] = {}
     a, b = np.array(plant.A), np.array(plant.B)
@@ -171,7 +205,9 @@ def _placed_at(
         if name == "pid" and asked.auxiliary is not None:
             wanted = Asked(asked.dominant, None, asked.integrator)
         try:
-            tuned = partial(tune, a, b, plant.h, wanted, corners=others, demand=demand)
+            tuned = partial(
+                tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
+            )
             found[name] = _followable(tuned, goals, None if wanted.dominant else model.speed)
         except BadSpecification as error:
             refused[name] = str(error)

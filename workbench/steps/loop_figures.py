@@ -1,9 +1,8 @@
 """What a loop comes to in simulation: its runs along steps and a smooth reference, its figures."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,23 +18,22 @@ from workbench.cards.readable import length
 from workbench.documents.design import Design, MarginValues, margin_values
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
-from workbench.steps.limit_cycle import LimitCycle, limit_cycle
+from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import plants_of
+from workbench.steps.loop_motion import JUDGED_SHARE, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
 SMOOTH_SPEED = 0.03  # frequency of the smooth reference, in units of w_n
+SMOOTH_PERIODS = 2.5
 DWELLS = 15.0  # length of a step, in time constants of the slowest loop
 SHORTEST_DWELL = 1.0  # s
 LAST_DWELL = 10.0  # s
-JUDGED_SHARE = 0.5  # part of a dwell that is judged
 WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit cycle
-SETTLING_BAND = 0.05  # of a step, in which a settled position stays
 STANDSTILL_SECONDS = 2.0  # s at rest over which the noise in the command is taken
 COMPENSATED = " + compensator"  # behind a controller's name
 PRESENT = "present"  # the controller that the machine has now
 ALMOST = 0.9  # of a limit, from which it is told that a loop comes near it
-ESCAPED = 10.0  # times the step
 
 
 @dataclass(frozen=True)
@@ -132,9 +130,12 @@ def present_figures(
     return loop_figures(machine, loop, runs, limits), runs
 
 
-def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, Array]:
+def references(
+    machine: Model, found: Design, h: float, periods: float = SMOOTH_PERIODS
+) -> tuple[Array, Array, Array]:
     """Steps, the smooth reference and rest [m] every h [s], one motion for every loop and plant.
 
+    periods: of the smooth reference, in the first half of one of which it comes to its amplitude.
     Levels from the travel that the logs have shown; the last one is held for long, since a limit
     cycle of an integrator against stiction may take seconds.
     """
@@ -148,7 +149,7 @@ def references(machine: Model, found: Design, h: float) -> tuple[Array, Array, A
     w = SMOOTH_SPEED * min(one.dominant[0] for one in found.controllers.values())
     if machine.speed is not None:  # no faster than the machine has been seen to move
         w = min(w, machine.speed / amplitude)
-    t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
+    t = h * np.arange(round(periods * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
     smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
     return levels, smooth, np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
@@ -179,88 +180,34 @@ def loop_figures(
     machine: Model, loop: DrivenLoop, run: Traces, limits: Limits, *, arx: bool = False
 ) -> LoopFigures:
     """What the runs of a loop on a machine come to; arx: margins on the machine's ARX plant."""
-    step = float(np.max(run.step.r))
-    amplitude = float(np.max(np.abs(run.smooth.r)))
-    stable = _stays(run.step, step) and _stays(run.smooth, amplitude)
-    judged = _judged(run.step)
-    standstill = float(np.max(np.abs(run.step.r - run.step.y)[judged])) if stable else np.inf
-    smooth = float(np.sqrt(np.mean((run.smooth.r - run.smooth.y) ** 2)))
-    runs = (run.step, run.smooth)
     drive = machine.simulated.actuator
     driven = drive is not None
     limit = limit_on(machine, loop) if driven else None
+    motion = loop_motion(run.step, run.smooth, machine.fit.noise_y, limit)
     found = LoopFigures(
-        stable=stable,
+        stable=motion.stable,
         margins=_linear_margins(machine, loop, arx),
-        step=step,
-        standstill=standstill,
-        standstill_relative=standstill / step,
-        overshoot=_overshoot(run.step),
-        settling=_settling(run.step),
-        step_rms=float(np.sqrt(np.mean((run.step.r - run.step.y) ** 2))),
-        smooth_rms=smooth,
-        smooth_relative=smooth / amplitude,
+        step=motion.step,
+        standstill=motion.standstill,
+        standstill_relative=motion.standstill / motion.step,
+        overshoot=motion.overshoot,
+        settling=motion.settling,
+        step_rms=motion.step_rms,
+        smooth_rms=motion.smooth_rms,
+        smooth_relative=motion.smooth_rms / motion.amplitude,
         force_rms=float(np.sqrt(np.mean(run.step.F**2))),
-        force_peak=max(float(np.max(np.abs(each.F))) for each in runs),
+        force_peak=motion.force_peak,
         force_seen=machine.force_peak,
-        command_peak=max(float(np.max(np.abs(each.u))) for each in runs) if driven else None,
+        command_peak=motion.command_peak if driven else None,
         command_limit=limit,
         command_noise=float(np.std(run.rest.u[len(run.rest.u) // 2 :])) if driven else None,
-        limit_cycle=limit_cycle(run.step, machine.fit.noise_y) if stable else None,
+        limit_cycle=motion.limit_cycle,
         missed=(),
         command_unit=machine.rig.command_unit,
-        limited=_limited(runs, limit),
+        limited=motion.limited,
         force_limit=abs(drive.k_a) * limit if isinstance(drive, Motor) and limit else None,
     )
     return replace(found, missed=_missed(found, limits, machine))
-
-
-def _limited(runs: Sequence[LoopRun], limit: float | None) -> float:
-    """Share of the samples at which the command is at its limit."""
-    if limit is None:
-        return 0.0
-    return float(np.mean(np.concatenate([np.abs(run.u) >= limit for run in runs])))
-
-
-def _stays(trace: LoopRun, size: float) -> bool:
-    """Whether a loop stays near a reference of this size [m]; not where it is lost to NaN."""
-    return bool(np.all(np.abs(trace.y) < ESCAPED * size))
-
-
-def _judged(trace: LoopRun) -> Any:
-    """The last half of every dwell, True at its samples."""
-    keep = np.zeros(len(trace.r), dtype=bool)
-    for low, high in _dwells(trace):
-        keep[high - round(JUDGED_SHARE * (high - low)) : high] = True
-    return keep
-
-
-def _dwells(trace: LoopRun) -> list[tuple[int, int]]:
-    """First sample of every level of the reference, and the one after its last."""
-    change = np.flatnonzero(np.diff(trace.r)) + 1
-    return list(pairwise([0, *change.tolist(), len(trace.r)]))
-
-
-def _after_steps(trace: LoopRun) -> list[tuple[float, Array]]:
-    """Height of every step [m] and the error y - r after it [m]."""
-    return [
-        (float(trace.r[low] - trace.r[low - 1]), trace.y[low:high] - trace.r[low:high])
-        for low, high in _dwells(trace)[1:]
-    ]
-
-
-def _overshoot(trace: LoopRun) -> float:
-    """Largest overshoot of a step, relative to its height."""
-    return max(float(np.max(error / height)) for height, error in _after_steps(trace))
-
-
-def _settling(trace: LoopRun) -> float:
-    """Longest time [s] from a step until the position stays within `SETTLING_BAND` of it."""
-    h = float(trace.t[1] - trace.t[0])
-    outside = [
-        np.flatnonzero(np.abs(e) > SETTLING_BAND * abs(height)) for height, e in _after_steps(trace)
-    ]
-    return h * max(float(late[-1] + 1) if late.size else 0.0 for late in outside)
 
 
 def _linear_margins(machine: Model, loop: DrivenLoop, arx: bool) -> MarginValues | None:

@@ -13,7 +13,6 @@ from workbench.steps.closed_loop import driven_loop
 from workbench.steps.loop_figures import (
     COMPENSATED,
     PRESENT,
-    SETTLING_BAND,
     Limits,
     LoopFigures,
     loop_figures,
@@ -21,6 +20,7 @@ from workbench.steps.loop_figures import (
     present_figures,
     references,
 )
+from workbench.steps.loop_motion import SETTLING_BAND
 
 EQUAL = 0.05  # mean relative difference of the measures below which two loops are as good
 LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no better

@@ -21,7 +21,7 @@ from workbench.cards.controller import CardController
 from workbench.documents.drive import DriveUnits, present_file
 from workbench.documents.model import Model
 from workbench.report.experiment import experiment_report, reference_text
-from workbench.steps.experiment.drawn import drawn_plants, in_loop
+from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import bench_of
 from workbench.steps.experiment.plan import experiment
 from workbench.steps.experiment.planned import Experiment, Wanted, experiment_document, limits_of

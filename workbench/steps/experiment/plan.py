@@ -20,7 +20,7 @@ from workbench.cards.effect_values import known_effect
 from workbench.documents.design import Design
 from workbench.documents.model import Model, versions
 from workbench.steps.closed_loop import effects_left_out
-from workbench.steps.experiment.drawn import drawn_plants, in_loop
+from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import Bench, asked_of, bench_of
 from workbench.steps.experiment.planned import (
     Experiment,

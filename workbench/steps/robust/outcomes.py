@@ -1,0 +1,167 @@
+"""What a loop comes to on every machine drawn: margins, errors, forces, a limit cycle."""
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from design.drawn_loops import DrawnPlants, loop_margins
+from design.loop import LoopNoise, LoopRun
+from identification.arrays import Array
+from identification.errors import UserError
+from identification.model.plant import Motor, Plant
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import DrivenLoop, limit_on, run_plant
+from workbench.steps.drawn import in_loop
+from workbench.steps.loop_figures import Limits
+from workbench.steps.loop_motion import loop_motion
+from workbench.steps.robust.machines import DrawnMachines
+
+SLOW_SHARE = 0.5  # of the narrowest stick band, at which a slow ramp moves
+SLOW_SECONDS = 10.0  # s that it lasts, the last half of which is judged
+BARELY = 1.0 - 1e-9  # of a limit of the command, at which it is reached
+
+Kind = Literal["share", "samples", "length", "time", "number"]
+
+
+class Measure(NamedTuple):
+    """What is judged of a loop: name, in words, what kind of number it is; floor: at least the
+    limit is kept, else at most."""
+
+    name: str
+    words: str
+    kind: Kind
+    floor: bool = False
+
+
+MEASURES = (
+    Measure("modulus", "modulus margin", "number", floor=True),
+    Measure("delay", "delay margin", "samples", floor=True),
+    Measure("standstill", "error at standstill, of the step", "share"),
+    Measure("tracking", "rms error along the smooth reference, of its amplitude", "share"),
+    Measure("overshoot", "overshoot, of the step", "share"),
+    Measure("force", "largest force, of that in the logs", "number"),
+    Measure("command", "largest command, of its limit", "number"),
+    Measure("limit_cycle", "limit cycle at rest, peak to peak", "length"),
+    Measure("staircase", "staircase on a slow ramp, peak to peak", "length"),
+    Measure("settling", "settling time", "time"),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """The references of a loop [m], one each of its samples: steps, smooth, and a ramp slower than
+    the stick band."""
+
+    steps: Array
+    smooth: Array
+    slow: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Outcomes:
+    """Every measure on every machine, (k,), by name; infinite (a margin: 0) where the loop runs
+    away; without those that the machine has not (a limit of the command)."""
+
+    values: Mapping[str, Array]
+
+    def kept(self, limits: Mapping[str, float]) -> dict[str, NDArray[np.bool_]]:
+        """Whether each limit is kept on each machine, (k,)."""
+        return {
+            one.name: self.values[one.name] >= limits[one.name]
+            if one.floor
+            else self.values[one.name] <= limits[one.name]
+            for one in MEASURES
+            if one.name in limits and one.name in self.values
+        }
+
+
+def limits_by_name(limits: Limits, staircase: float | None = None) -> dict[str, float]:
+    """The limits of `validate` by measure, that of the staircase [m] where one is asked for."""
+    out = {
+        "modulus": limits.modulus,
+        "delay": limits.delay,
+        "standstill": limits.standstill,
+        "tracking": limits.tracking,
+        "overshoot": limits.overshoot,
+        "force": limits.force,
+        "command": BARELY,
+        "limit_cycle": 0.0,
+    }
+    return out if staircase is None else {**out, "staircase": staircase}
+
+
+def slow_ramp(model: Model, h: float) -> tuple[Array, float]:
+    """A ramp at half the narrowest stick band [m], (n,), and its speed [m/s]."""
+    p = in_loop(model).friction
+    speed = SLOW_SHARE * min(p.dv_p, -p.dv_n)
+    return speed * h * np.arange(round(SLOW_SECONDS / h), dtype=np.float64), speed
+
+
+def outcomes(
+    machines: DrawnMachines, loop: DrivenLoop, motion: Motion, seeds: Sequence[np.random.Generator]
+) -> Outcomes:
+    """The loop on every machine, along one motion, with the sensors' noise by its own generator."""
+    model = machines.model
+    limit = limit_on(model, loop) if model.simulated.actuator is not None else None
+
+    def of(plant: Plant, rng: np.random.Generator) -> tuple[float, ...]:
+        return _on_one(model, plant, loop, motion, limit, rng)
+
+    with ThreadPoolExecutor(2) as pool:
+        rows = np.array(list(pool.map(of, machines.plants, seeds[: len(machines.plants)])))
+    names = ("standstill", "tracking", "overshoot", "force", "command", "limit_cycle", "staircase",
+             "settling")  # fmt: skip
+    values = dict(zip(names, rows.T, strict=True))
+    if limit is None:
+        del values["command"]
+    if not model.force_peak > 0.0:
+        del values["force"]
+    return Outcomes({**_margins(machines, loop), **values})
+
+
+def _margins(machines: DrawnMachines, loop: DrivenLoop) -> dict[str, Array]:
+    """Modulus and delay margin on every machine, 0 where the force loop is not stable on it."""
+    law, drive = loop.law.rst, machines.model.simulated.actuator
+    per = drive.k_a if isinstance(drive, Motor) else 1.0  # of the law's output, to force
+    each = machines.each_linear(law.h, loop.force)
+    stable = np.array([one is not None for one in each])
+    modulus, delay = np.zeros(len(each)), np.zeros(len(each))
+    if np.any(stable):
+        drawn = DrawnPlants.of([one for one in each if one is not None], 0.5)
+        found = loop_margins(drawn.A, per * drawn.B, law)
+        modulus[stable], delay[stable] = found.modulus, found.delay
+    return {"modulus": modulus, "delay": delay}
+
+
+def _on_one(
+    model: Model, plant: Plant, loop: DrivenLoop, motion: Motion, limit: float | None,
+    rng: np.random.Generator,
+) -> tuple[float, ...]:  # fmt: skip
+    """The measures of `outcomes` on one plant, margins left out."""
+
+    def run(r: Array) -> LoopRun:
+        noise = LoopNoise.draw(len(r), model.fit.noise_y, model.fit.noise_F, rng)
+        return run_plant(model, plant, loop, r, noise)
+
+    try:
+        steps, smooth, slow = run(motion.steps), run(motion.smooth), run(motion.slow)
+    except UserError:  # cannot be followed: it runs away
+        return (np.inf,) * 8
+    found = loop_motion(steps, smooth, model.fit.noise_y, limit)
+    if not found.stable:
+        return (np.inf,) * 8
+    off = (slow.y - slow.r)[len(slow.r) // 2 :]
+    return (
+        found.standstill / found.step,
+        found.smooth_rms / found.amplitude,
+        found.overshoot,
+        found.force_peak / model.force_peak if model.force_peak > 0.0 else 0.0,
+        0.0 if limit is None else found.command_peak / limit,
+        0.0 if found.limit_cycle is None else found.limit_cycle.amplitude,
+        float(np.ptp(off)),
+        found.settling,
+    )

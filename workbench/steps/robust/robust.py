@@ -1,0 +1,238 @@
+"""Model -> robust design: what it promises of the machines that there may be, and beside which."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from design.tune import Asked, Goals
+from identification.errors import BadModel, NotIdentifiable
+from identification.progress import Progress, quiet
+from workbench.documents.design import Design, From, Recommendation
+from workbench.documents.model import Model
+from workbench.steps.closed_loop import DrivenLoop, present_loop
+from workbench.steps.design import design, effort_limit, with_choice
+from workbench.steps.linear_loop import unknown_viscous
+from workbench.steps.loop_figures import PRESENT, Limits, references
+from workbench.steps.robust.machines import DrawnMachines, drawn_machines, some_of
+from workbench.steps.robust.outcomes import (
+    MEASURES,
+    Motion,
+    Outcomes,
+    limits_by_name,
+    outcomes,
+    slow_ramp,
+)
+from workbench.steps.robust.search import Candidate, Searched, searched, spread_of
+
+ROBUST_STAGES = {
+    "nominal design": (0.0, 0.1),
+    "placing poles": (0.1, 0.3),
+    "loops on a few machines": (0.3, 0.55),
+    "loops on all machines": (0.55, 0.75),
+    "what it promises": (0.75, 1.0),
+}
+SMOOTH_PERIODS = 1.25  # of the smooth reference: in, and once round
+MOST_BESIDE = 100  # machines on which the nominal and the present loop are shown
+ROBUST = "robust"
+NOMINAL = "nominal"  # the design that knows of no spread
+USUAL_DRAWS = 200
+USUAL_PROBABILITY = 0.95
+
+
+@dataclass(frozen=True)
+class RobustAsked:
+    """What is asked over the machines: so many drawn, on what share of them each limit has to hold.
+
+    staircase: largest on a slow ramp [m], None for any. drift: see `drift_seen`.
+    """
+
+    draws: int = USUAL_DRAWS
+    probability: float = USUAL_PROBABILITY
+    limits: Limits = field(default_factory=Limits)
+    staircase: float | None = None
+    drift: Mapping[str, float] | None = None
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A measure over the machines: 5 %, median, 95 %; its limit and the share that keeps it, None
+    where it has none. Infinite values are of loops that run away."""
+
+    low: float
+    median: float
+    high: float
+    limit: float | None
+    kept: float | None
+
+
+@dataclass(frozen=True, eq=False)
+class Promise:
+    """What a loop comes to over the machines, by measure, and the share that keeps every limit."""
+
+    controller: str
+    compensator: bool
+    measures: Mapping[str, Spread]
+    every: float
+    found: Outcomes
+
+
+@dataclass(frozen=True, eq=False)
+class Robust:
+    """A design chosen over the machines drawn, and promises by loop: "robust", then "nominal" and
+    "present" where there are such, all counted on the same machines, drawn anew.
+
+    missed: limits that too few machines keep, in words; () where the design passes.
+    """
+
+    design: Design
+    asked: RobustAsked
+    promises: Mapping[str, Promise]
+    tried: int
+    speed: float
+    missed: tuple[str, ...]
+    remarks: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether each limit is kept with the probability asked for."""
+        return not self.missed
+
+
+def robust_design(
+    model: Model,
+    wanted: RobustAsked,
+    asked: Asked | None = None,
+    *,
+    where: tuple[From | None, float | None] = (None, None),
+    report: Progress = quiet,
+) -> Robust:
+    """The design that does best over the machines that the model's errors (and its drift) allow.
+
+    where: the linear plant to design on and its period [s], None where they are chosen. Raises
+    NotIdentifiable where the mass is not known, BadSpecification where no loop can be placed.
+    """
+    asked = asked or Asked()
+    if model.friction["m"].value is None or where[0] == "arx":
+        raise NotIdentifiable(
+            "a robust design draws machines around the physical plant; none on an ARX plant"
+            f" (m: {model.friction['m'].reason or 'identified'})"
+        )
+    goals = Goals(wanted.limits.modulus, wanted.limits.delay, effort_limit(model))
+    report("nominal design", 0.0)
+    nominal = design(model, asked, goals=goals, source="physical", period=where[1])
+    search, anew, noise = np.random.default_rng(wanted.seed).spawn(3)
+    limits = limits_by_name(wanted.limits, wanted.staircase)
+    machines = drawn_machines(model, search, wanted.draws, wanted.drift)
+    motion, speed = _motion(model, nominal)
+    found = searched(
+        machines, asked, goals, ("physical", where[1]), motion, limits, wanted.probability,
+        search, report,
+    )  # fmt: skip
+    judges = drawn_machines(model, anew, wanted.draws, wanted.drift)
+    promises = _promises(model, judges, found.chosen, nominal, limits, noise, report)
+    missed = _missed(promises[ROBUST], wanted.probability)
+    return Robust(
+        design=_chosen(model, found, promises[ROBUST], wanted, missed),
+        asked=wanted,
+        promises=promises,
+        tried=found.tried,
+        speed=speed,
+        missed=missed,
+        remarks=tuple(_remarks(model, wanted)),
+    )
+
+
+def _motion(model: Model, nominal: Design, h: float | None = None) -> tuple[Motion, float]:
+    """One motion for all loops: that of the nominal design's validation, and a slow ramp."""
+    period = h or (nominal.force.h if nominal.force else nominal.plant.h)
+    steps, smooth, _ = references(model, nominal, period, SMOOTH_PERIODS)
+    slow, speed = slow_ramp(model, period)
+    return Motion(steps, smooth, slow), speed
+
+
+def _promises(
+    model: Model, machines: DrawnMachines, chosen: Candidate, nominal: Design,
+    limits: dict[str, float], rng: np.random.Generator, report: Progress,
+) -> dict[str, Promise]:  # fmt: skip
+    """What each loop comes to on machines of which the search knew nothing."""
+    loops = {ROBUST: (chosen.name, chosen.compensator, chosen.loop(model))}
+    if nominal.recommendation is not None and nominal.recommended != "none":
+        own = nominal.recommendation
+        one = Candidate(nominal, own.controller, own.compensator)
+        loops[NOMINAL] = (one.name, one.compensator, one.loop(model))
+    now = _present(model)
+    if now is not None:
+        loops[PRESENT] = ("none", False, now)
+    seeds = rng.spawn(len(machines.plants))
+    out = {}
+    for i, (name, (controller, compensator, loop)) in enumerate(loops.items()):
+        report("what it promises", i / len(loops))
+        motion, _ = _motion(model, nominal, loop.h)
+        judges = machines if name == ROBUST else some_of(machines, MOST_BESIDE)
+        found = outcomes(judges, loop, motion, seeds)
+        out[name] = promise_of(controller, compensator, found, limits)
+    return out
+
+
+def _present(model: Model) -> DrivenLoop | None:
+    try:
+        return None if model.present is None else present_loop(model, model.present)
+    except BadModel:  # `validate` says why
+        return None
+
+
+def promise_of(
+    controller: str, compensator: bool, found: Outcomes, limits: Mapping[str, float]
+) -> Promise:
+    """The outcomes as shares and quantiles."""
+    kept, spread = found.kept(limits), spread_of(found)
+    measures = {
+        name: Spread(*own, limits.get(name), float(np.mean(kept[name])) if name in kept else None)
+        for name, own in spread.items()
+    }
+    every = np.all(list(kept.values()), axis=0)
+    return Promise(controller, compensator, measures, float(np.mean(every)), found)
+
+
+def _missed(promise: Promise, probability: float) -> tuple[str, ...]:
+    words = {one.name: one.words for one in MEASURES}
+    return tuple(
+        f"{words[name]}: within its limit on {100 * one.kept:.0f} % of the machines drawn,"
+        f" {100 * probability:g} % asked"
+        for name, one in promise.measures.items()
+        if one.kept is not None and one.kept < probability
+    )
+
+
+def _chosen(
+    model: Model, found: Searched, promise: Promise, wanted: RobustAsked, missed: tuple[str, ...]
+) -> Design:
+    """The design with its choice and the promise as the reason."""
+    one = found.chosen
+    called = one.name.upper() + (" with the compensator" if one.compensator else "")
+    least = min((m.kept for m in promise.measures.values() if m.kept is not None), default=1.0)
+    said = (
+        f"{called}: of {wanted.draws} machines drawn each limit is kept by at least"
+        f" {100 * least:.0f} %, all of them by {100 * promise.every:.0f} %; the best of"
+        f" {found.tried} loops tried"
+    )
+    if missed:
+        return with_choice(model, one.design, Recommendation("none", False, "; ".join(missed)))
+    return with_choice(model, one.design, Recommendation(one.name, one.compensator, said))
+
+
+def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
+    out = []
+    if names := unknown_viscous(model):
+        out.append(f"{' and '.join(names)}: not identified, drawn around what is assumed")
+    if wanted.drift:
+        widest = max(wanted.drift, key=lambda name: (wanted.drift or {})[name])
+        out.append(
+            f"widened by the drift between the machine's models: {len(wanted.drift)} parameters, at"
+            f" most {100 * wanted.drift[widest]:.2g} % a step ({widest})"
+        )
+    if not model.fit.adequate:
+        out.append("the model leaves more than noise: the machine is not among those drawn")
+    return out
