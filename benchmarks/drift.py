@@ -33,7 +33,8 @@ from scipy.stats import chi2
 from benchmarks.blind_effects import SIZES, acting, place_of, shows
 from benchmarks.blind_machines import MACHINES, Machine, drifted, machine, simulated, stream
 from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, stage, turned
-from identification.drift.drift_test import DriftTest, drift_test
+from identification.drift.drift_result import DriftTest
+from identification.drift.drift_test import drift_test
 from identification.drift.own_logs import with_own_logs
 from identification.drift.reference_model import COULOMB, InForce, in_force
 from identification.effects._base import Acting

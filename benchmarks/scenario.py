@@ -11,7 +11,7 @@ on a spring that nobody declared (a hose that pulls). Prints the timeline.
 import argparse
 import os
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -96,15 +96,17 @@ def between(old: Karnopp, new: Karnopp, wear: float) -> Karnopp:
 
 
 def story(
-    root: Path, seed: int, count: int = 24, on_day: Callable[["Told"], None] = lambda _told: None
-) -> list[Told]:
-    """The first `count` logs, one after the other, each judged by a pass of its own."""
+    root: Path, seed: int, numbers: Iterable[int] = range(24),
+    on_day: Callable[["Told"], None] = lambda _told: None,
+) -> list[Told]:  # fmt: skip
+    """The logs of these numbers, one after the other, each judged by a pass of its own."""
     machine = root / "machines" / "rig"
     (machine / "logs").mkdir(parents=True)
     (machine / "card.toml").write_text(CARD, encoding="utf-8")
     told = []
     with Registry(str(root / "registry.db")) as registry:
-        for day in list(days())[:count]:
+        every = list(days())
+        for day in (every[number] for number in numbers):
             write(machine / "logs", day, seed)
             settings = PassSettings("scenario", first=True, settle=timedelta(0))
             now = day.at + timedelta(minutes=5)
@@ -248,7 +250,9 @@ def main() -> None:
     parser.add_argument("--picture", type=Path)
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
-        told = story(Path(name), given.seed, given.count, lambda one: print(line(one), flush=True))
+        told = story(
+            Path(name), given.seed, range(given.count), lambda one: print(line(one), flush=True)
+        )
     if given.picture:
         picture(told, given.picture)
 

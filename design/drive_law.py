@@ -16,8 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from design.pid import INTEGRATOR
-from design.polynomial import divide, trim
+from design.polynomial import INTEGRATOR, divide, trim
 from design.rst import RST
 from identification.arrays import Array
 from identification.errors import BadSpecification

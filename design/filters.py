@@ -13,7 +13,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.compiled import compiled_exact
 from identification.errors import BadSpecification
-from identification.signals.clean import RIG_A, RIG_C, Filter, fir_lowpass
+from identification.signals.filters import RIG_A, RIG_C, Filter, fir_lowpass
 
 N_D = 5  # positions of the slope (5)
 SHORTEST_SLOPE = 2

@@ -74,20 +74,16 @@ class _Loop:
     R: Array
     S: Array
 
-    def forward(self, theta: Array) -> ComplexArray:
-        """B R at theta."""
+    def both(self, theta: Array) -> tuple[ComplexArray, ComplexArray]:
+        """B R and A S at theta."""
         z = np.exp(1j * theta)
-        return evaluate(self.B, z) * evaluate(self.R, z)
-
-    def back(self, theta: Array) -> ComplexArray:
-        """A S at theta."""
-        z = np.exp(1j * theta)
-        return evaluate(self.A, z) * evaluate(self.S, z)
+        b, r, a, s = (evaluate(c, z) for c in (self.B, self.R, self.A, self.S))
+        return b * r, a * s
 
     def output_sensitivity(self, theta: Array) -> Array:
         """|S_yp| at theta."""
-        back = self.back(theta)
-        return np.abs(back / (back + self.forward(theta)))
+        forward, back = self.both(theta)
+        return np.abs(back / (back + forward))
 
     def input_sensitivity(self, theta: Array) -> Array:
         """|S_up| at theta."""
@@ -98,25 +94,25 @@ class _Loop:
 
     def imaginary(self, theta: Array) -> Array:
         """Im L |A S|^2 at theta."""
-        return np.imag(self.forward(theta) * np.conj(self.back(theta)))
+        forward, back = self.both(theta)
+        return np.imag(forward * np.conj(back))
 
     def excess(self, theta: Array) -> Array:
         """(|L|^2 - 1)|A S|^2 at theta."""
-        return np.square(np.abs(self.forward(theta))) - np.square(np.abs(self.back(theta)))
+        forward, back = self.both(theta)
+        return np.square(np.abs(forward)) - np.square(np.abs(back))
 
     def imaginary_noise(self, theta: Array) -> Array:
         """Rounding of `imaginary` at theta."""
-        forward, back = self.sizes()
-        return ROUNDING * (forward * np.abs(self.back(theta)) + back * np.abs(self.forward(theta)))
+        largest, largest_back = self.sizes()
+        forward, back = self.both(theta)
+        return ROUNDING * (largest * np.abs(back) + largest_back * np.abs(forward))
 
     def excess_noise(self, theta: Array) -> Array:
         """Rounding of `excess` at theta: far below its own size where both of its squares are."""
-        forward, back = self.sizes()
-        return (
-            2.0
-            * ROUNDING
-            * (forward * np.abs(self.forward(theta)) + back * np.abs(self.back(theta)))
-        )
+        largest, largest_back = self.sizes()
+        forward, back = self.both(theta)
+        return 2.0 * ROUNDING * (largest * np.abs(forward) + largest_back * np.abs(back))
 
     def sizes(self) -> tuple[float, float]:
         """Bounds of |B R| and |A S| on the unit circle: what rounding is measured against."""
@@ -148,22 +144,8 @@ def margins(A: ArrayLike, B: ArrayLike, controller: RST) -> Margins:
     Raises BadSpecification where the loop is not stable, naming the pole: it has no margin then.
     Accurate to about 1e-10 relative: a grid refined around every pole and zero, then zoomed.
     """
-    A, B = normalised_plant(A, B)
-    poles = closed_loop_poles(A, B, controller)
-    if poles.size and abs(poles[0]) >= 1:
-        raise BadSpecification(
-            f"the loop is unstable: pole {describe_root(complex(poles[0]), controller.h)} with "
-            f"|z| = {abs(poles[0]):.6g}; an unstable loop has no margins, design another controller"
-        )
+    loop, poles, grid = _stable_loop(A, B, controller)
     h = controller.h
-    loop = _Loop(A, B, controller.R, controller.S)
-    grid = _grid(poles, *(roots(c) for c in (A, B, controller.R, controller.S)))
-    if not np.all(loop.back(grid) + loop.forward(grid)):
-        # A S and B R both vanish there: that the computed pole lies inside is rounding alone.
-        raise BadSpecification(
-            "a closed-loop pole lies on the unit circle but for rounding: no margins can be told;"
-            " ask for faster poles"
-        )
     peak, peak_theta = _maximum(loop.output_sensitivity, grid)
     effort, effort_theta = _maximum(loop.input_sensitivity, grid)
     up, up_w, down, down_w = _gain_margins(loop, grid)
@@ -185,6 +167,32 @@ def margins(A: ArrayLike, B: ArrayLike, controller: RST) -> Margins:
         poles=poles,
         h=h,
     )
+
+
+def modulus_margin(A: ArrayLike, B: ArrayLike, controller: RST) -> float:
+    """The modulus margin alone, and what is refused, as `margins` has them: a fifth of its work."""
+    loop, _, grid = _stable_loop(A, B, controller)
+    return 1 / _maximum(loop.output_sensitivity, grid)[0]
+
+
+def _stable_loop(A: ArrayLike, B: ArrayLike, controller: RST) -> tuple[_Loop, ComplexArray, Array]:
+    """The loop, its poles, theta to look at; raises BadSpecification where it is unstable."""
+    A, B = normalised_plant(A, B)
+    poles = closed_loop_poles(A, B, controller)
+    if poles.size and abs(poles[0]) >= 1:
+        raise BadSpecification(
+            f"the loop is unstable: pole {describe_root(complex(poles[0]), controller.h)} with "
+            f"|z| = {abs(poles[0]):.6g}; an unstable loop has no margins, design another controller"
+        )
+    loop = _Loop(A, B, controller.R, controller.S)
+    grid = _grid(poles, *(roots(c) for c in (A, B, controller.R, controller.S)))
+    if not np.all(sum(loop.both(grid))):
+        # A S and B R both vanish there: that the computed pole lies inside is rounding alone.
+        raise BadSpecification(
+            "a closed-loop pole lies on the unit circle but for rounding: no margins can be told;"
+            " ask for faster poles"
+        )
+    return loop, poles, grid
 
 
 def _grid(*groups: ComplexArray) -> Array:
@@ -271,7 +279,7 @@ def _gain_margins(
     """Least destabilising gain above 1, greatest below 1, each with its theta."""
     forward, back = loop.sizes()
     theta = np.concatenate([[0.0], _zeros(loop.imaginary, grid, loop.imaginary_noise), [np.pi]])
-    n, d = loop.forward(theta), loop.back(theta)
+    n, d = loop.both(theta)
     known = (np.abs(n) > ROUNDING * forward) & (np.abs(d) > ROUNDING * back)
     theta, gain = theta[known], -np.real(d[known] / n[known])
     up, down = gain > 1, (gain > 0) & (gain < 1)
@@ -290,11 +298,11 @@ def _phase_and_delay_margins(
 ) -> tuple[float | None, float | None, float | None, float | None]:
     """Least phase [rad] and least delay [samples] over all crossings of |L| = 1, with theta."""
     theta = _zeros(loop.excess, grid, loop.excess_noise)
-    lag = np.mod(np.angle(loop.forward(theta) * np.conj(loop.back(theta))) + np.pi, 2 * np.pi)
+    forward, back = loop.both(theta)
+    lag = np.mod(np.angle(forward * np.conj(back)) + np.pi, 2 * np.pi)
     phase, phase_theta = _least(np.minimum(lag, 2 * np.pi - lag), theta)
     delay, delay_theta = _least(lag / theta, theta)
-    end = np.array([np.pi])
-    n, d = float(loop.forward(end)[0].real), float(loop.back(end)[0].real)
+    n, d = (float(one[0].real) for one in loop.both(np.array([np.pi])))
     if abs(n) > abs(d):
         # |L| > 1 up to pi/h: the response's ends at +-pi/h pass -1 within one sample of delay.
         limit = float(np.arccos(-d / n)) / np.pi

@@ -3,21 +3,19 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Literal, get_args
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import lsq_linear, minimize
 
-from design.place import solve_diophantine, solve_sylvester
+from design.dominant_pid import DominantPID
+from design.place import solve_diophantine
 from design.polynomial import (
+    INTEGRATOR,
     add,
     check_period,
     describe_root,
     divide,
-    largest_root,
-    multiply,
     roots,
     trim,
 )
@@ -33,7 +31,6 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 
 Sampling = Literal["zoh", "tustin"]
-INTEGRATOR = np.array([1.0, -1.0])
 
 
 @dataclass(frozen=True)
@@ -182,13 +179,15 @@ def design_pid(
     dominant: Sequence[float],
     auxiliary: ArrayLike = (),
     T: Tracking = "R",
+    freedom: Callable[[], DominantPID] | None = None,
 ) -> PID:
     """The digital PID that places the closed-loop poles, or only the dominant ones.
 
     A, B: plant in ascending powers of z^-1, h [s]. dominant: (w_n [rad/s], zeta). auxiliary:
     values of z, at most 2 for a plant of order 2 or less, where all poles are placed. For other
     plants the dominant pair is placed exactly and the rest by least squares on their polynomial;
-    if that is unstable, by a search for the smallest radius. T: see `tracking_polynomial`.
+    if that is unstable, by a search for the smallest radius. T: see `tracking_polynomial`. freedom:
+    the PIDs that place this dominant pair, which designs with other auxiliary poles share.
 
     Raises BadSpecification where the poles cannot be placed or the loop would be unstable, naming
     the pole. Source: our own for higher orders; Landau & Zito, section 3.2 for order 2.
@@ -205,7 +204,7 @@ def design_pid(
     if exact:
         R, S = _place_all(A, B, P_d, P_a, h)
     else:
-        R, S = _place_dominant(A, B, P_d, P_a, h)
+        R, S = (freedom() if freedom else DominantPID.of(A, B, P_d, h)).placed(P_a)
     P = trim(closed_loop(A, B, RST(R, S, R, h)), 1e-14)
     others = P_a if exact else divide(P, P_d)[0]
     rst = RST(R, S, tracking_polynomial(T, R, B, P_d, others), h, P)
@@ -233,56 +232,6 @@ def _place_all(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tuple[Ar
             "dominant ones; give fewer, or design an RST"
         )
     return solve_diophantine(A, B, np.convolve(P_d, P_a), H_S=INTEGRATOR, h=h)
-
-
-def _place_dominant(A: Array, B: Array, P_d: Array, P_a: Array, h: float) -> tuple[Array, Array]:
-    """R and S of a PID for any plant: dominant poles exact, the other two freedoms used.
-
-    With S = (1 - z^-1)(1 + s1 z^-1) the closed loop is P_d Q, and Q is linear in s1 and in the
-    multiple t of P_d in R.
-    """
-    fixed, R_0 = _with_dominant(A, B, P_d, np.array([1.0]), h)
-    moved, R_1 = _with_dominant(A, B, P_d, np.array([0.0, 1.0]), h)
-    n = max(fixed.size, moved.size, B.size, P_a.size)
-    Q_0, Q_1, Q_2, goal = (np.pad(c, (0, n - c.size)) for c in (fixed, moved, B, P_a))
-
-    size = 1.0 / float(np.abs(B).max())
-
-    def radius(x: Array, upper: float) -> float:
-        s1, t = (float(value) for value in x)
-        outside = max(s1 - upper, -0.999 - s1, 0.0)
-        return largest_root(Q_0 + s1 * Q_1 + t * size * Q_2) + 1e3 * outside
-
-    freedom = np.stack([Q_1, Q_2 * size], axis=1)
-    limits = ([-0.95, -np.inf], [-0.1, np.inf])
-    x = np.asarray(lsq_linear(freedom, goal - Q_0, limits).x, dtype=np.float64)
-    # -s1 = e^(-h/eps) >= 0.1 is a derivative filter; any other stable one is the last resort.
-    for upper, wanted in ((-0.1, float(np.abs(roots(P_d)).max())), (0.999, 1 - 1e-9)):
-        if radius(x, upper) > wanted:
-            x = _least(partial(radius, upper=upper), x, max(1.0, float(np.abs(Q_0).max())))
-    s1, t = float(x[0]), float(x[1]) * size
-    return add(R_0 + s1 * R_1, t * P_d), np.convolve(INTEGRATOR, np.array([1.0, s1]))
-
-
-def _with_dominant(A: Array, B: Array, P_d: Array, filter_: Array, h: float) -> tuple[Array, Array]:
-    """(Q, R) with A (1 - z^-1) filter_ + B R = P_d Q, deg R <= 1."""
-    open_loop = multiply(A, INTEGRATOR, filter_)
-    R, Q, sound = solve_sylvester(P_d, -B, open_loop)
-    if not sound:
-        raise BadSpecification(
-            f"a dominant pole {describe_root(complex(roots(P_d)[0]), h)} lies at a zero of the "
-            "plant, where feedback is blind; move it"
-        )
-    return Q, R
-
-
-def _least(radius: Callable[[Array], float], x: Array, scale: float) -> Array:
-    """The (s1, t) of the smallest radius found: a coarse grid, then its best points refined."""
-    sizes = scale * np.geomspace(1e-4, 1e2, 13)
-    grid = [np.array([s, t]) for s in np.linspace(-0.9, 0.0, 7) for t in (*-sizes, 0.0, *sizes)]
-    starts = [x, *sorted(grid, key=radius)[:4]]
-    found = [minimize(radius, s, method="Nelder-Mead", options={"maxiter": 300}) for s in starts]
-    return np.asarray(min(found, key=lambda result: float(result.fun)).x, dtype=np.float64)
 
 
 def _gain(name: str, value: float) -> float:

@@ -10,6 +10,7 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 
 ComplexArray = NDArray[np.complex128]
+INTEGRATOR = np.array([1.0, -1.0])
 SAME_ROOT = 1e-9  # backward error under which a value counts as a root of a polynomial
 
 
@@ -91,7 +92,8 @@ def evaluate(c: Array, z: ComplexArray | Array | complex) -> ComplexArray:
     q = 1.0 / np.asarray(z, dtype=np.complex128)
     out = np.full(q.shape, c[-1], dtype=np.complex128)
     for value in c[-2::-1]:
-        out = out * q + value
+        out *= q
+        out += value
     return out
 
 

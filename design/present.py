@@ -4,8 +4,7 @@ import math
 
 import numpy as np
 
-from design.pid import INTEGRATOR
-from design.polynomial import add, check_period, multiply
+from design.polynomial import INTEGRATOR, add, check_period, multiply
 from design.rst import RST
 from identification.errors import BadSpecification
 

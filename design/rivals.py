@@ -15,7 +15,7 @@ from design.pid import pid_to_rst
 from design.rst import RST
 from identification.arrays import Array
 from identification.errors import BadSpecification
-from identification.signals.clean import Filter
+from identification.signals.filters import Filter
 
 IntegralRule = Literal["plain", "dead-zone", "reset"]
 RULES: tuple[IntegralRule, ...] = ("plain", "dead-zone", "reset")

@@ -31,7 +31,7 @@ from design.servo_loop import SERVO_ROWS, plain_servo_kernel, servo_kernel
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.plant import Motor, Plant
-from identification.signals.clean import Filter, slope_filter
+from identification.signals.filters import Filter, slope_filter
 from identification.simulation.effect_table import ON_ACTUATOR, effect_table, pieces
 
 

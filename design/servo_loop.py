@@ -5,14 +5,9 @@ import numpy as np
 from design.servo_kernels import ADDED, RAW, SPEED, WANTED, Law, Memory, servo_step
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled
+from identification.simulation.effect_forces import shown_position, start_states
 from identification.simulation.effect_run import place_of
-from identification.simulation.effect_step import (
-    acting_command,
-    delayed,
-    effect_step,
-    shown_position,
-    start_states,
-)
+from identification.simulation.effect_step import acting_command, delayed, effect_step
 from identification.simulation.effect_table import ON_BRISTLE
 from identification.simulation.karnopp_step import (
     COLUMNS,

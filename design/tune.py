@@ -9,16 +9,22 @@ then chooses T.
 import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
+from design.dominant_pid import DominantPID
 from design.drawn_loops import DrawnPlants, loop_margins
-from design.margins import Margins, margins
+from design.margins import Margins, margins, modulus_margin
 from design.pid import PID, design_pid, pid_gains
 from design.polynomial import ComplexArray, frequency_and_damping, roots, trim
 from design.rst import RST, design_rst
-from design.specification import RSTSpecification, normalised_plant, pole_pair
+from design.specification import (
+    RSTSpecification,
+    dominant_polynomial,
+    normalised_plant,
+    pole_pair,
+)
 from design.tracking import (
     Demand,
     Followed,
@@ -92,8 +98,9 @@ class Tuned(Placed):
     followed: Followed
 
 
-# The least modulus margin inside the parameters' intervals, and the goals that are missed there.
-Inside = Callable[[RST], tuple[float | None, tuple[str, ...]]]
+# The least modulus margin inside the parameters' intervals, of which that of the nominal plant is
+# given, and the goals that are missed there.
+Inside = Callable[[RST, float], tuple[float | None, tuple[str, ...]]]
 Design = Callable[[tuple[float, float], tuple[complex, ...]], tuple[RST, PID | None]]
 
 
@@ -156,10 +163,16 @@ def tune_pid(
     """
     A, B = normalised_plant(A, B)
 
+    @cache
+    def freedom(dominant: tuple[float, float]) -> DominantPID:
+        return DominantPID.of(A, B, dominant_polynomial(dominant, h), h)
+
     def design(
         dominant: tuple[float, float], auxiliary: tuple[complex, ...]
     ) -> tuple[RST, PID | None]:
-        found = design_pid(A, B, h, dominant=dominant, auxiliary=auxiliary)
+        found = design_pid(
+            A, B, h, dominant=dominant, auxiliary=auxiliary, freedom=partial(freedom, dominant)
+        )
         return found.rst, found
 
     others = _auxiliary(A, h, min(A.size - 1, 2))
@@ -307,27 +320,31 @@ def _judged(
         missed = (*missed, *_laggards(margin, poles[0], slow))
     worst: float | None = margin.modulus
     if not missed:
-        worst, missed = inside(controller)
+        worst, missed = inside(controller, margin.modulus)
     if not controller.stable:
         missed = (*missed, "the controller itself has a pole outside the unit circle")
     return Placed(controller, margin, worst, *poles, missed, pid)
 
 
-def worst_modulus(plants: Plants, controller: RST) -> float | None:
-    """Least modulus margin over the plants; None where one of the loops is unstable."""
-    every = DrawnPlants.of([(A / A[0], B / A[0]) for A, B in plants], 0.5)
-    least = float(np.min(loop_margins(every.A, every.B, controller).modulus))
-    return least if least > 0.0 else None
+def worst_modulus(plants: Plants, controller: RST, least: float = math.inf) -> float | None:
+    """Least modulus margin over the plants; None where one of the loops is unstable.
+
+    least: that over other plants.
+    """
+    try:
+        return min((least, *(modulus_margin(A, B, controller) for A, B in plants)))
+    except BadSpecification:
+        return None
 
 
 def _inside(plants: Plants, goals: Goals, drawn: DrawnPlants | None) -> Inside:
     """What a controller misses on plants other than the first: on any of the corners, or on too
     many of those drawn."""
 
-    def of(controller: RST) -> tuple[float | None, tuple[str, ...]]:
+    def of(controller: RST, nominal: float) -> tuple[float | None, tuple[str, ...]]:
         if drawn is not None and (missed := drawn.missed(controller, goals)):
             return None, missed
-        worst = worst_modulus(plants, controller)
+        worst = worst_modulus(plants[1:], controller, nominal)
         return worst, () if drawn is not None else _worst_missed(worst, goals)
 
     return of

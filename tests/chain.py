@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
@@ -12,9 +13,11 @@ from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Actuator
 from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
+from workbench.documents.design import Design
 from workbench.documents.model import FitSummary, LogEntry, Model
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
+from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.simulate import record
 
@@ -55,6 +58,7 @@ TABLES = {
     "paper_table2": Karnopp(3.5, 16.97, 18.13, 289.0, 287.4, 0.009, -0.01, 20.76, -21.8),
     "paper_table3": Karnopp(6.5, 12.54, 7.35, 147.01, 113.05, 0.015, -0.02, 24.03, -10.18),
 }
+_DESIGNED: dict[str, Design] = {}
 EMPS = Karnopp(95.1, 23.5, 17.2, 203.5, 203.5, 0.001, -0.001, 25.0, -19.0)
 
 
@@ -73,6 +77,14 @@ def identified() -> Identified:
     log = record("short", recipe)
     source = Source(log, "short.csv", "0" * 64, len(log))
     return identify_sources(Sources(card, card.rig(), (source,), ("a remark",)))
+
+
+def designed(model: Model, *given: Any, **asked: Any) -> Design:
+    """`workbench.steps.design.design` of the model, made once a process for what is asked."""
+    key = repr((model, model.read, given, sorted(asked.items())))
+    if key not in _DESIGNED:
+        _DESIGNED[key] = design(model, *given, **asked)
+    return _DESIGNED[key]
 
 
 def model_of(

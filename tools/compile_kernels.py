@@ -9,6 +9,8 @@ import numpy as np
 import pandas as pd
 
 import workbench as wb
+from identification.effects._library import built_in
+from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
 
 PLAIN, RICH = "paper_table1_rich", "demo"
 SECONDS = 6.0
@@ -20,13 +22,15 @@ def short(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def main() -> None:
-    """A short log through identification, drift, design and validation, and one with effects."""
+    """A short log through identification, drift, design and validation, and every effect's run."""
     log = short(wb.simulate(PLAIN).frame)
     model = wb.identify(log, PLAIN)
     wb.drift(model, log.assign(y=np.round(log["y"], 6)), PLAIN)
     wb.validate(model, wb.design(model))
     wb.simulate(RICH)
     wb.trace(log, None, PLAIN)
+    for effect in built_in().values():
+        run_with(HYDRAULIC, trial_log(1.0), typical(effect))
 
 
 if __name__ == "__main__":

@@ -96,6 +96,36 @@ def effects_option(command: Command) -> Command:
     )(command)
 
 
+def registry_option(command: Command) -> Command:
+    """The option `--registry`, where the registry is, as `where`."""
+    return click.option(
+        "--registry",
+        "where",
+        metavar="FILE|URL",
+        help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
+    )(command)
+
+
+def machines_option(command: Command) -> Command:
+    """The option `--machines` of what serves the page: the folder of all machines."""
+    return click.option(
+        "--machines",
+        type=click.Path(path_type=Path),
+        default=Path("machines"),
+        metavar="FOLDER",
+        show_default=True,
+        help="Folder of the machines, as of 'watch'; dropped logs lie in it too.",
+    )(command)
+
+
+def events_options(command: Command) -> Command:
+    """The options `--json`, as `as_json`, and `--debug` of commands that tell events as JSON."""
+    debug = click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+    return click.option(
+        "--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON."
+    )(debug(command))
+
+
 def _the_only(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
     if len(values) > 1:
         raise click.UsageError(

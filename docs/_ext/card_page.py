@@ -10,7 +10,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 from sphinx.errors import ExtensionError
 
-from workbench.cards.card import CardFile
+from workbench.cards.card_tables import CardFile
 from workbench.cards.table import CardTable
 
 HEAD = """# The card, key by key

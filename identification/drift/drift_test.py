@@ -13,13 +13,13 @@ levels; else the log is not judged.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2, norm
 
 from identification.arrays import Array
+from identification.drift.drift_result import DriftTest, DriftVerdict, FoundBy, Shift, Statistic
 from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
 from identification.drift.mewma import (
     DriftState,
@@ -39,8 +39,6 @@ from identification.log import Log
 from identification.model.karnopp import NAMES
 from identification.thresholds import SEEN, SEEN_MARGINS, VANISHED
 
-DriftVerdict = Literal["none", "drift", "structure", "not_judged"]
-FoundBy = Literal["log", "mean"]
 Z_95 = float(norm.isf(0.025))
 
 
@@ -76,79 +74,6 @@ class DriftSettings:
     def to_be_seen(self) -> float:
         """Relative change that a log must be able to show, or it does not judge the parameter."""
         return max(SEEN, SEEN_MARGINS * self.margin)
-
-
-@dataclass(frozen=True)
-class Shift:
-    """A parameter before (model in force) and after (this log, or the mean of the last logs).
-
-    change: relative to the model's value, with its standard deviation and 95 % interval, in which
-    the model's error, the log's and the machine's variation from log to log are.
-    """
-
-    name: str
-    unit: str
-    before: float
-    before_sd: float
-    after: float
-    after_sd: float
-    change: float
-    sd: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Statistic:
-    """A test's value and threshold; p_value: chance of as much without drift, at most."""
-
-    value: float
-    threshold: float
-    p_value: float
-    parameters: int
-
-    @property
-    def alarm(self) -> bool:
-        """Whether the value lies above the threshold."""
-        return self.value > self.threshold
-
-
-@dataclass(frozen=True)
-class DriftTest:
-    """The verdict on one log.
-
-    verdict: "none", "drift", "structure" (no parameters of the model's structure follow the log),
-    "not_judged" (`reason` says why: nothing is told, or a change of the Coulomb levels could not
-    have been seen). moved: of the fewest parameters that explain a drift, those that surely have a
-    part in it; unsure: names of the others, and of those that explain it as well. shifts: every
-    tested parameter on this log; not_judged: the others, with the reason; could_have_seen:
-    smallest relative change of each tested one that would have been found on this log or, if it
-    lasts, by the mean. single, alone, mean: the statistic of all parameters of this log, of the
-    largest one, and of the mean over logs, None where nothing is tested; found_by: which of them
-    alarmed ("log": the first two). chi_square: what the log's own refit leaves; allowed: up to
-    which the structure fits. state: to be given with the next log.
-    """
-
-    log: str
-    verdict: DriftVerdict
-    moved: tuple[Shift, ...]
-    shifts: Mapping[str, Shift]
-    not_judged: Mapping[str, str]
-    single: Statistic | None
-    mean: Statistic | None
-    found_by: FoundBy | None
-    chi_square: float | None
-    allowed: float | None
-    reason: str
-    state: DriftState
-    alone: Statistic | None = None
-    unsure: tuple[str, ...] = ()
-    could_have_seen: Mapping[str, float] = field(default_factory=dict)
-
-    @property
-    def tested(self) -> bool:
-        """Whether the log was tested at all, whatever it could have shown."""
-        return self.single is not None
 
 
 def drift_test(

@@ -18,14 +18,12 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
     MotionLog,
-    Rows,
     mechanical,
     motion_log,
-    solve_rows,
-    stacked,
 )
 from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
+from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.model.plant import Plant

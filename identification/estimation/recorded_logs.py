@@ -8,13 +8,10 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regression.equation_rows import (
-    Fitted,
     MotionLog,
     actuator,
     mechanical,
     motion_log,
-    solve_rows,
-    stacked,
 )
 from identification.estimation.regression.held_command import (
     between_samples,
@@ -23,6 +20,7 @@ from identification.estimation.regression.held_command import (
     unseen,
 )
 from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt

@@ -5,38 +5,30 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array
-from identification.effects._base import AT_REST, Acting, Effect
+from identification.effects._base import Effect
 from identification.errors import UserError
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
-from identification.estimation.regression.effect_columns import Values, by_load, in_columns
+from identification.estimation.regressed_plant import (
+    RegressedPlant,
+    inertia_is_lost,
+    left_open,
+    regressed_plant,
+)
+from identification.estimation.regression.effect_columns import Values, by_load
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     BREAKAWAY,
-    FIVE,
     MECHANICAL,
     MotionLog,
     shortened,
 )
-from identification.estimation.regression.row_fit import (
-    RowFit,
-    first_stage,
-    mean_square,
-    rough,
-    with_sizes,
-)
-from identification.estimation.regression.standstill import borne
+from identification.estimation.regression.row_fit import RowFit, first_stage, mean_square, rough
 from identification.estimation.regression.three_step import first_estimate
-from identification.estimation.windowed_run.nudged_search import (
-    SEARCHES,
-    STICK_PER_COULOMB,
-    SearchLimits,
-    closest,
-    loaded,
-)
+from identification.estimation.windowed_run.closest import SEARCHES, SearchLimits, closest
+from identification.estimation.windowed_run.nudged_search import loaded
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import (
     RESCUES,
@@ -52,15 +44,8 @@ from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import Halted, Progress, quiet
-from identification.thresholds import ADEQUATE, COMPLETE, INERT, MUCH
+from identification.thresholds import ADEQUATE, COMPLETE, MUCH
 
-USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
-OVERLAP = 2.5  # rows that share samples are worth one in so many
-SHAPE = 0.03  # relative trust in a searched parameter
-EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
-LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none
-SLIGHT = 3.0  # deviations, below which a part of an effect begins as none
-QUICK = 20.0  # part of a sample, in which a body hardly moves on its own
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
 ABOVE_BAND = 1.3  # times the band, above which sliding friction is judged
 
@@ -82,18 +67,6 @@ class FittedStructure:
     fit: KarnoppFit | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Regressed:
-    """A structure by the equations alone: its plant, how sure they are of each parameter by name,
-    and (silent) parameters of which they tell nothing; slow [m/s]: speed below which they do not
-    hold."""
-
-    plant: Plant
-    prior: Mapping[str, float]
-    silent: Mapping[str, float]
-    slow: float
-
-
 def fitted_structure(
     stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
     recorded: RecordedLogs, rng: np.random.Generator, *, near: Karnopp | None = None,
@@ -105,7 +78,7 @@ def fitted_structure(
     so far, with the deviations that the regression tells.
     """
     logs, drive = recorded.logs, recorded.drive
-    told = _regressed(stage, outcomes, effects, recorded)
+    told = regressed_plant(stage, outcomes, effects, recorded)
     plant, prior = told.plant, dict(told.prior)
     if drive == "force" and inertia_is_lost(outcomes[MECHANICAL]):
         return FittedStructure(stage, outcomes, plant, {**prior, **told.silent}, True)
@@ -138,7 +111,7 @@ def fitted_structure(
 
 
 def _closest(
-    told: _Regressed, recorded: RecordedLogs, rng: np.random.Generator,
+    told: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator,
     known: tuple[Karnopp | None, bool, bool], done: Refit,
 ) -> Refit:  # fmt: skip
     """The plant searched where nothing holds its run to the log's position.
@@ -173,7 +146,9 @@ def _best_so_far(
     return min(found, key=lambda one: one[1])
 
 
-def _stops_searched(told: _Regressed, recorded: RecordedLogs, rng: np.random.Generator) -> Refit:
+def _stops_searched(
+    told: RegressedPlant, recorded: RecordedLogs, rng: np.random.Generator
+) -> Refit:
     """The regression's plant, its stops searched by themselves, refined on the free run."""
     logs, drive = recorded.logs, recorded.drive
     plant = stick_search(told.plant, logs, drive, rng)
@@ -181,8 +156,8 @@ def _stops_searched(told: _Regressed, recorded: RecordedLogs, rng: np.random.Gen
 
 
 def _refined(
-    told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None, effort: Effort,
-    before: Refit | None,
+    told: RegressedPlant, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
+    effort: Effort, before: Refit | None,
 ) -> Refit:  # fmt: skip
     """The regression's plant refined on the free run, from another band and on a piece first where
     that leaves more than noise; or one of before, if that is better."""
@@ -196,8 +171,8 @@ def _refined(
 
 
 def _rebegun(
-    done: Refit, told: _Regressed, logs: Sequence[MotionLog], drive: Drive, near: Karnopp | None,
-    effort: Effort,
+    done: Refit, told: RegressedPlant, logs: Sequence[MotionLog], drive: Drive,
+    near: Karnopp | None, effort: Effort,
 ) -> Refit:  # fmt: skip
     """The better of a refinement and of those from another band and on a piece first."""
     plant, prior = told.plant, dict(told.prior)
@@ -216,154 +191,6 @@ def _rebegun(
         close = refit(begun, logs, drive, prior=prior, effort="near", rescues=RESCUES)
         done = close if close.misfit < done.misfit else done
     return done
-
-
-def _regressed(
-    stage: EffectRows, outcomes: Mapping[str, RowFit], effects: Sequence[tuple[Effect, Values]],
-    recorded: RecordedLogs,
-) -> _Regressed:  # fmt: skip
-    """The plant by the equations alone."""
-    five = dict(zip(FIVE, np.maximum(stage.theta, 1e-9).tolist(), strict=True))
-    sliding = outcomes[MECHANICAL]
-    prior = dict(zip(FIVE, deviations(sliding)[:5].tolist(), strict=True))
-    logs, rig = recorded.logs, recorded.rig
-    up, down = borne(logs)
-    stick_p, stick_n = _limit(five["F_cp"], up), -_limit(five["F_cn"], down)
-    if BREAKAWAY in outcomes:
-        found = outcomes[BREAKAWAY].fit.theta
-        stick_p = float(found[0]) if found[0] > 0 else stick_p
-        stick_n = -float(found[1]) if found[1] > 0 else stick_n
-    slow = max(sliding.slowest, float(np.min([5.0 * one.v_noise for one in stage.logs])))
-    nine = Karnopp(**five, dv_p=slow, dv_n=-slow, F_sp=stick_p, F_sn=stick_n)
-    drives: Actuator | Motor | None = None
-    if ACTUATOR in outcomes:
-        k1, k2 = (float(x) for x in outcomes[ACTUATOR].fit.theta[:2])
-        drives = Actuator(max(k1, 1e-9), max(k2, 0.0))
-        prior |= dict(zip(("k1", "k2"), deviations(outcomes[ACTUATOR])[:2].tolist(), strict=True))
-    elif rig.kind == "motor" and rig.force_per_command is not None:
-        drives = Motor(rig.force_per_command)
-    acting, silent = [], dict[str, float]()
-    for effect, shape in effects:
-        values, spreads, unheard = _of_effect(effect, shape, outcomes)
-        acting.append(effect.acting(values))
-        prior |= spreads
-        silent |= dict.fromkeys(unheard, np.inf)
-    nine = replace(nine, m=max(nine.m, least_mass(nine, drives, logs[0].log.h)))
-    return _Regressed(Plant(nine, drives, tuple(acting)), prior, silent, slow)
-
-
-def _of_effect(
-    effect: Effect, shape: Values, outcomes: Mapping[str, RowFit]
-) -> tuple[dict[str, float], dict[str, float], list[str]]:
-    """An effect's parameters by the equations, how sure they are of each (as key.name), and those
-    (as key.name) of which they tell nothing."""
-    values = inside(effect, with_sizes(effect, shape, outcomes))
-    spreads = effect_sd(effect, values, outcomes)
-    none, unheard = slight(effect, values, spreads), []
-    for p in effect.params:  # a signal that is not there tells nothing of its parameter
-        if p.name in AT_REST:  # nor do the equations tell a stick limit
-            unheard.append(f"{effect.key}.{p.name}")
-            spreads.pop(p.name)
-        elif p.name in effect.linear and spreads.get(p.name) == 0.0:  # nor a signal of nothing
-            unheard.append(f"{effect.key}.{p.name}")
-            values[p.name] = float(np.clip(0.0, p.low, p.high))
-        elif lost(spreads.get(p.name), values[p.name], p.typical) or p.name in none:
-            values[p.name] = float(np.clip(0.0, p.low, p.high))
-    return values, {f"{effect.key}.{k}": x for k, x in spreads.items()}, unheard
-
-
-def lost(sd: float | None, value: float, typical: float) -> bool:
-    """Whether a deviation is so far beyond its parameter that no search should begin from it."""
-    return sd is not None and not sd < LOST * max(abs(value), abs(typical))
-
-
-def _limit(coulomb: float, held: float) -> float:
-    """A stick limit [N] to begin from; a body at rest against a stop bears more than any."""
-    return min(max(USUAL_STICK * coulomb, held), STICK_PER_COULOMB[2] * coulomb)
-
-
-def least_mass(nine: Karnopp, drives: Actuator | Motor | None, h: float) -> float:
-    """Mass [kg] below which a body's motion is over within a small part of a sample of h [s].
-
-    A regression bent by what the model lacks may leave none, and a run with none takes for ever.
-    """
-    k2 = drives.k2 if isinstance(drives, Actuator) else 0.0
-    return max(max(nine.F_vp, nine.F_vn) * h / QUICK, k2 * (h / QUICK) ** 2)
-
-
-def inertia_is_lost(o: RowFit) -> bool:
-    """Whether the motion is imposed: inertia is of no account beside what the model leaves."""
-    keep = o.rows.speed >= o.slowest
-    inertia = float(np.std((o.rows.X[:, 0] * o.fit.theta[0])[keep]))
-    left = float(np.std((o.fit.residual * o.rows.sd)[keep]))
-    return inertia < INERT * left
-
-
-def left_open(effects: Sequence[Acting], sd: Mapping[str, float]) -> dict[str, float]:
-    """How far sliding, which these effects explain, leaves mass, friction and sizes open, by name.
-
-    Nothing is known so well of a plant without effects, or where one is told by more than sliding.
-    """
-    if not effects or not all(
-        in_columns(a.effect) and not a.effect.place.in_stops for a in effects
-    ):
-        return {}
-    sizes = (f"{a.key}.{name}" for a in effects for name in a.effect.linear)
-    return {
-        name: EQUATION_DEVIATIONS * sd[name] for name in (*FIVE, *sizes) if sd.get(name, 0.0) > 0.0
-    }
-
-
-def slight(effect: Effect, values: Mapping[str, float], sd: Mapping[str, float]) -> set[str]:
-    """Names of sizes that are no more than chance makes of none, where another one is more.
-
-    A search would follow them to wherever they happen to help.
-    """
-    if not in_columns(effect):
-        return set()
-    small = {name for name in effect.linear if abs(values[name]) < SLIGHT * sd.get(name, 0.0)}
-    spare = {p.name for p in effect.params if p.spare}
-    return small & spare if small < set(effect.linear) else set()
-
-
-def inside(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
-    """The values, those out of bounds put at the bound."""
-    return {p.name: float(np.clip(values[p.name], p.low, p.high)) for p in effect.params}
-
-
-def deviations(o: RowFit) -> Array:
-    """Standard deviations of theta, (k,), widened by what the rows leave and their overlap.
-
-    0 where a column is nothing.
-    """
-    keep = o.rows.speed >= o.slowest
-    A = (o.rows.X / o.rows.sd[:, np.newaxis])[keep]
-    size = np.maximum(np.linalg.norm(A, axis=0), 1e-300)
-    inverse = np.linalg.pinv((A / size).T @ (A / size), rcond=1e-12)
-    left = float(np.mean(o.fit.residual[keep] ** 2)) if np.any(keep) else 1.0
-    return np.asarray(np.sqrt(np.maximum(np.diag(inverse), 0.0) * OVERLAP * max(left, 1.0)) / size)
-
-
-def effect_sd(
-    effect: Effect, values: Mapping[str, float], outcomes: Mapping[str, RowFit]
-) -> dict[str, float]:
-    """Standard deviations of an effect's parameters for the prior; 0 holds one at its value."""
-    out: dict[str, float] = {}
-    for p in effect.params:
-        if p.held(values[p.name]):
-            out[p.name] = 0.0
-        else:
-            out[p.name] = SHAPE * abs(values[p.name]) if values[p.name] else 0.0
-    for o in outcomes.values():
-        spreads = dict(zip(o.rows.names, deviations(o).tolist(), strict=True))
-        for name in effect.linear:
-            full = f"{effect.key}.{name}"
-            if full in spreads:
-                out[name] = spreads[full]
-            elif f"{full}+" in spreads:
-                out[name] = 0.5 * float(np.hypot(spreads[f"{full}+"], spreads[f"{full}-"]))
-                out["asymmetry"] = out[name] / max(abs(values[name]), 1e-300)
-    return out
 
 
 def band(model: FittedStructure) -> float:

@@ -4,13 +4,8 @@ import numpy as np
 
 from identification.arrays import Array, IntArray
 from identification.compiled import call_value, compiled
-from identification.simulation.effect_step import (
-    acting_command,
-    delayed,
-    effect_step,
-    shown_position,
-    start_states,
-)
+from identification.simulation.effect_forces import shown_position, start_states
+from identification.simulation.effect_step import acting_command, delayed, effect_step
 from identification.simulation.effect_table import (
     INITIAL,
     ON_ACTUATOR,

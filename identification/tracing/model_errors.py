@@ -7,13 +7,9 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    MECHANICAL,
-    MotionLog,
-    stacked,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, rms
+from identification.estimation.regression.weighted_rows import stacked
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import position_rms

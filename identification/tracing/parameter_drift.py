@@ -5,18 +5,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.estimation.regressed_plant import OVERLAP
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     FIVE,
     MECHANICAL,
     MotionLog,
-    Rows,
     column_noise,
-    stacked,
 )
 from identification.estimation.regression.row_fit import RowFit
-from identification.estimation.structure_fit import OVERLAP, FittedStructure, band
+from identification.estimation.regression.weighted_rows import Rows, stacked
+from identification.estimation.structure_fit import FittedStructure, band
 from identification.log import Rig
 from identification.model.plant import units_of
 from identification.thresholds import DRIFT_GAIN, DRIFT_LEAST, DRIFT_SHARE

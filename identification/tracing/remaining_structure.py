@@ -10,13 +10,13 @@ from identification.arrays import Array, BoolArray, IntArray
 from identification.estimation.regression.effect_rows import EffectRows, one_way
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
-    BLOCKS,
     BREAKAWAY,
     MECHANICAL,
     REST,
     MotionLog,
 )
 from identification.estimation.regression.row_fit import RowFit, mean_square, rms
+from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.estimation.windowed_run.parameters import PERIOD_REACH
 from identification.estimation.windowed_run.run_errors import soft

@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.fit import finished
+from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
 from identification.estimation.regression.row_fit import mean_square
-from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.log import Rig
 from identification.model.plant import Plant

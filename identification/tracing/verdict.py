@@ -9,13 +9,9 @@ from identification.estimation.estimates import of_effect
 from identification.estimation.imposed_motion import imposed_estimates
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
-from identification.estimation.regression.equation_rows import (
-    ACTUATOR,
-    MECHANICAL,
-    MotionLog,
-    stacked,
-)
+from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, rms
+from identification.estimation.regression.weighted_rows import stacked
 from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors

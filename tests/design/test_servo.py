@@ -25,7 +25,7 @@ from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.signals.clean import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
+from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 from tests.identification.plants import ACTUATOR, table
 
 H, N = 1e-3, 6000

@@ -12,7 +12,7 @@ from sphinx.errors import ExtensionError
 from docs._ext import card_page, command_pages, effect_pages
 from docs._ext.session import blocks
 from identification.effects._library import built_in
-from workbench.cards.card import CardFile
+from workbench.cards.card_tables import CardFile
 from workbench.cli import COMMANDS, cli
 
 ROOT = Path(__file__).parents[2]

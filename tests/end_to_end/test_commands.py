@@ -13,6 +13,7 @@ from tests.chain import CARD
 from workbench.cli import COMMANDS, main
 from workbench.steps import demo as demonstration
 from workbench.steps.loop_figures import Limits
+from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import validate
 
 WITHOUT_FILES = (
@@ -226,7 +227,9 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     shown = capsys.readouterr().out
     assert "No controller keeps every goal" in shown and "RST misses: modulus margin" in shown
     assert shown.splitlines()[-1].endswith(f"): workbench design {shop / 'id/model.json'}")
-    assert as_json(capsys, [*command, "--modulus", "0.99"], status=1)["recommended"] == "none"
+    strict = as_json(capsys, [*command, "--poles", "15,0.9", "--modulus", "0.99"], status=1)
+    assert strict["recommended"] == "none"
+    assert any("at least 0.99 asked" in line for line in strict["rst"]["missed"])
 
 
 def test_export_writes_code(shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -379,22 +382,41 @@ def test_a_model_without_a_plant_is_a_refusal(
     assert found["next"].startswith("workbench doctor short.csv --card ")
 
 
-def test_a_demo_that_fails_says_so_by_its_status(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def strict(*args: Any, **more: Any) -> Any:
-        return validate(*args, **more, limits=Limits(standstill=1e-9))
-
-    monkeypatch.setattr(demonstration, "validate", strict)
-    shown = as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)
-    assert shown["passed"] is False
-    assert shown["reason"].startswith("RST on the model: error at standstill")
+@pytest.fixture(scope="module")
+def traced() -> list[Traced]:
+    """What the demo's trace has found, once it has run."""
+    return []
 
 
-def test_demo_runs_the_chain(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_demo_runs_the_chain(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    traced: list[Traced],
+) -> None:  # fmt: skip
+    def kept(*args: Any) -> Traced:
+        traced.append(trace_sources(*args))
+        return traced[0]
+
+    monkeypatch.setattr(demonstration, "trace_sources", kept)
     found = as_json(capsys, ["demo", "--out", str(tmp_path / "demo")])
     assert found["passed"] is True
     assert found["worst_error"] < 5e-3
     assert found["verdict"] == "effect" and found["effects"] == ["stribeck"]
     names = {"model.json", "design.json", "validation.json", "truth.json", "trace.json"}
     assert names | {"report.html", "design.html", "validation.html"} <= files(tmp_path / "demo")
+
+
+def test_a_demo_that_fails_says_so_by_its_status(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
+    traced: list[Traced],
+) -> None:  # fmt: skip
+    def found(*args: Any) -> Traced:
+        return traced[0] if traced else trace_sources(*args)
+
+    def strict(*args: Any, **more: Any) -> Any:
+        return validate(*args, **more, limits=Limits(standstill=1e-9))
+
+    monkeypatch.setattr(demonstration, "trace_sources", found)  # the same log is not traced twice
+    monkeypatch.setattr(demonstration, "validate", strict)
+    shown = as_json(capsys, ["demo", "--out", str(tmp_path / "d")], status=1)
+    assert shown["passed"] is False
+    assert shown["reason"].startswith("RST on the model: error at standstill")

@@ -9,7 +9,7 @@ import pytest
 
 from workbench.cli import main
 from workbench.course import Course
-from workbench.documents.model import read_model
+from workbench.documents.model_file import read_model
 from workbench.logs.fetch import card_path
 
 FILES = {"trace.json", "model.json", "report.html"}

@@ -9,13 +9,12 @@ from typing import Any
 import pytest
 
 from identification.model.plant import Actuator
-from tests.chain import CARD, TABLES, model_of
+from tests.chain import CARD, TABLES, designed, model_of
 from tests.workbench.jobs.listener import listening
 from workbench.cli import main
-from workbench.documents.design import design_document
-from workbench.documents.model import model_document
+from workbench.documents.design_file import design_document
+from workbench.documents.model_file import model_document
 from workbench.output import dumps
-from workbench.steps.design import design
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 WHY = ["--reason", "a test", "--by", "tester"]
@@ -29,7 +28,7 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     for number, table in enumerate(("paper_table1", "paper_table2"), 1):
         model = model_of(TABLES[table], ACTUATOR)
         Path(f"model{number}.json").write_text(dumps(model_document(model)), encoding="utf-8")
-        made = dumps(design_document(design(model)))
+        made = dumps(design_document(designed(model)))
         Path(f"design{number}.json").write_text(made, encoding="utf-8")
     return tmp_path
 

@@ -1,4 +1,7 @@
-"""Twelve weeks of one machine, from table 2 to table 3: what is noticed, when, and what is done."""
+"""Twelve weeks of one machine, from table 2 to table 3: what is noticed, when, and what is done.
+
+`benchmarks/scenario.py` tells the same story with two logs a week.
+"""
 
 from pathlib import Path
 
@@ -6,6 +9,9 @@ import pytest
 
 from benchmarks.scenario import SPRING, Told, days, picture, story
 from workbench.registry.store import Registry
+
+LOGGED = (0, 1, 2, 4, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22)  # one a week, and both unreadable ones
+DAYS = [day for day in days() if day.number in LOGGED]
 
 
 @pytest.fixture(scope="module")
@@ -16,15 +22,15 @@ def home(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def told(home: Path) -> list[Told]:
-    """The whole story; its noise is not that of the README's picture."""
-    return story(home, seed=5)
+    """The story of the README's picture with a log a week, and other noise."""
+    return story(home, 5, LOGGED)
 
 
 def test_every_log_has_one_verdict(told: list[Told]) -> None:
-    assert [one.day for one in told] == list(days())
-    verdicts = [one.outcome.verdict for one in told]
+    assert [one.day for one in told] == DAYS
+    verdicts = {one.day.number: one.outcome.verdict for one in told}
     assert verdicts[0] == "promoted"
-    assert verdicts[1:6] == ["none"] * 5
+    assert [verdicts[number] for number in (1, 2, 4)] == ["none"] * 3
 
 
 def test_bad_logs_and_a_sensor_fault_are_set_aside_and_stop_nothing(told: list[Told]) -> None:
@@ -35,12 +41,12 @@ def test_bad_logs_and_a_sensor_fault_are_set_aside_and_stop_nothing(told: list[T
 
 
 def test_wear_is_followed(told: list[Told]) -> None:
-    """With at most one log's wear behind: 0.3 N of F_cp."""
+    """With less behind than wears off between two logs: 0.6 N of F_cp."""
     for one in told:
         if not one.day.fault:
             assert one.in_force == pytest.approx(one.true, abs=0.35), one
     moved = [one for one in told if one.outcome.reason.startswith("moved:")]
-    assert len(moved) >= 5
+    assert len(moved) >= 4
     assert told[-1].in_force == pytest.approx(12.54, abs=0.1)
 
 
@@ -62,7 +68,8 @@ def test_the_undeclared_spring_is_named_when_it_comes_and_stays(
 def test_nothing_is_lost(told: list[Told], home: Path) -> None:
     with Registry(str(home / "registry.db")) as registry:
         state = registry.machine("rig")
-        assert (state.logs, state.waiting, state.set_aside) == (24, 0, 4)
+        set_aside = sum(bool(day.fault) for day in DAYS)
+        assert (state.logs, state.waiting, state.set_aside) == (len(DAYS), 0, set_aside)
         promoted = [one for one in registry.decisions("rig") if one.kind == "promoted"]
     assert len(promoted) == sum(one.outcome.verdict == "promoted" for one in told)
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from workbench.cli import main
-from workbench.documents.model import read_model
+from workbench.documents.model_file import read_model
 from workbench.logs.fetch import card_path
 
 

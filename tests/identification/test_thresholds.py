@@ -28,20 +28,20 @@ from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import is_no_run, leaves_much
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.recorded_logs import chosen_drive, recorded_logs
+from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     FIVE,
     MECHANICAL,
     REST,
-    Fitted,
     MotionLog,
-    Rows,
 )
 from identification.estimation.regression.held_command import told_share
 from identification.estimation.regression.row_fit import RowFit, rough
+from identification.estimation.regression.weighted_rows import Fitted, Rows
 from identification.estimation.settling import is_adequate
-from identification.estimation.structure_fit import FittedStructure, inertia_is_lost
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability

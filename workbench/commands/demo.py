@@ -34,8 +34,8 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     the model found, and checks them in simulation.
     """
     from workbench.cards.card import load_card
-    from workbench.documents.design import design_document
-    from workbench.documents.model import model_document
+    from workbench.documents.design_file import design_document
+    from workbench.documents.model_file import model_document
     from workbench.logs.fetch import card_path
     from workbench.report.demo_tables import demo_view
     from workbench.report.next_steps import after_demo

@@ -117,8 +117,8 @@ def command(
     """
     from design.tune import Asked, Goals
     from workbench.cards.own_effects import library
-    from workbench.documents.design import design_document
-    from workbench.documents.model import read_model
+    from workbench.documents.design_file import design_document
+    from workbench.documents.model_file import read_model
     from workbench.options import parse_auxiliary, parse_poles
     from workbench.report.design_tables import design_view
     from workbench.report.next_steps import after_design, without_design
@@ -168,7 +168,7 @@ def _robust(
     model: "Model", model_file: Path, wanted: "RobustAsked", asked: "Asked",
     plant: "tuple[From | None, float | None]", as_json: bool, out: Path | None,
 ) -> int:  # fmt: skip
-    from workbench.documents.design import design_document
+    from workbench.documents.design_file import design_document
     from workbench.report.next_steps import after_robust, without_design
     from workbench.report.robust import robust_report, robust_view
     from workbench.steps.robust.document import robust_document

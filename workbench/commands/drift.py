@@ -71,7 +71,7 @@ def command(
     """
     from identification.drift.drift_test import DriftSettings
     from workbench.cards.own_effects import library
-    from workbench.documents.model import read_model
+    from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_report
     from workbench.report.drift_tables import drift_view

@@ -79,8 +79,8 @@ def command(
     report.html. The run begins with the machine at rest at the first r.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design import read_design
-    from workbench.documents.model import read_model
+    from workbench.documents.design_read import read_design
+    from workbench.documents.model_file import read_model
     from workbench.report.experiment import experiment_report, experiment_view, reference_text
     from workbench.report.next_steps import after_experiment
     from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment

@@ -75,7 +75,7 @@ def command(
     gives the command with its limit and anti-windup, as the simulation does, in every bit (c, fmu)
     or within rounding (st, plcopen). Each file holds a vector that tests it on the machine.
     """
-    from workbench.documents.design import read_design
+    from workbench.documents.design_read import read_design
     from workbench.export.exported import exported
     from workbench.export.targets import writers
 

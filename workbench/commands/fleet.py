@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from workbench.ending import StatusCommand, Step, step
-from workbench.options import POSITIVE
+from workbench.options import POSITIVE, registry_option
 from workbench.output import dumps, emit, progress
 
 if TYPE_CHECKING:
@@ -40,8 +40,7 @@ def fleet_options(command: Command) -> Command:
                      "ADDRESS has a setting of its own."),
         click.option("--timeout", type=POSITIVE, default=30.0, show_default=True, metavar="S",
                      help="Wait this long for a cluster's answer."),
-        click.option("--registry", "where", metavar="FILE|URL", help="SQLite file or "
-                     "postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]"),
+        registry_option,
         click.option("--no-registry", is_flag=True, help="Write Parquet only."),
         click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
         click.option("--out", type=click.Path(path_type=Path), metavar="DIR",

@@ -52,7 +52,7 @@ def command(
     Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
     report.html. LOG is a path, or a file name of the card's set.
     """
-    from workbench.documents.model import model_document
+    from workbench.documents.model_file import model_document
     from workbench.logs.sources import read_sources
     from workbench.options import parse_orders
     from workbench.report.model_tables import model_view

@@ -46,7 +46,7 @@ def command(
     sliding, by command the actuator); then `run_refused` says so.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.model import read_model
+    from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
     from workbench.report.prediction import prediction_lines, then_of_prediction
     from workbench.steps.predict import predict_sources, prediction_csv

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from workbench.ending import StatusGroup
-from workbench.options import effects_option
+from workbench.options import effects_option, registry_option
 from workbench.output import OutputFolder, emit
 
 if TYPE_CHECKING:
@@ -25,12 +25,7 @@ KINDS = ("model", "design", "validation")
 def registry_options(command: Command) -> Command:
     """The options of every registry command: `where` (--registry) and `as_json` (--json)."""
     options = (
-        click.option(
-            "--registry",
-            "where",
-            metavar="FILE|URL",
-            help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
-        ),
+        registry_option,
         click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
         click.option("--debug", is_flag=True, expose_value=False, hidden=True),
     )
@@ -161,8 +156,8 @@ def add(
     version.
     """
     from workbench.cards.own_effects import library
-    from workbench.documents.design import read_design
-    from workbench.documents.model import read_model
+    from workbench.documents.design_read import read_design
+    from workbench.documents.model_file import read_model
     from workbench.documents.reading import read_document
     from workbench.registry.values import Candidate
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import Finite
+from workbench.options import Finite, events_options, machines_option, registry_option
 
 MEGA = 1e6
 
@@ -16,20 +16,8 @@ MEGA = 1e6
     done="stopped",
     epilog="Example: workbench serve --registry fleet.db --machines machines",
 )
-@click.option(
-    "--registry",
-    "where",
-    metavar="FILE|URL",
-    help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
-)
-@click.option(
-    "--machines",
-    type=click.Path(path_type=Path),
-    default=Path("machines"),
-    metavar="FOLDER",
-    show_default=True,
-    help="Folder of the machines, as of 'watch'; dropped logs lie in it too.",
-)
+@registry_option
+@machines_option
 @click.option("--host", default="127.0.0.1", show_default=True, help="Address to bind to.")
 @click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True)
 @click.option(
@@ -84,8 +72,7 @@ MEGA = 1e6
     metavar="N",
     help="Processes that identify and trace; more by 'workbench work'.",
 )
-@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
-@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+@events_options
 def command(
     where: str | None,
     machines: Path,

@@ -58,7 +58,7 @@ def command(
     """
     begun = time.monotonic()
     from workbench.cards.own_effects import library
-    from workbench.documents.model import model_document
+    from workbench.documents.model_file import model_document
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
     from workbench.report.trace import trace_report

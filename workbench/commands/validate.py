@@ -60,8 +60,8 @@ def command(
     import numpy as np
 
     from workbench.cards.own_effects import library
-    from workbench.documents.design import read_design
-    from workbench.documents.model import read_model
+    from workbench.documents.design_read import read_design
+    from workbench.documents.model_file import read_model
     from workbench.report.next_steps import after_validate
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view

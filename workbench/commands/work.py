@@ -6,6 +6,7 @@ from pathlib import Path
 import click
 
 from workbench.ending import StatusCommand
+from workbench.options import events_options, machines_option, registry_option
 
 
 @click.command(
@@ -13,23 +14,10 @@ from workbench.ending import StatusCommand
     done="stopped, or, with --once, no task waits",
     epilog="Example: workbench work --registry postgresql://... --machines /srv/machines",
 )
-@click.option(
-    "--registry",
-    "where",
-    metavar="FILE|URL",
-    help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
-)
-@click.option(
-    "--machines",
-    type=click.Path(path_type=Path),
-    default=Path("machines"),
-    metavar="FOLDER",
-    show_default=True,
-    help="Folder of the machines, as of 'serve'.",
-)
+@registry_option
+@machines_option
 @click.option("--once", is_flag=True, help="End when no task waits.")
-@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
-@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+@events_options
 def command(where: str | None, machines: Path, once: bool, as_json: bool) -> None:
     """Identify and trace the logs that were dropped on the page, one after the other.
 

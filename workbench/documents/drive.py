@@ -16,7 +16,7 @@ from design.filters import CompensatorFilters, sampled
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from identification.model.plant import over
-from identification.signals.clean import Filter, slope_filter
+from identification.signals.filters import Filter, slope_filter
 from workbench.cards.parameter_units import in_unit, shown
 from workbench.cards.units import Motion
 

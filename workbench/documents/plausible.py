@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.log import Log, Rig
-from workbench.cards.card import SignalSpec
+from workbench.cards.card_tables import SignalSpec
 from workbench.documents.model import LogEntry, Model
 
 Slips = tuple[tuple[float, str], ...]

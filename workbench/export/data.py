@@ -19,7 +19,7 @@ from design.program import (
     Variable,
 )
 from identification.model.karnopp import NAMES
-from identification.signals.clean import slope_filter
+from identification.signals.filters import slope_filter
 from workbench.export.exported import Exported
 from workbench.export.filled import lead_of, title_of
 from workbench.output import dumps

@@ -31,8 +31,10 @@ from identification.errors import BadCard, BadModel
 from workbench.cards.card import Card, load_card
 from workbench.cards.own_effects import library
 from workbench.course import Course, moving, watched
-from workbench.documents.design import Design, read_design
-from workbench.documents.model import Model, read_model
+from workbench.documents.design import Design
+from workbench.documents.design_read import read_design
+from workbench.documents.model import Model
+from workbench.documents.model_file import read_model
 from workbench.interface.inputs import (
     CardLike,
     LogLike,

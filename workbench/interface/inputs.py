@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias, Union
 import numpy as np
 
 from identification.errors import BadCard, BadLog
-from workbench.cards.card import Card, FileSpec, card_from, load_card
+from workbench.cards.card import Card, card_from, load_card
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.cards.sensors import parse_gain
 from workbench.cards.units import conversion, si_unit

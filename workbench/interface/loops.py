@@ -36,7 +36,7 @@ class DesignResult(Result):
 
     @property
     def document(self) -> Mapping[str, Any]:
-        from workbench.documents.design import design_document
+        from workbench.documents.design_file import design_document
 
         return design_document(self.design)
 

@@ -79,7 +79,7 @@ class IdentifyResult(_OfModel):
 
     @property
     def document(self) -> Mapping[str, Any]:
-        from workbench.documents.model import model_document
+        from workbench.documents.model_file import model_document
 
         return model_document(self.model)
 
@@ -212,7 +212,7 @@ class TraceResult(_OfModel):
         return f"{trace_sentence(self.found)} {then}".strip(), parts
 
     def _files(self) -> Iterator[tuple[str, str]]:
-        from workbench.documents.model import model_document
+        from workbench.documents.model_file import model_document
 
         yield "trace.json", self.to_json() + "\n"
         yield "model.json", dumps(model_document(self.model)) + "\n"

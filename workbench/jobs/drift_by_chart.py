@@ -10,7 +10,7 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
-from identification.drift.drift_test import DriftTest, Shift
+from identification.drift.drift_result import DriftTest, Shift
 from identification.drift.mewma import DriftState
 from identification.errors import BadModel
 from workbench.documents.model import Model

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option
+from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option, registry_option
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery, Webhook
@@ -49,8 +49,7 @@ def job_options(command: Command) -> Command:
     """ROOT and the options of `JobOptions`, by the names of its fields."""
     options = (
         click.argument("root", type=click.Path(path_type=Path)),
-        click.option("--registry", "where", metavar="FILE|URL", help="SQLite file or "
-                     "postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]"),
+        registry_option,
         click.option("--first", is_flag=True,
                      help="Give a machine without a model its first from its first log."),
         click.option("--settle", type=SECONDS, default=10.0, show_default=True,

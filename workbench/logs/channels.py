@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from identification.errors import BadLog
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.logs.table import RawColumn, Table
 

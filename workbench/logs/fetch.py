@@ -5,7 +5,8 @@ import os
 from pathlib import Path
 
 from identification.errors import BadCard, BadLog
-from workbench.cards.card import Card, FileEntry
+from workbench.cards.card import Card
+from workbench.cards.card_tables import FileEntry
 from workbench.cards.nearest import nearest
 from workbench.files import CARD_FILE, refuse_special, shipped_cards
 from workbench.links import broken_link

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from identification.errors import BadLog
-from workbench.cards.card import FileSpec, Format
+from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.nearest import nearest
 from workbench.files import refuse_special
 from workbench.links import broken_link

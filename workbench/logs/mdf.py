@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from identification.errors import BadLog
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.channels import Channel, channel_table, optional
 from workbench.logs.table import BINARY_BYTES, RawColumn, Table, refuse_long

@@ -16,7 +16,8 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
-from workbench.cards.card import Card, SignalSpec
+from workbench.cards.card import Card
+from workbench.cards.card_tables import SignalSpec
 from workbench.files import ABSURD
 from workbench.logs.clocks import on_one_clock
 from workbench.logs.table import Table, damaged

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from identification.errors import BadLog
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger
 from workbench.logs.excel import read_excel

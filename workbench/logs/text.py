@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.errors import BadLog
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.table import Table

@@ -11,7 +11,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog
 from identification.signals.check import SHORTEST_LOG
-from workbench.cards.card import FileSpec, Format
+from workbench.cards.card_tables import FileSpec, Format
 from workbench.cards.headers import written_unit
 from workbench.files import refuse_larger
 from workbench.logs.formats import find_format, head_of

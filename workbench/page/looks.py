@@ -52,7 +52,7 @@ def warm() -> None:
 
 def refuse_no_log(path: Path) -> None:
     """Raises BadLook where the file's first bytes are of something else than its name says."""
-    from workbench.cards.card import FileSpec
+    from workbench.cards.card_tables import FileSpec
     from workbench.logs.formats import checked_format
 
     try:

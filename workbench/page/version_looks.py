@@ -88,7 +88,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
 @contextmanager
 def _read(text: str) -> "Iterator[Design]":
     """The design, read as from its file; its messages without the file's folder."""
-    from workbench.documents.design import read_design
+    from workbench.documents.design_read import read_design
 
     with TemporaryDirectory(prefix="workbench-") as name:
         path = Path(name) / "design.json"

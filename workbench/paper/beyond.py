@@ -22,7 +22,7 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator
-from identification.signals.clean import RIG_A, RIG_C
+from identification.signals.filters import RIG_A, RIG_C
 from workbench.paper.figures_rig import IdentifiedRig
 from workbench.paper.measures import Case, measure
 from workbench.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst

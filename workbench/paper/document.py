@@ -4,7 +4,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from workbench.documents.model import versions
+from workbench.documents.versions import versions
 from workbench.output import Row, table, written
 from workbench.paper.claims import claims
 from workbench.paper.measures import Case, Figures

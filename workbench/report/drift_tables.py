@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.drift.drift_test import DriftTest, Shift, Statistic
+from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
 from workbench.cards.readable import number, shown_unit
 from workbench.output import Row, next_step, table, written

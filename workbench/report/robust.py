@@ -36,8 +36,8 @@ if TYPE_CHECKING:
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "kept", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that keeps the limit", "robust", "nominal", "present")
-LOOKS = {ROBUST: (MODEL, "-"), NOMINAL: (GREY, ":"), PRESENT: (MEASURED, "-.")}
-WIDEST = 12.0  # times the middle of all curves, to which an axis goes
+CURVE_LOOKS = {ROBUST: (MODEL, "-"), NOMINAL: (GREY, ":"), PRESENT: (MEASURED, "-.")}
+AXIS_WIDEST = 12.0  # times the middle of all curves, to which an axis goes
 
 
 def robust_sentence(found: Robust) -> str:
@@ -79,7 +79,7 @@ def promise_rows(found: Robust, rotary: bool) -> list[Row]:
 def beside_rows(found: Robust, rotary: bool) -> list[Row]:
     """The medians of every loop, and the shares, by `BESIDE_HEAD`."""
     return [
-        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in LOOKS))
+        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_LOOKS))
         for one, _ in _of(found.promises[ROBUST])
     ]
 
@@ -220,8 +220,8 @@ def _shares(axes: "Axes", found: Robust, one: Measure, rotary: bool) -> None:
         share = 100.0 * np.arange(1, len(at) + 1) / len(at)
         keep = np.isfinite(at)
         told.append(at[keep])
-        line(axes, np.repeat(at[keep], 2), np.repeat(share[keep], 2), color=LOOKS[name][0],
-             ls=LOOKS[name][1], lw=1.2, label=name)  # fmt: skip
+        line(axes, np.repeat(at[keep], 2), np.repeat(share[keep], 2), color=CURVE_LOOKS[name][0],
+             ls=CURVE_LOOKS[name][1], lw=1.2, label=name)  # fmt: skip
     if limit is not None:
         axes.axvline(factor * limit, color=REFERENCE, ls="--", lw=1.0, label="limit")
     _within(axes, told, None if limit is None else factor * limit)
@@ -236,7 +236,7 @@ def _within(axes: "Axes", told: Sequence[Array], limit: float | None) -> None:
         return
     low, high = float(np.min(every)), float(np.max(every))
     middle = max(float(np.median(np.abs(every))), limit or 0.0)
-    high = min(high, WIDEST * middle) if middle > 0.0 else high
+    high = min(high, AXIS_WIDEST * middle) if middle > 0.0 else high
     room = 0.05 * max(high - low, 1e-9 * max(abs(high), 1.0))
     axes.set_xlim(low - room, high + room)
 

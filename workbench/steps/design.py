@@ -26,8 +26,9 @@ from workbench.documents.design import (
     margin_values,
 )
 from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model, versions
+from workbench.documents.model import Model
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
+from workbench.documents.versions import versions
 from workbench.steps.identify import check_period
 from workbench.steps.linear_loop import command_of, corners, linear_of, periods, unknown_viscous
 from workbench.steps.recommend import recommended

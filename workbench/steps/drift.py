@@ -8,14 +8,8 @@ from typing import Any, Literal
 
 import numpy as np
 
-from identification.drift.drift_test import (
-    DriftSettings,
-    DriftTest,
-    DriftVerdict,
-    Shift,
-    Statistic,
-    drift_test,
-)
+from identification.drift.drift_result import DriftTest, DriftVerdict, Shift, Statistic
+from identification.drift.drift_test import DriftSettings, drift_test
 from identification.drift.mewma import DriftState
 from identification.drift.reference_model import InForce
 from identification.errors import BadModel
@@ -25,8 +19,11 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
 from identification.signals.bad_samples import BadSamples
 from identification.thresholds import ADEQUATE
-from workbench.documents.model import Model, as_number, model_document, used, versions
+from workbench.documents.model import Model, used
+from workbench.documents.model_file import model_document
+from workbench.documents.plain import as_number
 from workbench.documents.reading import read_result
+from workbench.documents.versions import versions
 from workbench.logs.sources import Source, Sources
 from workbench.output import dumps, write_whole
 

@@ -34,8 +34,8 @@ from workbench.documents.model import (
     LogEntry,
     Model,
     ParameterCorrelation,
-    versions,
 )
+from workbench.documents.versions import versions
 from workbench.logs.sources import Source
 from workbench.steps.drift import model_in_force
 

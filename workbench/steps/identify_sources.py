@@ -8,7 +8,8 @@ import numpy as np
 from identification.estimation.estimates import told_estimate
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NEGATIVE
-from workbench.documents.model import Model, as_number
+from workbench.documents.model import Model
+from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify

@@ -25,7 +25,7 @@ from workbench.cards.effect_values import exact
 from workbench.cards.parameter_units import friction_units
 from workbench.cards.recipe import Recipe
 from workbench.documents.drive import PresentFile
-from workbench.documents.model import as_number, plain
+from workbench.documents.plain import as_number, plain
 from workbench.files import ABSURD
 from workbench.steps.simulate_present import compensation, recipe_loop, run_present
 

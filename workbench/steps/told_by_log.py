@@ -9,14 +9,9 @@ from identification.arrays import Array
 from identification.estimation.estimates import Events, silent_reason
 from identification.estimation.imposed_motion import fit_imposed
 from identification.estimation.recorded_logs import NO_NOISE, RecordedLogs
-from identification.estimation.regression.equation_rows import (
-    FIVE,
-    MotionLog,
-    mechanical,
-    solve_rows,
-    stacked,
-)
+from identification.estimation.regression.equation_rows import FIVE, MotionLog, mechanical
 from identification.estimation.regression.standstill import Breakaways
+from identification.estimation.regression.weighted_rows import solve_rows, stacked
 from identification.experiment.identifiability import Tellable, identifiability
 from identification.model.karnopp import NAMES
 from identification.thresholds import EVENTS_NEEDED, WIDEST_SD

@@ -18,8 +18,10 @@ from identification.tracing.result import Errors, FoundEffect, FreeCurve, Trace
 from identification.tracing.trace import trace
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import relabelled
-from workbench.documents.model import ArxPlant, FitSummary, LogEntry, Model, as_number, versions
+from workbench.documents.model import ArxPlant, FitSummary, LogEntry, Model
+from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
+from workbench.documents.versions import versions
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import arx_plant, speed_of

@@ -9,7 +9,8 @@ import numpy as np
 from identification.errors import BadModel
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
-from workbench.documents.model import Model, versions
+from workbench.documents.model import Model
+from workbench.documents.versions import versions
 from workbench.steps.closed_loop import driven_loop, effects_left_out
 from workbench.steps.loop_figures import (
     ALMOST,

@@ -24,7 +24,6 @@ from identification.estimation.regression.equation_rows import (
     MECHANICAL,
     REST,
     MotionLog,
-    Rows,
     actuator,
     mechanical,
 )
@@ -42,6 +41,7 @@ from identification.estimation.regression.standstill import (
     rest_stretches,
     rests,
 )
+from identification.estimation.regression.weighted_rows import Rows
 from identification.model.karnopp import Karnopp
 from identification.simulation.effect_along_motion import (
     contribution,

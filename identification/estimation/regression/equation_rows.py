@@ -7,7 +7,7 @@ Actuator, in windows over the whole log (N/s), where a linear actuator has a log
 Each row is divided by what the sensors' noise makes of it, so a complete model leaves 1.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 from identification.errors import BadLog
+from identification.estimation.regression.weighted_rows import BLOCKS, Rows, solve_rows
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.progress import Halt
@@ -41,11 +42,9 @@ SURE_OF_DIRECTION = 5.0  # times the velocity's noise from which its sign is sur
 IMPOSED_CUTOFFS = (20.0, 10.0, 5.0, 3.0)
 MOSTLY_SURE = 0.9  # of the samples of imposed motion, whose direction is to be sure
 STILL_UNSURE = 0.8  # of the others, at most, that more smoothing may leave; a body at rest stays so
-BLOCKS = 8  # stretches of a log that are left out in turn
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
-NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
 OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
@@ -118,34 +117,6 @@ class MotionLog:
     def driving(self) -> Log:
         """The log with the force that drives a run, between its samples too."""
         return self.log.with_signals(F=self.log["F"] + self.kinks)
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """A regression b = X theta: b (r,), X (r, k), sd (r,) of b, block (r,) of time, speed (r,).
-
-    lost: twice the log-likelihood that b has lost, where an effect has taken away a part of what
-    was logged: without it the effect that leaves no force at all would explain every force;
-    positive: names of parameters that are never below 0.
-    """
-
-    b: Array
-    X: Array
-    sd: Array
-    block: IntArray
-    speed: Array
-    names: tuple[str, ...]
-    lost: float = 0.0
-    positive: frozenset[str] = NEVER_NEGATIVE
-
-
-@dataclass(frozen=True, eq=False)
-class Fitted:
-    """Least squares of `Rows`: theta (k,), residual in units of sd (r,), cost its square sum."""
-
-    theta: Array
-    residual: Array
-    cost: float
 
 
 def motion_log(
@@ -355,50 +326,3 @@ def integral(u: Array, h: float) -> Array:
 
 def _blocks(w: WeakWindows, n: int) -> IntArray:
     return (w.middle * BLOCKS // n).astype(np.int64)
-
-
-def stacked(parts: Sequence[Rows]) -> Rows:
-    """Rows of several logs as one regression; their blocks are kept apart."""
-    block = np.concatenate([p.block + BLOCKS * i for i, p in enumerate(parts)])
-    join = [np.concatenate([getattr(p, k) for p in parts]) for k in ("b", "X", "sd", "speed")]
-    lost = sum(p.lost for p in parts)
-    return Rows(join[0], join[1], join[2], block, join[3], parts[0].names, lost, parts[0].positive)
-
-
-def solve_rows(
-    rows: Rows, keep: BoolArray | None = None, positive: IntArray | None = None
-) -> Fitted:
-    """Weighted least squares; `keep` (r,) masks rows out of the fit (their residual is kept).
-
-    positive: columns whose parameter is 0 where it would come out negative.
-    """
-    A, c = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
-    mask = np.ones(len(c), dtype=bool) if keep is None else keep
-    scale = of_column(A)
-
-    def least_squares(at: IntArray) -> Array:
-        theta = np.linalg.lstsq(A[np.ix_(mask, at)] / scale[at], c[mask], rcond=1e-10)[0]
-        return np.asarray(theta / scale[at])
-
-    none = np.zeros(0, dtype=np.int64)
-    theta = non_negative(least_squares, A.shape[1], none if positive is None else positive)
-    residual = c - A @ theta
-    return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
-
-
-def of_column(A: Array) -> Array:
-    """Root mean square of each column (k,); 1 of nothing, whose parameter then comes out 0."""
-    size = np.sqrt(np.mean(A**2, axis=0))
-    return np.asarray(np.where(size > 0.0, size, 1.0))
-
-
-def non_negative(fit: Callable[[IntArray], Array], k: int, positive: IntArray) -> Array:
-    """Parameters (k,) of `fit` on a set of columns, those in `positive` not below 0."""
-    at = np.arange(k)
-    while True:
-        theta = np.zeros(k)
-        theta[at] = fit(at)
-        below = positive[theta[positive] < 0.0]
-        if not len(below):
-            return theta
-        at = np.setdiff1d(at, below)

@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.regression.equation_rows import MotionLog, Rows
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.weighted_rows import Rows
 from identification.log import Log
 from identification.thresholds import SHARE_BEYOND, SHARE_GAINS, SURE_OF_SHARE
 

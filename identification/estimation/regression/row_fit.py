@@ -15,8 +15,10 @@ from identification.estimation.regression.equation_rows import (
     EQUATIONS,
     MECHANICAL,
     REST,
-    Fitted,
     MotionLog,
+)
+from identification.estimation.regression.weighted_rows import (
+    Fitted,
     Rows,
     non_negative,
     of_column,

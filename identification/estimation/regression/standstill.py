@@ -12,7 +12,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from identification.arrays import Array, IntArray
-from identification.estimation.regression.equation_rows import BLOCKS, MotionLog, Rows
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.weighted_rows import BLOCKS, Rows
 from identification.signals.sampling import samples
 
 LEAST_BREAKAWAY = 0.6  # of the direction's median force, below which an event is none

@@ -18,7 +18,8 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, FIVE, MECHANICAL, MotionLog
 from identification.estimation.regression.row_fit import RowFit, mean_square, settled_fits
 from identification.estimation.structure_fit import FittedStructure, band, fitted_structure
-from identification.estimation.windowed_run.nudged_search import closer, more_load, nearer
+from identification.estimation.windowed_run.closest import closer
+from identification.estimation.windowed_run.nudged_search import more_load, nearer
 from identification.estimation.windowed_run.parameters import even, loose, on_bristle
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.estimation.windowed_run.run_errors import misfit

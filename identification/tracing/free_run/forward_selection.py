@@ -7,14 +7,12 @@ nothing but noise, so a term that merely helps is never taken here.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import chi2
 
 from identification.effects._base import Effect
-from identification.errors import UserError
 from identification.estimation.regression.effect_columns import by_load, equations_of
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
@@ -25,32 +23,10 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.row_fit import RowFit, mean_square, rough, settled_fits
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.windowed_run.nudged_search import (
-    BREAKS_RANGE,
-    CLOSE_RANGE,
-    FAR_RANGE,
-    FINER_RANGE,
-    GROWTH_RANGE,
-    MIDWAY_RANGE,
-    SHORT_SECONDS,
-    SIDES_RANGE,
-    SLIDING_RANGE,
-    closer,
-    judge_nudged,
-    less_load,
-    nearer,
-    nudged_search,
-)
-from identification.estimation.windowed_run.parameters import even, loose, on_bristle
-from identification.estimation.windowed_run.refinement import Refit, briefly, onward, refit
-from identification.estimation.windowed_run.run_errors import judge, loss, misfit
-from identification.estimation.windowed_run.stick_search import start_band
-from identification.estimation.windowed_run.windows import (
-    RUN_WINDOW,
-    freed,
-    starts,
-    window_residual,
-)
+from identification.estimation.windowed_run.closest import SHORT_SECONDS
+from identification.estimation.windowed_run.parameters import loose, on_bristle
+from identification.estimation.windowed_run.refinement import Refit
+from identification.estimation.windowed_run.windows import freed, starts, window_residual
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
 from identification.thresholds import (
@@ -68,48 +44,24 @@ from identification.tracing.free_run.backward_elimination import (
     enough,
     known,
     pruned,
-    refined_near,
     seconds,
     with_steps,
 )
-from identification.tracing.free_run.trial_structures import (
-    Trial,
-    driven_only,
-    seen_in_run,
-    structures,
+from identification.tracing.free_run.contenders import (
+    Begun,
+    RunContender,
+    begun_with,
+    near_start,
+    on_short_logs,
+    on_whole_logs,
 )
+from identification.tracing.free_run.trial_structures import driven_only, structures
 from identification.tracing.regression.candidates import EffectCandidate, trial
 from identification.tracing.regression.significance import by_luck
 from identification.tracing.regression.stepwise import Choice, Step, absorb
 
-MAY_BE_UNEVEN = 20.0  # misfit up to which unequal directions may be what is left
-WORTH = 1.25  # times that, up to which an effect's other starts are tried
-LARGER = 3  # starts of a play, from the best up
 RUN_ALONE = "effects that only the free run shows"  # left out where a trace is halted
 Report = Callable[[str, float], None]
-
-
-@dataclass(frozen=True, eq=False)
-class RunContender:
-    """A structure in the free run: its steps but the last, the last effect, plant and misfit."""
-
-    steps: tuple[Step, ...]
-    effect: Effect
-    plant: Plant
-    misfit: float
-
-
-@dataclass(frozen=True, eq=False)
-class Begun:
-    """A trial after a first search: the plant before and after it, what that leaves (a run nudged
-    along the log where nothing else holds it, and one let go), and other plants to begin from."""
-
-    trial: Trial
-    start: Plant
-    plant: Plant
-    loss: float
-    misfit: float
-    others: tuple[Plant, ...]
 
 
 def judged_forward(
@@ -206,7 +158,7 @@ def contest(
     begun = list[Begun]()
     tried = list(structures(choice, model, setting))
     for i, attempt in enumerate(tried):
-        begun += _begun(attempt, setting)
+        begun += begun_with(attempt, setting)
         report("judging", 0.5 * (i + 1) / len(tried))
     # What a sensor shows leads the run astray, so its loss tells nothing.
     begun.sort(key=lambda one: (one.misfit > ADEQUATE, one.loss))
@@ -217,7 +169,7 @@ def contest(
     if not screened or screened[0].misfit > promising:
         return None
     winner = screened[0]
-    done = _whole(winner, setting)
+    done = on_whole_logs(winner, setting)
     rivals = [one for one in screened if one.effect.key != winner.effect.key]
     if done.misfit > decisive(model.misfit, rivals) or scales_alone(
         winner.effect, done.plant, setting.logs
@@ -234,7 +186,7 @@ def earning(choice: Choice, model: FittedStructure, setting: Setting) -> float:
     """
     if not choice.steps:
         return np.inf
-    without = _near(model.plant, model.plant, setting).misfit
+    without = near_start(model.plant, model.plant, setting).misfit
     return np.inf if without <= COMPLETE else earned(without)
 
 
@@ -251,7 +203,7 @@ def screening(
     for i, one in enumerate(begun):
         if one.misfit > lost:
             continue
-        found = _screened(one, setting, promising)
+        found = on_short_logs(one, setting, promising)
         if found is not None:
             screened.append(found)
             if found.misfit <= ADEQUATE:
@@ -290,123 +242,6 @@ def most_left(plant: Plant, one: MotionLog, drive: Drive, seconds: float) -> Mot
     step = max(1, size // 8)
     begins = np.arange(0, n - size + 1, step)
     return shortened(one, seconds, int(begins[np.argmax(sums[begins + size] - sums[begins])]))
-
-
-def _begun(trial: Trial, setting: Setting) -> list[Begun]:
-    """The effect at the best of its starts, after a first search; empty where it has none."""
-    plants = []
-    for values in trial.values:
-        try:
-            acting = trial.effect.acting(values)
-            base = less_load(trial.base, acting) if by_load(trial.effect) else trial.base
-            plants.append(replace(base, effects=(*base.effects, acting)))
-        except UserError:
-            continue
-    if not plants:
-        return []
-    free = loose(plants[0], setting.drive)
-    if free and not known(setting):
-        errors_of = judge_nudged(plants[0], setting.short, setting.drive, 1.0)
-    else:
-        errors_of = judge(plants[0], setting.short, setting.drive, RUN_WINDOW)
-    try:
-        with ThreadPoolExecutor(2) as pool:
-            costs = list(pool.map(lambda one: loss(errors_of(one)), plants))
-        at = int(np.argmin(costs))
-        first = _first(plants[at], trial.effect, setting)
-        others: tuple[Plant, ...] = ()
-        if free and (by_load(trial.effect) or trial.effect.place.in_stops):
-            # What hardly shows by itself is small at its best start: another from the middle.
-            others = (plants[len(plants) // 2],)
-        elif trial.effect.place.shows and len(trial.effect.params) == 1:
-            # The plain parameters are bent to do without it: a larger size may be the better start.
-            others = tuple(plants[at + 1 : at + LARGER])
-        left_by = misfit(first, setting.short, setting.drive)
-        return [Begun(trial, plants[at], first, loss(errors_of(first)), left_by, others)]
-    except UserError:  # two effects of a kind that a plant takes one of
-        return []
-
-
-def _screened(one: Begun, setting: Setting, enough: float) -> RunContender | None:
-    """The contender refined a little on the short logs, from its other starts too.
-
-    enough: misfit from which it may be the best; far above it no other start is tried.
-    """
-    trial = one.trial
-    free = loose(one.plant, setting.drive)
-    try:
-        found = _near(one.start, one.plant, setting)
-        for other in one.others:
-            if found.misfit <= COMPLETE or (not free and found.misfit > WORTH * enough):
-                break
-            again = _near(other, _first(other, trial.effect, setting), setting)
-            found = min(found, again, key=lambda x: x.misfit)
-    except UserError:
-        return None
-    return RunContender(trial.steps, trial.effect, found.plant, found.misfit)
-
-
-def _first(plant: Plant, effect: Effect, setting: Setting) -> Plant:
-    """The plant after a first search on the short logs."""
-    if loose(plant, setting.drive):
-        if not effect.place.in_stops and not on_bristle(plant):
-            return briefly(plant, setting.short, setting.drive).plant
-        # Growth shows in stops alone, of which brief windows see little.
-        # Where the plain run is nearly followed, its band and limits are nearly right.
-        around = MIDWAY_RANGE if setting.plain.misfit <= NEARLY_FOLLOWED else SLIDING_RANGE
-        around = BREAKS_RANGE if effect.place.in_stops else around
-        stage = (0.0, around) if known(setting) else (1.0, FAR_RANGE)
-        return nudged_search(plant, setting.short, setting.drive, setting.rng, (stage,))
-    if seen_in_run(effect) and not by_load(effect):  # the plain band and limits stood for it
-        p = plant.friction
-        return start_band(plant, setting.short, setting.drive, max(p.dv_p, -p.dv_n))
-    return plant
-
-
-def _near(start: Plant, plant: Plant, setting: Setting) -> Refit:
-    """The plant after a first search, or its start, refined a little on the short logs."""
-    if loose(plant, setting.drive) and misfit(plant, setting.short, setting.drive) > COMPLETE:
-        plant = nearer((plant, start), setting.short, setting.drive)
-        plant = nudged_search(
-            plant, setting.short, setting.drive, setting.rng, ((0.0, CLOSE_RANGE),)
-        )
-    return refit(plant, setting.short, setting.drive, prior=even(plant), effort="quick")
-
-
-def _whole(one: RunContender, setting: Setting) -> Refit:
-    """The contender refined on the whole logs; its asymmetries free where it falls short."""
-    growth = one.effect.place.in_stops and loose(one.plant, setting.drive)
-    found = _grown(one, setting) if growth else refined_near(one.plant, setting)
-    if COMPLETE < found.misfit < MAY_BE_UNEVEN and even(found.plant):
-        again = refit(found.plant, setting.logs, setting.drive, prior={}, effort="quick")
-        found = again if again.misfit < found.misfit else found
-        if found.misfit > COMPLETE and loose(found.plant, setting.drive):
-            again = closer(found.plant, setting.logs, setting.drive, setting.rng, 2, SIDES_RANGE)
-            found = again if again.misfit < found.misfit else found
-    return found
-
-
-def _grown(one: RunContender, setting: Setting) -> Refit:
-    """A contender of growing stiction, searched and refined on the whole logs in turn.
-
-    A breakaway is at one sample or the next, so a small change of its limit changes nothing, and
-    where each start hangs on the rest before it, minima are many and narrow.
-    """
-    logs, drive = setting.logs, setting.drive
-    begins = [one.plant]
-    # All but the rare late breakaways
-    if not one.steps and setting.plain.misfit <= NEARLY_FOLLOWED:
-        begins.append(replace(one.plant, friction=setting.plain.plant.friction))
-    best: Refit | None = None
-    for around in (GROWTH_RANGE, GROWTH_RANGE, FINER_RANGE, FINER_RANGE):
-        near = [nudged_search(x, logs, drive, setting.rng, ((0.0, around),)) for x in begins]
-        found = onward(nearer((*begins, *near), logs, drive), logs, drive)
-        best = found if best is None or found.misfit < best.misfit else best
-        if not COMPLETE < best.misfit < MAY_BE_UNEVEN:
-            break
-        begins = [best.plant]
-    assert best is not None
-    return best
 
 
 def _taken(

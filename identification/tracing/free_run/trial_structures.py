@@ -8,11 +8,12 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.effects._base import Effect, Param
+from identification.estimation.regressed_plant import inside
 from identification.estimation.regression.effect_columns import by_load, slow_motion
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import BREAKAWAY, FIVE, REST, MotionLog
 from identification.estimation.regression.row_fit import RowFit, base_fits, mean_square
-from identification.estimation.structure_fit import FittedStructure, inside
+from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.parameters import loose
 from identification.model.plant import Plant
 from identification.tracing.free_run.backward_elimination import Setting, without

@@ -23,8 +23,9 @@ from identification.estimation.regression.effect_columns import (
     shape_params,
 )
 from identification.estimation.regression.effect_rows import EffectRows, with_effect
-from identification.estimation.regression.equation_rows import MECHANICAL, stacked
+from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, row_fit, with_sizes
+from identification.estimation.regression.weighted_rows import stacked
 from identification.thresholds import CALLED
 from identification.tracing.regression.shape_grid import shape_grid
 

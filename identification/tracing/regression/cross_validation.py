@@ -4,7 +4,8 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.effect_rows import EffectRows
-from identification.estimation.regression.equation_rows import MECHANICAL, Rows, solve_rows, stacked
+from identification.estimation.regression.equation_rows import MECHANICAL
+from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 
 
 def row_residual(

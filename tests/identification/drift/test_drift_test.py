@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.drift.drift_test import DriftSettings, DriftTest, drift_test, judged_estimate
+from identification.drift.drift_result import DriftTest
+from identification.drift.drift_test import DriftSettings, drift_test, judged_estimate
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.reference_model import InForce, in_force

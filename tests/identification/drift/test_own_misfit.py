@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from identification.arrays import Array
-from identification.drift.drift_test import DriftSettings, DriftTest, judged_estimate
+from identification.drift.drift_result import DriftTest
+from identification.drift.drift_test import DriftSettings, judged_estimate
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.own_logs import own_logs_of, with_own_logs

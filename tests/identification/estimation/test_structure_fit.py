@@ -1,7 +1,7 @@
 """From a regression's sizes to a plant."""
 
 from identification.effects._library import built_in
-from identification.estimation.structure_fit import EQUATION_DEVIATIONS, left_open, slight
+from identification.estimation.regressed_plant import EQUATION_DEVIATIONS, left_open, slight
 
 KEY = "position_dependent_friction"
 

@@ -9,18 +9,8 @@ from identification.arrays import Array
 from identification.errors import BadLog, BadSpecification
 from identification.log import Log, Rig
 from identification.signals.check import work_share
-from identification.signals.clean import (
-    RIG_A,
-    RIG_C,
-    applied_force,
-    apply_filter,
-    check,
-    even_clock,
-    fir_lowpass,
-    prepare,
-    repair,
-    velocity,
-)
+from identification.signals.clean import applied_force, check, even_clock, prepare, repair
+from identification.signals.filters import RIG_A, RIG_C, apply_filter, fir_lowpass, velocity
 
 RIG = Rig(kind="force", stroke=(-0.2, 0.2))
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from identification.estimation.regression.equation_rows import FIVE, MECHANICAL, Rows
+from identification.estimation.regression.equation_rows import FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, first_stage
+from identification.estimation.regression.weighted_rows import Rows
 from identification.tracing.parameter_drift import changes
 from tests.identification.motor_logs import made, seen
 

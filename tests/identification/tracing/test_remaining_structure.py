@@ -1,6 +1,8 @@
 """What is left beside effects: too much of it, or of an effect whose size no log tells."""
 
+import json
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -167,11 +169,25 @@ def lacking(
     effects: dict[str, dict[str, float]], *, fast: bool = False, seeds: tuple[int, ...] = (5,)
 ) -> tuple[Choice, FittedStructure]:
     """A motor with effects that no library has: the plain model's choice, and its run."""
-    logs = [seen(made(seed, effects, command=shaken() if fast else None)) for seed in seeds]
+    asked = json.dumps(effects), fast, seeds
+    return equations_of(*asked), run_of(*asked)
+
+
+@cache
+def equations_of(effects: str, fast: bool, seeds: tuple[int, ...]) -> Choice:
+    """The plain model's choice; effects: as JSON."""
+    command = shaken() if fast else None
+    logs = [seen(made(seed, json.loads(effects), command=command)) for seed in seeds]
     start, first = first_stage(logs, False)
-    rng = np.random.default_rng(0)
-    plain = fitted_structure(start, first, (), RecordedLogs(tuple(logs), MOTOR, "command"), rng)
-    return Choice(start, first, (), start, first), plain
+    return Choice(start, first, (), start, first)
+
+
+@cache
+def run_of(effects: str, fast: bool, seeds: tuple[int, ...]) -> FittedStructure:
+    """The plain model's run."""
+    choice = equations_of(effects, fast, seeds)
+    recorded = RecordedLogs(choice.start.logs, MOTOR, "command")
+    return fitted_structure(choice.start, choice.first, (), recorded, np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
@@ -208,9 +224,9 @@ def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() ->
 
 def test_breakaways_tell_that_they_depend_on_the_time_at_rest() -> None:
     seeds = (5, 6, 7)  # few breakaways tell nothing
-    choice, _ = lacking({"rising_stiction": {"F_r": 6.0, "tau": 0.3}}, seeds=seeds)
+    grows = json.dumps({"rising_stiction": {"F_r": 6.0, "tau": 0.3}})
+    choice, plain = (equations_of(one, False, seeds) for one in (grows, "{}"))
     assert at_breakaway(choice).depends_on == ("rest",)
-    plain, _ = lacking({}, seeds=seeds)
     assert at_breakaway(plain).depends_on == ()
     assert at_breakaway(replace(choice, base={})).depends_on == ()
 

@@ -9,10 +9,11 @@ import pytest
 from identification.effects._library import Library, built_in
 from identification.errors import NotIdentifiable
 from identification.estimation.recorded_logs import RecordedLogs
+from identification.estimation.regressed_plant import _limit
 from identification.estimation.regression.effect_rows import UNEXPLAINED, with_effect
 from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
 from identification.estimation.regression.row_fit import base_fits, first_stage
-from identification.estimation.structure_fit import _limit, fitted_structure
+from identification.estimation.structure_fit import fitted_structure
 from identification.estimation.windowed_run.refinement import Refit, refit
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import starts, walks

@@ -12,9 +12,11 @@ from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, identified, model_of
-from workbench.cards.card import SignalSpec, load_card
+from workbench.cards.card import load_card
+from workbench.cards.card_tables import SignalSpec
 from workbench.cli import main
-from workbench.documents.model import Model, model_document
+from workbench.documents.model import Model
+from workbench.documents.model_file import model_document
 from workbench.documents.plausible import (
     bandwidth_remarks,
     log_remarks,

@@ -9,11 +9,10 @@ from design.loop import LoopNoise
 from design.servo import ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.model.plant import Actuator, Motor, Plant
-from tests.chain import EMPS, TABLES, model_of
+from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.export.exported import Exported
-from workbench.steps.design import design
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 START = 0.03  # m, where the simulated machine stands before its first sample
@@ -38,7 +37,7 @@ def case(name: str) -> Case:
         model = model_of(TABLES["paper_table1" if name == "limited" else name], ACTUATOR)
         if name == "limited":
             model = replace(model, rig=replace(model.rig, control_limit=0.4))
-    return Case(model, design(model))
+    return Case(model, designed(model))
 
 
 NAMES = ("paper_table1", "paper_table2", "paper_table3", "limited", "emps")

@@ -10,9 +10,8 @@ from identification.errors import BadModel
 from identification.log import Log
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator
-from tests.chain import TABLES, model_of, short_recipe
+from tests.chain import TABLES, designed, model_of, short_recipe
 from workbench.jobs.challenge import Contender, Contest, Terms, challenge, contest_document
-from workbench.steps.design import design
 from workbench.steps.simulate import record
 
 ACTUATOR = Actuator(19530.0, 10405.0)
@@ -31,7 +30,7 @@ def held_out(p: Karnopp) -> Log:
 def contender(p: Karnopp) -> Contender:
     """A model of these parameters and the design made for it."""
     model = model_of(p, ACTUATOR)
-    return Contender(model, design(model))
+    return Contender(model, designed(model))
 
 
 def contest(

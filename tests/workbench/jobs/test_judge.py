@@ -1,6 +1,6 @@
 """What a log leads to: nothing, a new version, a refusal; on real logs of a simulated machine."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,9 +13,11 @@ import pytest
 from identification.effects._library import built_in
 from identification.errors import BadCard, BadLog, BadModel
 from identification.model.karnopp import Karnopp
-from tests.chain import CARD, TABLES
+from tests.chain import CARD, TABLES, designed
 from workbench.cards.card import Card, load_card
-from workbench.documents.model import Model, read_model
+from workbench.documents.model import Model
+from workbench.documents.model_file import read_model
+from workbench.jobs import judge
 from workbench.jobs.challenge import Terms
 from workbench.jobs.drift_by_chart import drift_by_chart
 from workbench.jobs.drift_verdict import Drift, drift_by_refit
@@ -24,6 +26,7 @@ from workbench.jobs.passes import Task
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import dumps
 from workbench.registry.values import Judgement, SeenLog, Version
+from workbench.steps.identify_sources import Identified, identify_sources
 from workbench.steps.simulate import as_columns, record
 
 OLD = TABLES["paper_table1"]
@@ -49,6 +52,23 @@ def write(path: Path, card: Card, friction: Karnopp, seed: int) -> None:
     recipe = replace(card.recipe, plant=replace(card.recipe.plant, friction=friction))
     log = record(card.name, recipe, seed, card.rig())
     pd.DataFrame(as_columns(log, card)).to_csv(path, index=False, float_format="%.12g")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def once() -> Iterator[None]:
+    """The same runs are fitted once and the same model is designed for once, whoever asks."""
+    fits: dict[str, Identified] = {}
+
+    def identified_once(sources: Sources, seed: int) -> Identified:
+        key = repr([(one.sha256, one.rows, seed) for one in sources.runs])
+        if key not in fits:
+            fits[key] = identify_sources(sources, seed=seed)
+        return fits[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(judge, "identify_sources", identified_once)
+        patch.setattr(judge, "design", designed)
+        yield
 
 
 @pytest.fixture(scope="module")

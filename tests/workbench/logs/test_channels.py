@@ -24,7 +24,7 @@ from tests.workbench.channel_files import (
     write_xlsx,
 )
 from tests.workbench.log_files import WRITERS, card, signals
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.cli import main
 from workbench.logs.runs import read_log, read_runs
 from workbench.logs.tables import read_table

@@ -12,7 +12,7 @@ import pytest
 
 from design.tune import Asked
 from identification.model.plant import Actuator
-from tests.chain import TABLES, model_of
+from tests.chain import TABLES, designed, model_of
 from workbench import cli
 from workbench.commands.fleet import after_fleet
 from workbench.commands.reidentify import after_pass
@@ -30,7 +30,6 @@ from workbench.report.next_steps import (
     looked_over,
     without_design,
 )
-from workbench.steps.design import design
 from workbench.steps.loop_figures import Limits
 from workbench.steps.validate import validate
 
@@ -60,12 +59,12 @@ def model() -> Model:
 
 @pytest.fixture(scope="module")
 def found(model: Model) -> Design:
-    return design(model)
+    return designed(model)
 
 
 @pytest.fixture(scope="module")
 def too_fast(model: Model) -> Design:
-    return design(model, FAST)
+    return designed(model, FAST)
 
 
 def test_names_are_quoted_for_a_shell() -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.model.plant import Actuator, actuator_units
-from tests.chain import TABLES, identified, model_of
+from tests.chain import TABLES, designed, identified, model_of
 from workbench.cards.parameter_units import friction_units
 from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
 from workbench.report.in_a_row import liveliest
@@ -19,7 +19,6 @@ from workbench.report.validation_tables import (
     validation_lines,
     validation_rows,
 )
-from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified
 from workbench.steps.validate import validate
 
@@ -95,7 +94,7 @@ def turned(found: Identified) -> Identified:
 
 def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     model = turned(identified()).model
-    found = design(model)
+    found = designed(model)
     html = checked(design_report(found, model.rotary), 2)
     assert "[dB, N m/rad]" in html and " V/(N m)," in html
     assert "N/m" not in html and "V/N," not in html
@@ -105,7 +104,7 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
 
 
 def test_design_report() -> None:
-    html = checked(design_report(design(identified().model)), 2)
+    html = checked(design_report(designed(identified().model)), 2)
     for text in (
         "frequency [rad/s]",
         "|S_yp| [dB]",
@@ -118,7 +117,7 @@ def test_design_report() -> None:
 
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
-    result, traces = validate(model, design(model), np.random.default_rng(0), plant=other)
+    result, traces = validate(model, designed(model), np.random.default_rng(0), plant=other)
     html = checked(validation_report(result, traces, rotary=False), 4)
     assert "Steps on the identified plant" in html and "Steps on the other plant" in html
     rotary = validation_report(result, traces, rotary=True)
@@ -163,7 +162,7 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
 
 def test_a_rotary_validation_has_rotary_columns() -> None:
     model = turned(identified()).model
-    result, _ = validate(model, design(model), np.random.default_rng(0))
+    result, _ = validate(model, designed(model), np.random.default_rng(0))
     head = validation_head(result, rotary=True)
     assert "force N m" in head and "force N" in validation_head(result)
     assert all(len(row) == len(head) for row in validation_rows(result, rotary=True))

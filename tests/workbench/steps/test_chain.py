@@ -15,15 +15,16 @@ from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator
-from tests.chain import EMPS, TABLES, identified, model_of, short_recipe
+from tests.chain import EMPS, TABLES, designed, identified, model_of, short_recipe
 from workbench.cards.recipe import RecipePID
-from workbench.documents.design import design_document, read_design
+from workbench.documents.design_file import design_document
+from workbench.documents.design_read import read_design
 from workbench.documents.model import Model
 from workbench.output import dumps
 from workbench.report.model_tables import fit_lines
 from workbench.steps import loop_figures
 from workbench.steps.closed_loop import run_driven, run_loop
-from workbench.steps.design import design, effort_limit
+from workbench.steps.design import effort_limit
 from workbench.steps.identify import (
     arx_plant,
     closed_loop_remarks,
@@ -89,7 +90,7 @@ def test_a_loop_is_remarked_only_where_y_follows_r() -> None:
 @pytest.mark.parametrize("name", list(TABLES))
 def test_default_designs_of_the_paper_s_plants_pass_in_simulation(name: str) -> None:
     model = model_of(TABLES[name], ACTUATOR)
-    found = design(model)
+    found = designed(model)
     assert found.plant.source == "physical" and found.force is not None
     assert found.rst is not None and found.rst.missed == ()
     assert found.rst.margins.modulus >= 0.5
@@ -103,7 +104,7 @@ def test_default_designs_of_the_paper_s_plants_pass_in_simulation(name: str) -> 
 
 def test_the_default_design_of_the_emps_axis_passes() -> None:
     model = model_of(EMPS, k_a=35.15)
-    found = design(model)
+    found = designed(model)
     assert found.force is None
     assert found.recommended == "rst"
     result, _ = validate(model, found, rng())
@@ -111,7 +112,7 @@ def test_the_default_design_of_the_emps_axis_passes() -> None:
 
 
 def test_a_design_comes_back_from_its_file(tmp_path: Path) -> None:
-    found = design(model_of(TABLES["paper_table2"], ACTUATOR))
+    found = designed(model_of(TABLES["paper_table2"], ACTUATOR))
     path = tmp_path / "design.json"
     path.write_text(dumps(design_document(found)), encoding="utf-8")
     back = read_design(path)
@@ -125,18 +126,18 @@ def test_a_design_comes_back_from_its_file(tmp_path: Path) -> None:
 
 def test_asked_poles_and_period_are_taken() -> None:
     model = model_of(TABLES["paper_table2"], ACTUATOR)
-    found = design(model, Asked((12.0, 0.9)), period=0.02)
+    found = designed(model, Asked((12.0, 0.9)), period=0.02)
     assert found.rst is not None and found.rst.dominant == (12.0, 0.9)
     assert found.plant.h == 0.02 and found.rst.h == 0.02
     with pytest.raises(BadSpecification, match="zeta"):
-        design(model, Asked((12.0, -0.9)))
-    plain = design(model, Asked(integrator=False))
+        designed(model, Asked((12.0, -0.9)))
+    plain = designed(model, Asked(integrator=False))
     assert plain.pid is None and "integrator" in plain.refused["pid"]
 
 
 def test_goals_are_taken() -> None:
     model = model_of(TABLES["paper_table2"], ACTUATOR)
-    easy, strict = (design(model, goals=Goals(m, 2.0)).rst for m in (0.4, 0.6))
+    easy, strict = (designed(model, goals=Goals(m, 2.0)).rst for m in (0.4, 0.6))
     assert easy is not None and strict is not None
     assert strict.margins.modulus >= 0.6
     assert strict.dominant[0] < easy.dominant[0]
@@ -151,32 +152,32 @@ def without_mass(model: Model) -> Model:
 
 def test_without_a_mass_the_arx_plant_carries_the_design() -> None:
     model = without_mass(identified().model)
-    found = design(model)
+    found = designed(model)
     assert found.plant.source == "arx"
     assert found.rst is not None and found.rst.margins.modulus >= 0.5
-    asked = design(identified().model, source="arx")
+    asked = designed(identified().model, source="arx")
     assert asked.plant.A == found.plant.A
     with pytest.raises(BadSpecification, match="identify again with --design-period"):
-        design(model, period=0.02)
+        designed(model, period=0.02)
 
 
 def test_a_model_that_carries_no_design_is_refused() -> None:
     model = without_mass(model_of(TABLES["paper_table1"], ACTUATOR))
     with pytest.raises(NotIdentifiable, match="no ARX plant"):
-        design(model)
+        designed(model)
     plant = identified().model.plant
     assert plant is not None
     wild = replace(plant, simulation_relative=0.9)
     with pytest.raises(NotIdentifiable, match="leaves 90 % of the motion"):
-        design(replace(model, plant=wild))
+        designed(replace(model, plant=wild))
     imposed = replace(model.log[0], position_rms=None)
     with pytest.raises(NotIdentifiable, match="imposed"):
-        design(replace(model, log=(imposed,)))
+        designed(replace(model, log=(imposed,)))
 
 
 def test_another_plant_can_fail_what_the_model_passes() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], ACTUATOR) for k in (1, 3))
-    found = design(model)
+    found = designed(model)
     result, traces = validate(model, found, rng(), plant=other)
     assert set(result.figures["rst"]) == {"model", "plant"}
     assert result.figures["rst"]["model"].passed
@@ -190,7 +191,7 @@ def test_another_plant_can_fail_what_the_model_passes() -> None:
 
 def test_limits_are_taken() -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
-    found = design(model)
+    found = designed(model)
     for limits in (Limits(modulus=0.95), Limits(delay=9.0), Limits(standstill=1e-6),
                    Limits(tracking=1e-3), Limits(overshoot=1e-6), Limits(force=0.5)):  # fmt: skip
         result, _ = validate(model, found, rng(), limits=limits)
@@ -201,7 +202,7 @@ def test_limits_are_taken() -> None:
 def test_a_design_with_a_force_loop_does_not_fit_a_motor() -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
     with pytest.raises(BadModel, match="force loop"):
-        validate(model, design(model), rng(), plant=model_of(EMPS, k_a=35.0))
+        validate(model, designed(model), rng(), plant=model_of(EMPS, k_a=35.0))
 
 
 def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
@@ -317,7 +318,7 @@ def test_a_loop_that_runs_away_is_no_log() -> None:
 
 def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
     model = replace(model_of(EMPS), rig=Rig("force"))
-    found = design(model)
+    found = designed(model)
     assert found.rst is not None and found.force is None
     r = np.repeat([0.0, 0.05], 200)
     free, limited = (
@@ -334,13 +335,13 @@ def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -
 )
 def test_a_limit_that_is_no_number_is_never_kept(name: str) -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
-    result, _ = validate(model, design(model), rng(), limits=Limits(**{name: np.nan}))
+    result, _ = validate(model, designed(model), rng(), limits=Limits(**{name: np.nan}))
     assert not result.passed
 
 
 def test_both_runs_must_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
-    found = design(model)
+    found = designed(model)
     count = 0
 
     def lost(*arguments: Any) -> LoopRun:
@@ -357,7 +358,7 @@ def test_both_runs_must_stay(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_margins_of_a_validation_are_those_of_its_plant() -> None:
     model = identified().model
-    found = design(model, source="arx")
+    found = designed(model, source="arx")
     assert model.plant is not None
     stronger = replace(model.plant, B=tuple(1.3 * b for b in model.plant.B))
     result, _ = validate(model, found, rng(), plant=replace(model, plant=stronger))
@@ -365,7 +366,7 @@ def test_margins_of_a_validation_are_those_of_its_plant() -> None:
     assert one is not None and other is not None
     assert other.modulus != one.modulus
     wide = model_of(TABLES["paper_table1"], ACTUATOR, spread=0.05)
-    physical = design(wide)
+    physical = designed(wide)
     checked, _ = validate(wide, physical, rng())
     margin = checked.figures["rst"]["model"].margins
     assert margin is not None and margin.worst_modulus is not None
@@ -377,11 +378,11 @@ def test_margins_of_a_validation_are_those_of_its_plant() -> None:
 def test_a_physical_design_needs_a_mass_and_says_what_it_rests_on() -> None:
     model = identified().model
     with pytest.raises(NotIdentifiable, match=r"no physical plant.*no acceleration"):
-        design(without_mass(model), source="physical")
-    assert "viscous friction are identified" in design(model).plant.why
+        designed(without_mass(model), source="physical")
+    assert "viscous friction are identified" in designed(model).plant.why
     blank = Estimate(None, "N s/m", reason="too slow", assumed=300.0)
     vague = replace(model, friction={**model.friction, "F_vp": blank})
-    assert "the mass is identified, F_vp assumed" in design(vague).plant.why
+    assert "the mass is identified, F_vp assumed" in designed(vague).plant.why
 
 
 def test_an_interval_from_zero_is_not_taken_for_none() -> None:

@@ -7,11 +7,11 @@ import pytest
 
 from design.tune import Asked, Goals
 from identification.model.plant import Actuator, Motor
-from tests.chain import EMPS, TABLES, model_of
+from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import run_loop
-from workbench.steps.design import design, reference_demand
+from workbench.steps.design import reference_demand
 from workbench.steps.validate import validate
 
 ACTUATOR = Actuator(19530.0, 10405.0)
@@ -26,7 +26,7 @@ def rng() -> np.random.Generator:
 @pytest.mark.parametrize("name", list(MODELS))
 def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) -> None:
     model = MODELS[name]
-    found = design(model)
+    found = designed(model)
     assert found.recommended == "rst" and found.rst is not None and found.pid is not None
     result, traces = validate(model, found, rng())
     assert result.passed
@@ -50,7 +50,7 @@ def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) ->
 
 def test_a_pid_s_weights_are_between_none_and_all_of_the_reference() -> None:
     for model in MODELS.values():
-        found = design(model)
+        found = designed(model)
         assert found.pid is not None and found.pid.gains is not None
         for weight in (found.pid.gains.b, found.pid.gains.c):
             assert -1e-9 <= weight <= 1.0 + 1e-9
@@ -59,7 +59,7 @@ def test_a_pid_s_weights_are_between_none_and_all_of_the_reference() -> None:
 def test_the_reference_is_moved_no_faster_than_the_force_allows() -> None:
     model = MODELS["paper_table2"]
     weak = replace(model, log=(replace(model.log[0], force_peak=100.0),))
-    slow, fast = design(weak), design(model)
+    slow, fast = designed(weak), designed(model)
     assert slow.rst is not None and fast.rst is not None
     assert slow.rst.rate is not None and fast.rst.rate is not None
     assert slow.rst.rate < 0.6 * fast.rst.rate
@@ -71,7 +71,7 @@ def test_the_reference_is_moved_no_faster_than_the_force_allows() -> None:
 def test_the_command_limit_bounds_it_too() -> None:
     model = MODELS["paper_table2"]
     limited = replace(model, rig=replace(model.rig, control_limit=0.3))
-    found = design(limited)
+    found = designed(limited)
     assert found.rst is not None and found.rst.rate is not None
     result, _ = validate(limited, found, rng())
     peak = result.figures["rst"]["model"].command_peak
@@ -83,7 +83,7 @@ def test_the_command_limit_bounds_it_too() -> None:
 
 def test_the_run_has_the_reference_as_given() -> None:
     model = MODELS["paper_table2"]
-    found = design(model)
+    found = designed(model)
     assert found.rst is not None
     r = np.repeat([0.0, 0.1], 500)
     run = run_loop(model, found, found.rst, r, rng())
@@ -97,7 +97,7 @@ def test_the_run_has_the_reference_as_given() -> None:
     [(Asked((300.0, 0.7)), Goals()), (Asked(), Goals(modulus=0.99)), (Asked((15, 1)), Goals(0.97))],
 )
 def test_what_misses_the_goals_is_not_recommended(asked: Asked, goals: Goals) -> None:
-    found = design(MODELS["paper_table2"], asked, goals=goals)
+    found = designed(MODELS["paper_table2"], asked, goals=goals)
     assert found.recommended == "none"
     for name, one in found.controllers.items():
         assert one.missed
@@ -107,7 +107,7 @@ def test_what_misses_the_goals_is_not_recommended(asked: Asked, goals: Goals) ->
 
 
 def test_the_pid_is_recommended_where_only_it_keeps_the_goals() -> None:
-    found: Design = design(
+    found: Design = designed(
         MODELS["paper_table2"], Asked((36.2, 1.0)), goals=Goals(modulus=0.4, effort=82.0)
     )
     assert found.rst is not None and found.pid is not None
@@ -117,7 +117,7 @@ def test_the_pid_is_recommended_where_only_it_keeps_the_goals() -> None:
 
 def failing(model: Model, **changes: float) -> tuple[str, ...]:
     """What the default design misses where it is validated on a changed rig or log."""
-    found = design(model)
+    found = designed(model)
     rig = replace(model.rig, control_limit=changes.get("control_limit"))
     log = (replace(model.log[0], force_peak=changes.get("force_peak", model.force_peak)),)
     result, _ = validate(model, found, rng(), plant=replace(model, rig=rig, log=log))
@@ -137,7 +137,7 @@ def test_validation_judges_force_and_command() -> None:
 
 def test_validation_judges_overshoot() -> None:
     model = MODELS["paper_table2"]
-    found = design(model)
+    found = designed(model)
     assert found.pid is not None
     hasty = replace(found.pid, T=found.pid.R, rate=None)
     result, _ = validate(model, replace(found, pid=hasty, recommended="pid"), rng())

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.drift.drift_test import DriftSettings, DriftTest, Statistic
+from identification.drift.drift_result import DriftTest, Statistic
+from identification.drift.drift_test import DriftSettings
 from identification.drift.mewma import fresh_state
 from identification.drift.reference_model import OwnLogs
 from identification.errors import BadModel
@@ -16,7 +17,8 @@ from identification.model.karnopp import NAMES
 from tests.chain import CARD, TABLES, identified, model_of
 from tests.told import broken_in
 from workbench.cli import main
-from workbench.documents.model import ParameterCorrelation, model_document, read_model
+from workbench.documents.model import ParameterCorrelation
+from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
 from workbench.steps.drift import (
     Drifted,

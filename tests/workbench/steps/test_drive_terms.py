@@ -11,12 +11,12 @@ import pytest
 
 from identification.arrays import Array
 from identification.model.plant import Actuator
-from tests.chain import EMPS, TABLES, model_of
-from workbench.documents.design import Design, design_document
+from tests.chain import EMPS, TABLES, designed, model_of
+from workbench.documents.design import Design
+from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
 from workbench.output import dumps
 from workbench.steps.closed_loop import driven_loop, run_driven
-from workbench.steps.design import design
 
 Step = Callable[[float], float]
 
@@ -25,14 +25,14 @@ Step = Callable[[float], float]
 def motor() -> tuple[Model, Design]:
     model = model_of(EMPS, k_a=35.15)
     model = replace(model, rig=replace(model.rig, command_unit="A", control_limit=4.0))
-    return model, design(model, period=2e-3)
+    return model, designed(model, period=2e-3)
 
 
 @cache
 def cylinder() -> tuple[Model, Design]:
     model = model_of(TABLES["paper_table2"], Actuator(19530.0, 10405.0))
     model = replace(model, rig=replace(model.rig, control_limit=0.4))
-    return model, design(model)
+    return model, designed(model)
 
 
 def filtered(b: list[float], a: list[float], first: float) -> Step:

@@ -13,7 +13,7 @@ from identification.errors import BadCard, BadLog
 from identification.log import Log, Rig
 from identification.model.plant import Motor
 from identification.signals.excitation import Steps
-from tests.chain import EMPS, model_of, short_recipe
+from tests.chain import EMPS, designed, model_of, short_recipe
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import exact
 from workbench.cards.recipe import (
@@ -28,7 +28,6 @@ from workbench.logs.fetch import card_path
 from workbench.logs.runs import read_log
 from workbench.steps.closed_loop import effects_left_out, in_the_loop, run_loop
 from workbench.steps.demo import recipe_of, simulated_log
-from workbench.steps.design import design
 from workbench.steps.predict import Prediction, predict
 from workbench.steps.predicted_force import of_body
 from workbench.steps.simulate import record, truth
@@ -210,7 +209,7 @@ def test_a_log_without_the_effect_s_signals_is_refused() -> None:
 
 def test_a_motor_s_loop_has_the_model_s_effects() -> None:
     plain = model_of(EMPS, k_a=35.15)
-    found = design(plain, period=10e-3)
+    found = designed(plain, period=10e-3)
     assert found.rst is not None
     spring = built_in()["spring"].acting({"k": 2000.0})
     whole = replace(plain, effects={"spring": exact(spring, "linear")})
@@ -227,7 +226,7 @@ def test_a_motor_s_loop_has_the_model_s_effects() -> None:
 
 def test_a_loop_of_two_rates_has_the_model_s_effects() -> None:
     plain = model_of(RECIPE.plant.friction, RECIPE.plant.actuator)  # type: ignore[arg-type]
-    found = design(plain)
+    found = designed(plain)
     assert found.rst is not None and found.force is not None
     assert found.rst.h > found.force.h
     effects = {"stribeck": exact(acting("stribeck"), "linear")}

@@ -8,14 +8,13 @@ import pytest
 
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
-from tests.chain import EMPS, TABLES, model_of
+from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.cards.controller import CardController
 from workbench.documents.design import Design
 from workbench.documents.drive import DriveUnits, present_file
 from workbench.documents.model import Model
 from workbench.report.validation_tables import validation_head, validation_rows
 from workbench.steps import recommend
-from workbench.steps.design import design
 from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import force_period, periods
 from workbench.steps.loop_figures import PRESENT, LoopFigures
@@ -39,7 +38,7 @@ def motor() -> tuple[Model, Design]:
     model = model_of(EMPS, k_a=35.15)
     model = replace(model, rig=replace(model.rig, control_limit=10.0, force_per_command=35.15))
     model = now(model, 150.0)
-    return model, design(model, period=5e-3)
+    return model, designed(model, period=5e-3)
 
 
 def choose(monkeypatch: pytest.MonkeyPatch, **changes: LoopFigures) -> tuple[str, bool, str]:
@@ -169,7 +168,7 @@ def test_periods_come_from_the_card_and_the_log() -> None:
 def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
     model = model_of(EMPS, k_a=35.15)
     noisy = replace(model, fit=replace(model.fit, noise_y=3e-4))
-    found = design(noisy)
+    found = designed(noisy)
     assert found.plant.h > 1e-3
     assert any(line.startswith("not every 1 ms: ") for line in found.remarks)
 
@@ -177,9 +176,9 @@ def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
 def test_a_loop_is_no_faster_than_its_reference_may_be_moved() -> None:
     model = model_of(EMPS, k_a=35.15)
     precise = replace(model, fit=replace(model.fit, noise_y=1e-8))
-    hasty = design(precise, period=1e-3)
+    hasty = designed(precise, period=1e-3)
     seen = replace(precise, log=(replace(model.log[0], speed=0.15),))
-    calm = design(seen, period=1e-3)
+    calm = designed(seen, period=1e-3)
     for name in ("rst", "pid"):
         fast, slow = hasty.controllers[name], calm.controllers[name]
         assert fast.rate is not None and fast.rate < 0.15

@@ -18,7 +18,8 @@ from identification.model.plant import Plant
 from identification.progress import KeepGoing, Progress
 from workbench.cards.effect_values import known_effect
 from workbench.documents.design import Design
-from workbench.documents.model import Model, versions
+from workbench.documents.model import Model
+from workbench.documents.versions import versions
 from workbench.steps.closed_loop import effects_left_out
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import Bench, asked_of, bench_of

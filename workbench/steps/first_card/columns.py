@@ -12,7 +12,7 @@ from identification.errors import BadLog
 from identification.signals.differentiate import Motion, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import Header, read_header
 from workbench.logs.unknown import RawColumn, UnknownLog
 

@@ -11,7 +11,7 @@ import numpy as np
 from identification.errors import BadLog
 from identification.log import RigKind
 from identification.signals.relations import force_law, lead
-from workbench.cards.card import FileSpec
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of

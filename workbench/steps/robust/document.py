@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.documents.model import versions
+from workbench.documents.versions import versions
 from workbench.steps.robust.robust import ROBUST, Promise, Robust
 
 ROBUST_SCHEMA = "robust/1"

@@ -32,7 +32,7 @@ ROBUST_STAGES = {
     "loops on all machines": (0.55, 0.75),
     "what it promises": (0.75, 1.0),
 }
-SMOOTH_PERIODS = 1.25  # of the smooth reference: in, and once round
+SMOOTH_LAPS = 1.25  # of the smooth reference: in, and once round
 MOST_BESIDE = 100  # machines on which the nominal and the present loop are shown
 ROBUST = "robust"
 NOMINAL = "nominal"  # the design that knows of no spread
@@ -147,7 +147,7 @@ def robust_design(
 def _motion(model: Model, nominal: Design, h: float | None = None) -> tuple[Motion, float]:
     """One motion for all loops: that of the nominal design's validation, and a slow ramp."""
     period = h or (nominal.force.h if nominal.force else nominal.plant.h)
-    steps, smooth, _ = references(model, nominal, period, SMOOTH_PERIODS)
+    steps, smooth, _ = references(model, nominal, period, SMOOTH_LAPS)
     slow, speed = slow_ramp(model, period)
     return Motion(steps, smooth, slow), speed
 

@@ -21,13 +21,13 @@ from workbench.steps.design import placed_design
 from workbench.steps.robust.machines import DrawnMachines, some_of
 from workbench.steps.robust.outcomes import MEASURES, Motion, Outcomes, outcomes
 
-SPEEDS = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
+SPEEDS_TRIED = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
 # The compensator's e_T and its filters' time constants, in units of the usual ones; None: without.
 COMPENSATIONS: tuple[tuple[float, float] | None, ...] = (None, (1.0, 1.0), (0.3, 0.3), (0.1, 0.3))
 FEW = 6  # machines that sort the candidates
 FINALISTS = 2  # candidates that all machines judge
 # Errors below which less is no better: of step and amplitude; a staircase, in the sensor's noise.
-LEAST_ERROR, LEAST_STAIR = 1e-3, 5.0
+ERROR_FLOOR, STAIR_FLOOR = 1e-3, 5.0
 WEIGHED = ("standstill", "tracking", "settling", "staircase")
 
 
@@ -102,7 +102,7 @@ def candidates(
     wanted = [
         (replace(asked, integrator=integrator), speed)
         for integrator in ((True, False) if asked.integrator else (False,))
-        for speed in (SPEEDS if asked.dominant is None else (1.0,))
+        for speed in (SPEEDS_TRIED if asked.dominant is None else (1.0,))
     ]
     fastest: dict[bool, Design] = {}
     for i, (one, speed) in enumerate(wanted):
@@ -163,8 +163,8 @@ def _short(one: Candidate, limits: dict[str, float], probability: float) -> floa
 def _cost(one: Candidate, model: Model) -> float:
     """Mean logarithm of what is weighed, each the median over the machines."""
     assert one.found is not None
-    floors = dict.fromkeys(WEIGHED, LEAST_ERROR)
-    floors |= {"staircase": LEAST_STAIR * max(model.fit.noise_y, 1e-12), "settling": 1e-6}
+    floors = dict.fromkeys(WEIGHED, ERROR_FLOOR)
+    floors |= {"staircase": STAIR_FLOOR * max(model.fit.noise_y, 1e-12), "settling": 1e-6}
     medians = [max(float(np.median(one.found.values[n])), floors[n]) for n in WEIGHED]
     return float(np.mean(np.log(medians))) if np.all(np.isfinite(medians)) else np.inf
 

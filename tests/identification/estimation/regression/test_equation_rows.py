@@ -4,13 +4,8 @@ import numpy as np
 import pytest
 
 from identification.errors import BadLog
-from identification.estimation.regression.equation_rows import (
-    LEAST_PART,
-    Rows,
-    motion_log,
-    shortened,
-    solve_rows,
-)
+from identification.estimation.regression.equation_rows import LEAST_PART, motion_log, shortened
+from identification.estimation.regression.weighted_rows import Rows, solve_rows
 from identification.log import Log
 
 

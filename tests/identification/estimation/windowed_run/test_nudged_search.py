@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.closest import SearchLimits, agree, closer, closest
 from identification.estimation.windowed_run.nudged_search import (
     CLOSE_RANGE,
     FAR_RANGE,
@@ -14,10 +15,6 @@ from identification.estimation.windowed_run.nudged_search import (
     SIDES_RANGE,
     TOLD_RANGE,
     Range,
-    SearchLimits,
-    agree,
-    closer,
-    closest,
     judge_nudged,
     less_load,
     limits,
@@ -88,7 +85,7 @@ def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
         ranges.extend(around for _, around in stages)
         return nudged_search(plant, logs, drive, rng, stages)
 
-    monkeypatch.setattr("identification.estimation.windowed_run.nudged_search.nudged_search", spied)
+    monkeypatch.setattr("identification.estimation.windowed_run.closest.nudged_search", spied)
     one = seen(made(4))
     unsure = replace(plant(), friction=replace(NINE, dv_p=0.003, dv_n=-0.003, F_sp=16.2))
     found = closest(
@@ -178,9 +175,7 @@ def test_a_search_that_ends_where_another_did_is_the_last(monkeypatch: pytest.Mo
         begun.append(tried)
         return tried
 
-    monkeypatch.setattr(
-        "identification.estimation.windowed_run.nudged_search.nudged_search", nearly
-    )
+    monkeypatch.setattr("identification.estimation.windowed_run.closest.nudged_search", nearly)
     rng = np.random.default_rng(0)
     found = closest([plant()] * 4, [one], "command", rng, SearchLimits(0))
     assert found.misfit > 5.0 and len(begun) == 2
@@ -231,7 +226,7 @@ def test_a_search_ends_where_another_has_ended(monkeypatch: pytest.MonkeyPatch) 
         searched.append(args)
         return plant()
 
-    monkeypatch.setattr("identification.estimation.windowed_run.nudged_search.nudged_search", count)
+    monkeypatch.setattr("identification.estimation.windowed_run.closest.nudged_search", count)
     rng = np.random.default_rng(0)
     found = closer(plant(), [one], "command", rng, 1)
     assert found.misfit > COMPLETE and len(searched) == 1

@@ -1,6 +1,8 @@
 """The forward run as judge: what the equations do not show is named, and nothing else is."""
 
+from copy import deepcopy
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -15,9 +17,8 @@ from identification.estimation.windowed_run.parameters import even
 from identification.log import Rig
 from identification.thresholds import COMPLETE, MUCH_IS_LEFT
 from identification.tracing.free_run.backward_elimination import Setting
+from identification.tracing.free_run.contenders import Begun, RunContender
 from identification.tracing.free_run.forward_selection import (
-    Begun,
-    RunContender,
     cut_short,
     decisive,
     hidden,
@@ -37,7 +38,13 @@ MOTOR = Rig("motor", force_per_command=K_A)
 
 
 def setting_of(seed: int, width: float) -> tuple[Setting, FittedStructure]:
-    """What the contest needs of a log with that play in its transducer."""
+    """What the contest needs of a log with that play in its transducer, of its own to change."""
+    setting, plain = fitted_setting(seed, width)
+    return replace(setting, rng=deepcopy(setting.rng), made=dict(setting.made)), plain
+
+
+@cache
+def fitted_setting(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     one = seen(made(seed, {"backlash": {"width": width}}))
     start, first = first_stage([one], False)
     rng = np.random.default_rng(0)
@@ -144,7 +151,7 @@ def test_contenders_are_tried_until_one_is_followed(
         misfit = 1.0 if asked == ["backlash"] else 5.0 - len(asked)
         return RunContender((), one.trial.effect, one.plant, misfit)
 
-    monkeypatch.setattr("identification.tracing.free_run.forward_selection._screened", screened)
+    monkeypatch.setattr("identification.tracing.free_run.forward_selection.on_short_logs", screened)
     begun = [
         Begun(
             Trial((), plain.plant, built_in()[key], []), plain.plant, plain.plant, loss, misfit, ()

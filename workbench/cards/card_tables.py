@@ -1,0 +1,204 @@
+"""The tables of a card as it is written, every key said below its field.
+
+`[recipe]` is in workbench/cards/recipe.py, `[controller]` in workbench/cards/controller.py, and
+what a gain means in workbench/cards/sensors.py.
+"""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, Strict, model_validator
+
+from identification.errors import BadCard
+from identification.log import Rig, RigKind
+from identification.model.plant import over
+from workbench.cards.controller import ControllerSection
+from workbench.cards.quantities import in_unit_of
+from workbench.cards.recipe import RecipeSection
+from workbench.cards.sensors import column_scale, command_unit, parse_gain
+from workbench.cards.table import CardTable, Positive
+from workbench.cards.units import LONGEST_UNIT, Scale, force_unit
+
+Format = Literal["csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel"]
+
+
+class About(CardTable):
+    """`[card]`: name of the set and where it comes from."""
+
+    name: str = Field(pattern=r"^[\w.-]+$")
+    """of the machine: letters, digits, `_`, `.`, `-`; also the folder of its files under
+    `WORKBENCH_DATA`"""
+    title: str = ""
+    """in a line"""
+    source: str = ""
+    """who recorded the logs, and how"""
+    licence: str = ""
+    """of the logs"""
+    citation: str = ""
+    """how their authors want them cited"""
+    url: str = ""
+    """where they are described"""
+    notes: tuple[str, ...] = ()
+    """traps, one a text"""
+
+
+class FileSpec(CardTable):
+    """`[file]`: how the bytes are laid out; `None` means found by looking."""
+
+    format: Format | None = None
+    """of the files; without it, by their content"""
+    header: bool | None = None
+    """of text: whether a row of names is there; without it, by looking"""
+    skip_rows: int = Field(default=0, ge=0)
+    """rows to drop before the header, or before the data where there is none"""
+    delimiter: str | None = Field(default=None, min_length=1, max_length=1)
+    """of text; without it, by looking"""
+    decimal: Literal[".", ","] | None = None
+    """of text; without it, by looking"""
+    comment: str = "#"
+    """of text: rows that begin so are dropped"""
+    rows: str | None = None
+    """what holds the signals: JSON key, HDF5 group, MAT struct (`a.b`), sheet, group of channels,
+    topic or message"""
+    encoding: str = "utf-8"
+    """of text"""
+
+
+class SignalSpec(CardTable):
+    """One signal: column = gain * signal + offset (see workbench/cards/sensors.py)."""
+
+    column: str | int
+    """its name in the log, or its number from 0"""
+    unit: str
+    """of the column; of a sensor's output where `gain` is a number of that output for each SI
+    unit"""
+    gain: Annotated[float, Strict()] | str = 1.0
+    """column = gain * signal + offset: a text with its unit (`"80 V/m"`, `"4096 count/turn"`), or a
+    number"""
+    offset: float = 0.0
+    """what the column shows where the signal is 0, in the unit of the column"""
+    bits: int | None = Field(default=None, ge=2, le=52)
+    """of a counter in two's complement"""
+    signed: bool = False
+    """whether an unsigned column is such a counter; needs `bits`"""
+
+    @model_validator(mode="after")
+    def _invertible(self) -> "SignalSpec":
+        parse_gain(self.gain)
+        if self.signed and self.bits is None:
+            raise ValueError("signed = true needs bits")
+        return self
+
+    def scale(self, signal: str, rig: Rig) -> Scale:
+        """Signal in SI = factor * (column - offset) + shift; raises BadCard where it cannot be."""
+        return column_scale(self.unit, self.written_gain, signal, rig.motion, rig.command_unit)
+
+    @property
+    def written_gain(self) -> float | str | None:
+        """The gain as it is written; None where it is not."""
+        return self.gain if "gain" in self.model_fields_set else None
+
+
+class RigSection(CardTable):
+    """`[rig]` as a card writes it."""
+
+    kind: RigKind
+    """how the force on the body is known: from two pressures, logged as F, or as force_per_command
+    times u"""
+    area_p_m2: Positive | None = None
+    """piston area of the chamber that pushes towards +y, m²; with `force` given too, the pressures
+    correct F"""
+    area_n_m2: Positive | None = None
+    """piston area of the other chamber, m²"""
+    supply_pressure_pa: float | None = None
+    """P_s of eq. (7), Pa; left out (0) where areas are the same or pressures are gauge pressures"""
+    force_per_command: float | str | None = None
+    """of a motor: N for each unit of u, or a text (`"35.15 N/A"`)"""
+    command_unit: str | None = Field(default=None, min_length=1, max_length=LONGEST_UNIT)
+    """the unit of u inside; without it V, A, 1, N or N m, as the unit of its column is"""
+    control_limit: Positive | str | None = None
+    """of the size of u, in `command_unit`, or a text (`"8 A"`)"""
+    control_limit_v: Positive | None = None
+    """the older name of `control_limit`"""
+    stroke_m: tuple[float, float] | None = None
+    """low and high end of the motion, m (rad)"""
+    motion: Literal["linear", "rotary"] = "linear"
+    """rotary: rad, N m and kg m² in place of m, N and kg"""
+
+    @model_validator(mode="after")
+    def _complete(self) -> "RigSection":
+        if self.kind == "electro-pneumatic":
+            for key in ("area_p_m2", "area_n_m2"):
+                if getattr(self, key) is None:
+                    raise ValueError(f'kind = "electro-pneumatic" needs {key!r} for eq. (7)')
+        if self.stroke_m and self.stroke_m[0] >= self.stroke_m[1]:
+            raise ValueError("stroke_m must be [low, high]")
+        if self.control_limit is not None and self.control_limit_v is not None:
+            raise ValueError("control_limit and control_limit_v are the same; give one of them")
+        return self
+
+    def value(self, signals: Mapping[str, SignalSpec]) -> Rig:
+        """The rig; signals tell the unit of its command where the card does not name it.
+
+        Raises BadCard where a number's unit is of another kind.
+        """
+        command = self.command_unit or self._command_unit(signals)
+        limit = self.control_limit_v if self.control_limit is None else self.control_limit
+        per = over(force_unit(self.motion), command)
+        return Rig(
+            kind=self.kind,
+            area_p=self.area_p_m2,
+            area_n=self.area_n_m2,
+            supply_pressure=self.supply_pressure_pa,
+            force_per_command=in_unit_of(self.force_per_command, per, "rig.force_per_command"),
+            control_limit=_positive(in_unit_of(limit, command, "rig.control_limit")),
+            stroke=self.stroke_m,
+            motion=self.motion,
+            command_unit=command,
+        )
+
+    def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
+        """The unit of the command's column; a force where none is logged but its limit is told."""
+        if "u" in signals:
+            return command_unit(signals["u"].unit, signals["u"].written_gain, self.motion)
+        return "V" if self.control_limit is None else force_unit(self.motion)
+
+
+def _positive(limit: float | None) -> float | None:
+    if limit is not None and not limit > 0:
+        raise BadCard(f"rig.control_limit = {limit:g}, must be > 0")
+    return limit
+
+
+class FileEntry(CardTable):
+    """`[[files]]`: one file of the set, where to fetch it, and what of the rig differs for it."""
+
+    name: str
+    """of the file"""
+    url: str | None = None
+    """where it can be fetched"""
+    sha256: str | None = Field(default=None, pattern=r"^[0-9a-f]{64}$")
+    """of its bytes; another file is refused"""
+    rig: dict[str, Any] = Field(default_factory=dict)
+    """keys of `[rig]` that differ for this file"""
+
+
+class CardFile(CardTable):
+    """A card as it is written."""
+
+    card: About
+    """what the machine is called, and where its logs come from"""
+    rig: RigSection
+    """the machine"""
+    signals: dict[str, SignalSpec] = Field(default_factory=dict)
+    """what each column is; `t`, `y`, and by kind `p_p` and `p_n`, `F`, or `u` are needed"""
+    file: FileSpec = FileSpec()
+    """how the files are laid out; all of it is found by looking where it is not given"""
+    files: tuple[FileEntry, ...] = ()
+    """the files of the set, one table each"""
+    split: dict[str, tuple[str, ...]] = Field(default_factory=dict)
+    """names of groups of files; `trace` takes `train` and `test`"""
+    recipe: RecipeSection | None = None
+    """in place of a log: what `simulate` makes one from"""
+    controller: ControllerSection | None = None
+    """the controller that the machine has now"""

@@ -1,0 +1,181 @@
+"""design.json read back, in SI, and refused where it contradicts itself."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from design.pid import PIDGains
+from identification.errors import BadModel, BadSpecification
+from identification.model.estimates import Estimate
+from workbench.cards.parameter_units import converted, in_unit
+from workbench.documents.contradictions import refuse_apart, refuse_unequal
+from workbench.documents.design import CompensatorValues, Controller, Design, Linear
+from workbench.documents.design_file import (
+    DESIGN_SCHEMA,
+    ControllerFile,
+    DesignFile,
+    FileUnits,
+    GainsFile,
+    as_file,
+    gain_units,
+    units_of,
+)
+from workbench.documents.drive import (
+    command_of,
+    filters_of,
+    force_of,
+    law_of,
+    number,
+    positive,
+    present_of,
+)
+from workbench.documents.model import used
+from workbench.documents.reading import read_result
+
+
+def read_design(path: Path) -> Design:
+    """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
+    written = read_result(path, DesignFile, DESIGN_SCHEMA)
+    units = units_of(written)
+    try:
+        found = _from_file(written, units)
+        _refuse_other_laws(written, found, units)
+        pairs = tuple(_pairs(written, as_file(found, units), ""))
+        _refuse_changed_units(pairs, found)
+    except (BadModel, BadSpecification) as error:
+        raise BadModel(f"{path}: {error}") from None
+    if not found.controllers:
+        raise BadModel(f"{path}: holds no controller; run 'workbench design' again")
+    said = (converted(one, ours, f"[{where}]") for where, one, ours in pairs)
+    return replace(found, read=tuple(line for line in said if line))
+
+
+def _pairs(written: object, ours: object, where: str) -> Iterator[tuple[str, Estimate, Estimate]]:
+    """Every parameter of a file as it is written and in our units, with its place."""
+    if isinstance(written, Estimate) and isinstance(ours, Estimate):
+        yield where, written, ours
+    elif isinstance(written, Mapping) and isinstance(ours, Mapping):
+        for key, one in written.items():
+            yield from _pairs(one, ours[key], f"{where}.{key}")
+    elif is_dataclass(written):
+        for each in fields(written):
+            place = f"{where}.{each.name}" if where else each.name
+            yield from _pairs(getattr(written, each.name), getattr(ours, each.name), place)
+
+
+def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], found: Design) -> None:
+    """Raises BadModel where a value in another unit is not what the file says in other places."""
+    at = {where: (one, ours) for where, one, ours in pairs}
+    start = "compensator.friction."
+    nine = {w.removeprefix(start): both for w, both in at.items() if w.startswith(start)}
+    refuse_apart(
+        {name: both[0] for name, both in nine.items()},
+        {name: both[1] for name, both in nine.items()},
+        f"[{start}",
+    )
+    if "plant.m" in at:
+        (one, ours), (other, same) = at["plant.m"], nine["m"]
+        refuse_unequal("[plant.m]", one, ours, used(same), f"[{start}m]")
+        refuse_unequal(f"[{start}m]", other, same, used(ours), "[plant.m]")
+    for name in found.controllers:
+        (one, ours), (other, same) = at[f"{name}.h"], at["plant.h"]
+        refuse_unequal(f"[{name}.h]", one, ours, used(same), "[plant.h]")
+        refuse_unequal("[plant.h]", other, same, used(ours), f"[{name}.h]")
+
+
+def _refuse_other_laws(written: DesignFile, found: Design, units: FileUnits) -> None:
+    """Raises BadModel where a law is not the controller beside it."""
+    for name, one in (("rst", written.rst), ("pid", written.pid)):
+        if one is None or one.law is None:
+            continue
+        if found.command is None:
+            raise BadModel(f"[{name}.law] needs [command]; run 'workbench design' again")
+        law = law_of(one.law, units.drive, f"{name}.law")
+        ours = found.controllers[name].law(found.command)
+        for key in "RST":
+            mine, other = getattr(ours, key), getattr(law, key)
+            if len(mine) != len(other) or not np.allclose(mine, other, rtol=1e-9, atol=0.0):
+                raise BadModel(
+                    f"[{name}.law] {key} is not [{name}] {key} in the unit of the command; run"
+                    " 'workbench design' again"
+                )
+
+
+def _from_file(found: DesignFile, units: FileUnits) -> Design:
+    p, c, drive = found.plant, found.compensator, units.drive
+    mass, viscous = units.friction["m"], units.friction["F_vp"]
+    return Design(
+        card=found.card,
+        motion=found.motion,
+        plant=Linear(
+            p.source,
+            p.why,
+            p.A,
+            p.B,
+            positive(p.h, "s", "plant.h"),
+            None if p.m is None else in_unit(p.m, mass, "[plant.m]"),
+            None if p.F_v is None else in_unit(p.F_v, viscous, "[plant.F_v]"),
+        ),
+        force=None if found.force is None else force_of(found.force, drive, "force"),
+        rst=None if found.rst is None else _controller(found.rst, units, "rst"),
+        pid=None if found.pid is None else _controller(found.pid, units, "pid"),
+        refused=found.refused,
+        recommended=found.recommended,
+        compensator=CompensatorValues(
+            number(c.N_c, "1", "compensator.N_c"),
+            number(c.e_T, units.length, "compensator.e_T"),
+            {name: _nine(e, name, units) for name, e in c.friction.items()},
+            None if c.filters is None else filters_of(c.filters),
+            None if c.filters is None else positive(c.filters.h, "s", "compensator.filters.h"),
+        ),
+        remarks=found.remarks,
+        versions=found.versions,
+        command=None if found.command is None else command_of(found.command, found.motion),
+        present=None if found.present is None else present_of(found.present, drive, "present"),
+        recommendation=found.recommendation,
+    )
+
+
+def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller:
+    dominant, rate = one.dominant, one.reference_rate
+    if rate.value is None and not rate.reason:
+        raise BadModel(f"[{where}.reference_rate] is null; it needs a 'reason'")
+    at = f"{where}.reference_rate"
+    return Controller(
+        R=one.R,
+        S=one.S,
+        T=one.T,
+        h=positive(one.h, "s", f"{where}.h"),
+        dominant=(
+            positive(dominant.w_n, "rad/s", f"{where}.dominant.w_n"),
+            positive(dominant.zeta, "1", f"{where}.dominant.zeta"),
+        ),
+        auxiliary=one.auxiliary,
+        margins=one.margins,
+        rate=None if rate.value is None else positive(rate, units.speed, at),
+        lag=number(one.reference_lag, "s", f"{where}.reference_lag"),
+        overshoot=one.overshoot,
+        missed=one.missed,
+        gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
+        note=one.note,
+        W=None if one.law is None else one.law.W,
+    )
+
+
+def _gains(found: GainsFile, units: FileUnits, where: str) -> PIDGains:
+    values = {
+        name: number(getattr(found, name), unit, f"{where}.{name}")
+        for name, unit in gain_units(units)
+    }
+    return PIDGains(**values)
+
+
+def _nine(found: Estimate, name: str, units: FileUnits) -> Estimate:
+    where = f"[compensator.friction.{name}]"
+    if name not in units.friction:
+        raise BadModel(f"{where} is none of the nine: {', '.join(units.friction)}")
+    if found.value is None and (not found.reason or found.assumed is None):
+        raise BadModel(f"{where} is null; it needs a 'reason' and the value 'assumed' instead")
+    return in_unit(found, units.friction[name], where)

@@ -1,0 +1,120 @@
+"""model.json: a model as it is written, and read back in SI."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from identification.effects._library import Library, built_in
+from identification.errors import BadModel
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.model.plant import actuator_units
+from workbench.cards.effect_values import estimates_in_si
+from workbench.cards.parameter_units import all_converted, friction_units, in_unit
+from workbench.documents.contradictions import refuse_changed_units
+from workbench.documents.model import Model, ModelFile, fields_of
+from workbench.documents.plain import as_number, plain
+from workbench.documents.reading import read_result
+
+MODEL_SCHEMA = "model/1"
+
+
+def model_document(model: Model) -> dict[str, Any]:
+    """The model as model.json writes it: the schema first, one entry an estimate."""
+    document = asdict(ModelFile(**fields_of(model)))
+    document["friction"] = {name: as_number(model.friction[name]) for name in NAMES}
+    if model.actuator is not None:
+        document["actuator"] = {key: as_number(value) for key, value in model.actuator.items()}
+    document["effects"] = {
+        key: {name: as_number(value) for name, value in found.items()}
+        for key, found in model.effects.items()
+    }
+    if model.controller is not None:
+        document["controller"] = plain(model.controller)
+    return {"schema": document.pop("schema"), **document}
+
+
+def read_model(path: Path, library: Library | None = None) -> Model:
+    """The model in the file `path`; raises BadModel in one line where it is none.
+
+    library: the effects that it may name, by default all but a user's own files.
+    """
+    found = read_result(path, ModelFile, MODEL_SCHEMA)
+    if library is None:
+        library = _installed() if found.effects else built_in()
+    try:
+        return in_si(found, library)
+    except BadModel as error:
+        raise BadModel(f"{path}: {error}") from None
+
+
+def _installed() -> Library:
+    from workbench.cards.own_effects import library
+
+    return library()
+
+
+def in_si(found: ModelFile, library: Library) -> Model:
+    """The model with every parameter in its SI unit.
+
+    Raises BadModel where a unit is of no such kind, an effect is not in the library, or a value in
+    another unit than ours contradicts the rest.
+    """
+    motion = found.rig.motion
+    friction = friction_units(motion)
+    actuator = actuator_units(motion, found.rig.command_unit)
+    drive = found.actuator
+    try:
+        effects = {
+            key: estimates_in_si(key, values, library, motion, found.rig.command_unit)
+            for key, values in found.effects.items()
+        }
+    except BadModel as error:
+        said = str(error)
+        raise BadModel(said if said.startswith("[") else f"[effects] {said}") from None
+    in_units = replace(
+        found,
+        friction={n: in_unit(e, friction[n], f"[friction.{n}]") for n, e in found.friction.items()},
+        actuator=drive
+        and {n: in_unit(e, actuator[n], f"[actuator.{n}]") for n, e in drive.items()},
+        effects=effects,
+        posterior=_posterior_in_si(found.posterior, {**friction, **actuator}),
+    )
+    refuse_changed_units(found, in_units)
+    return Model(**fields_of(in_units), library=library, read=tuple(_read(found, in_units)))
+
+
+def _read(written: ModelFile, found: ModelFile) -> list[str]:
+    """A line for each value that was written in another unit."""
+    said = all_converted(written.friction, found.friction, "friction")
+    said += all_converted(written.actuator or {}, found.actuator or {}, "actuator")
+    for key, values in found.effects.items():
+        said += all_converted(written.effects[key], values, f"effects.{key}")
+    raw, values = (_intervals(e.posterior) for e in (written, found))
+    return said + all_converted(raw, values, "posterior.parameters")
+
+
+def _posterior_in_si(
+    posterior: Mapping[str, Any] | None, units: Mapping[str, str]
+) -> Mapping[str, Any] | None:
+    """The posterior with its parameters in SI; raises BadModel where a unit is of another kind."""
+    if posterior is None:
+        return None
+    found = {}
+    for name, one in _intervals(posterior).items():
+        if name not in units:
+            raise BadModel(f"[posterior.parameters] unknown parameter {name!r}")
+        found[name] = as_number(in_unit(one, units[name], f"[posterior.parameters.{name}]"))
+    return {**posterior, "parameters": found}
+
+
+def _intervals(posterior: Mapping[str, Any] | None) -> dict[str, Estimate]:
+    """The parameters of a posterior; raises BadModel where one is no value with its unit."""
+    try:
+        return {n: Estimate(**one) for n, one in (posterior or {}).get("parameters", {}).items()}
+    except (TypeError, AttributeError):
+        raise BadModel(
+            "[posterior.parameters] a table of value, unit, sd, low, high each needed; run"
+            " 'workbench identify --posterior' again"
+        ) from None
