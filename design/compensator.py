@@ -48,7 +48,9 @@ class Compensator:
     and is full at e_T; in the rest of the band stands F_stick(F_e), outside it Coulomb friction:
     eq. (4). inner: what stands in the narrow band instead; "none" is 0, which is figure 4 without
     its zero-velocity block. stick off: 0 in the rest of the band (figure 22). viscous: F_v v is
-    added outside the band; with F_stick in the whole band that is eq. (2).
+    added outside the band; with F_stick in the whole band that is eq. (2). excess: F_s - F_c in
+    place of F_s and nothing outside the narrow band, for a loop whose integrator holds the sliding
+    friction: given the whole force at each breakaway, such a loop leaps.
 
     Raises BadModel where N_c <= 1 or e_T <= 0. Source: paper, eqs. (2)-(4), figures 4 and 13.
     """
@@ -59,6 +61,7 @@ class Compensator:
     inner: Inner = "zero-velocity"
     stick: bool = True
     viscous: bool = False
+    excess: bool = False
 
     def __post_init__(self) -> None:
         if self.inner not in INNERS:
@@ -83,8 +86,11 @@ class Compensator:
         """The compensator as `compensation_force` takes it, (14,)."""
         p, viscous = self.friction, float(self.viscous)
         slip = [p.F_cp, p.F_cn, viscous * p.F_vp, viscous * p.F_vn]
-        bands = [p.dv_p, p.dv_n, p.F_sp, p.F_sn, self.dv_p1, self.dv_n1]
-        terms = [float(INNERS.index(self.inner)), float(self.stick)]
+        stick = [p.F_sp, p.F_sn]
+        if self.excess:
+            slip, stick = [0.0] * 4, [max(p.F_sp - p.F_cp, 0.0), min(p.F_sn + p.F_cn, 0.0)]
+        bands = [p.dv_p, p.dv_n, *stick, self.dv_p1, self.dv_n1]
+        terms = [float(INNERS.index(self.inner)), float(self.stick and not self.excess)]
         return np.array([p.m, *slip, *bands, self.e_T, *terms])
 
     def force(self, v: float, e_y: float, F: float) -> float:

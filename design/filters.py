@@ -5,6 +5,7 @@ compensator gives. The paper says of the rig that a filter of order 40 delays th
 0.21 s, and names it B, while its text takes the velocity behind A: `rig_filters` has both readings.
 """
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -19,6 +20,9 @@ N_D = 5  # positions of the slope (5)
 SHORTEST_SLOPE = 2
 CUTOFF, RIG_CUTOFF = 5.0, 10.0  # Hz
 RIG_PERIOD = 10e-3  # s
+QUICK_SLOPE, LONGEST_SLOPE = 3, 20
+QUICK_SHARE = 0.4  # of the band, to which the slope's noise may come before its filter
+QUICK_SAMPLES = (2.0, 1.0)  # time constants of velocity and error, in samples
 PASS = Filter((1.0,))
 
 
@@ -68,6 +72,21 @@ def scaled_filters(h: float, times: float) -> CompensatorFilters:
         _first_order((-one.a[1]) ** (h / (times * RIG_PERIOD))) for one in (RIG_A, RIG_C)
     )
     return CompensatorFilters(first, first, last, max(round(times * N_D), SHORTEST_SLOPE))
+
+
+def quick_filters(h: float, noise: float, band: float) -> CompensatorFilters:
+    """Filters for a compensator that acts within a stick: as short as the position's noise lets.
+
+    The slope (5) is over the fewest positions, of noise [m], that leave of it a share of the band
+    [m/s]; no filter C. Raises BadSpecification where h [s] or the band is not positive.
+    """
+    if not (h > 0 and band > 0):
+        raise BadSpecification(f"sampling period {h:g} s, band {band:g} m/s; need both > 0")
+    most = QUICK_SHARE * band * h / noise if noise > 0 else math.inf
+    spans = range(QUICK_SLOPE, LONGEST_SLOPE)
+    n = next((n for n in spans if n * (n * n - 1) * most**2 >= 12.0), LONGEST_SLOPE)
+    velocity, error = (_first_order(math.exp(-1.0 / samples)) for samples in QUICK_SAMPLES)
+    return CompensatorFilters(velocity, error, PASS, n)
 
 
 def _first_order(pole: float) -> Filter:

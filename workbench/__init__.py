@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from workbench.interface.calls import load_model as load_model
     from workbench.interface.calls import predict as predict
     from workbench.interface.calls import read_logs as read_logs
+    from workbench.interface.calls import robust_design as robust_design
     from workbench.interface.calls import simulate as simulate
     from workbench.interface.calls import trace as trace
     from workbench.interface.calls import validate as validate
@@ -29,11 +30,13 @@ if TYPE_CHECKING:
     from workbench.steps.experiment.planned import Wanted as Wanted
     from workbench.steps.identify_sources import Options as Options
     from workbench.steps.loop_figures import Limits as Limits
+    from workbench.steps.robust.robust import RobustAsked as RobustAsked
 
 _CALLS = "workbench.interface.calls"
 _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
     **{name: _CALLS for name in ("simulate", "experiment", "load_model", "read_logs")},
+    "robust_design": _CALLS,
     **{name: "workbench.interface.effects" for name in ("effects", "check_effects")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",
@@ -42,6 +45,7 @@ _HOMES = {
     "Wanted": "workbench.steps.experiment.planned",
     "Options": "workbench.steps.identify_sources",
     "Limits": "workbench.steps.loop_figures",
+    "RobustAsked": "workbench.steps.robust.robust",
 }
 
 

@@ -58,6 +58,20 @@ def test_the_terms_at_a_glance() -> None:
     assert replace(C, stick=False).force(0.03, 1.0, 7.0) == 0.0
 
 
+def test_the_excess_alone_pushes_by_what_breakaway_needs_beyond_sliding() -> None:
+    own = replace(C, excess=True)
+    assert own.force(0.05, 0.0, 0.0) == own.force(-0.05, 0.0, 0.0) == 0.0
+    assert own.force(0.0, 1.0, 0.0) == pytest.approx(20.6 - 12.0)
+    assert own.force(0.0, -1.0, 0.0) == pytest.approx(-(23.0 - 15.0))
+    assert own.force(0.0, 0.0015, 0.0) == pytest.approx(0.5 * (20.6 - 12.0))
+    assert own.force(0.03, 1.0, 7.0) == 0.0
+
+
+def test_where_sliding_needs_more_than_breakaway_there_is_no_excess() -> None:
+    own = replace(C, friction=replace(FRICTION, F_sp=11.0, F_sn=-14.0), excess=True)
+    assert own.force(0.0, 1.0, 0.0) == own.force(0.0, -1.0, 0.0) == 0.0
+
+
 def test_narrow_band_is_the_band_over_N_c() -> None:
     assert (C.dv_p1, C.dv_n1) == (0.02, -0.02)
     with pytest.raises(FrozenInstanceError):

@@ -22,7 +22,14 @@ if TYPE_CHECKING:
     from design.tune import Asked
     from workbench.documents.design import From
     from workbench.documents.model import Model
+    from workbench.steps.loop_figures import Limits
     from workbench.steps.robust.robust import RobustAsked
+
+# Options, by the names of their values, that only --robust has.
+ROBUST_ONLY = (
+    "draws", "probability", "staircase", "standstill", "tracking", "overshoot", "force", "machine",
+    "where", "seed",
+)  # fmt: skip
 
 
 @click.command(
@@ -78,7 +85,10 @@ if TYPE_CHECKING:
     "--registry", "where", metavar="FILE|URL",
     help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
 )  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True,
+    help="Of the machines drawn, with --robust.",
+)  # fmt: skip
 @present_card_option
 @effects_option
 @output_options
@@ -115,36 +125,48 @@ def command(
     With --robust: the poles, the integrator and the compensator that do best over the machines that
     the model's errors (and the machine's drift so far) allow; robust.json holds what that promises.
     """
-    from design.tune import Asked, Goals
+    from design.tune import Asked
     from workbench.cards.own_effects import library
-    from workbench.documents.design_file import design_document
     from workbench.documents.model_file import read_model
     from workbench.options import parse_auxiliary, parse_poles
+    from workbench.steps.loop_figures import Limits
+    from workbench.steps.present import with_card
+
+    model = with_card(read_model(model_file, library(effects)), card)
+    asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
+    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
+    if robust:
+        from workbench.steps.robust.robust import RobustAsked
+
+        seen = _drift(where, machine) if machine else None
+        wanted = RobustAsked(draws, probability, limits, staircase, seen, seed)
+        return _robust(model, model_file, wanted, asked, (source, design_period), as_json, out)
+    _only_robust(click.get_current_context())
+    kept = _kept(integrator, source, design_period, card, effects)
+    plant = (source, design_period)
+    return _nominal(model, (model_file, card, kept), limits, asked, plant, as_json, out)
+
+
+def _nominal(
+    model: "Model", given: tuple[Path, str | None, tuple[str, ...]], limits: "Limits",
+    asked: "Asked", plant: "tuple[From | None, float | None]", as_json: bool, out: Path | None,
+) -> int:  # fmt: skip
+    """given: model file and card, and the options that another try keeps."""
+    from design.tune import Goals
+    from workbench.documents.design_file import design_document
     from workbench.report.design_tables import design_view
     from workbench.report.next_steps import after_design, without_design
     from workbench.report.reports import design_report
     from workbench.steps.design import design, effort_limit
-    from workbench.steps.present import with_card
-    from workbench.steps.robust.robust import RobustAsked
 
-    model = with_card(read_model(model_file, library(effects)), card)
-    asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
-    goals = Goals(modulus, delay, effort_limit(model))
-    kept = _kept(integrator, source, design_period, card, effects)
-    if robust:
-        from workbench.steps.loop_figures import Limits
-
-        limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
-        seen = _drift(where, machine) if machine else None
-        wanted = RobustAsked(draws, probability, limits, staircase, seen, seed)
-        return _robust(model, model_file, wanted, asked, (source, design_period), as_json, out)
-    _only_robust(staircase=staircase, machine=machine)
+    (model_file, card, kept), (source, period) = given, plant
+    goals = Goals(limits.modulus, limits.delay, effort_limit(model))
     with (
         refused_with(without_design(model, card)),
         OutputFolder("design", out, now=datetime.now()) as folder,
     ):
         with progress("designing", as_json=as_json):
-            found = design(model, asked, goals=goals, source=source, period=design_period)
+            found = design(model, asked, goals=goals, source=source, period=period)
         document = design_document(found)
         folder.write_json("design.json", document)
         folder.write_text("report.html", design_report(found, model.rotary))
@@ -152,16 +174,19 @@ def command(
         {**document, "out": folder.final},
         as_json,
         lambda: design_view(found, folder.final, model.rotary),
-        after_design(found, model_file, poles is not None, kept),
+        after_design(found, model_file, asked.dominant is not None, kept),
     )
     return 1 if found.recommended == "none" else 0
 
 
-def _only_robust(**given: object) -> None:
+def _only_robust(context: click.Context) -> None:
     """Raises a usage error where an option is given that has no meaning without --robust."""
-    for name, value in given.items():
-        if value is not None:
-            raise click.UsageError(f"--{name} has no meaning without --robust; add it.")
+    for option in context.command.params:
+        given = context.get_parameter_source(option.name or "")
+        if option.name in ROBUST_ONLY and given is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f"{option.opts[0]} has no meaning without --robust; add it, or leave it out."
+            )
 
 
 def _robust(
@@ -197,6 +222,8 @@ def _robust(
 
 def _drift(where: str | None, machine: str) -> dict[str, float]:
     """By how much the machine's parameters have changed between its models in force."""
+    from pydantic import TypeAdapter
+
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import MOVES, Registry
@@ -205,13 +232,8 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]
         models = [store.document(store.version(machine, n), "model") for n in numbers]
-    return drift_seen(
-        [
-            {name: Estimate(one.get("value"), one["unit"], one.get("sd"))
-             for name, one in model["friction"].items()}
-            for model in models
-        ]
-    )  # fmt: skip
+    friction = TypeAdapter(dict[str, Estimate])
+    return drift_seen([friction.validate_python(model["friction"]) for model in models])
 
 
 def _kept(

@@ -106,7 +106,7 @@ class Controller:
 class CompensatorValues:
     """Parameters of the compensator (4): N_c [-], e_T [m], the nine as the model has them.
 
-    filters: around it, and their period [s]; None in older files.
+    filters: around it, and their period [s]; None in older files. excess: see `Compensator`.
     """
 
     N_c: float
@@ -114,6 +114,7 @@ class CompensatorValues:
     friction: Mapping[str, Estimate]
     filters: CompensatorFilters | None = None
     h: float | None = None
+    excess: bool = False
 
     def __post_init__(self) -> None:
         for name in NAMES:
@@ -130,7 +131,7 @@ class CompensatorValues:
     def value(self) -> Compensator:
         """The compensator for the loop."""
         friction = Karnopp(**{name: used(self.friction[name]) for name in NAMES})
-        return Compensator(friction, self.N_c, self.e_T)
+        return Compensator(friction, self.N_c, self.e_T, excess=self.excess)
 
 
 @dataclass(frozen=True)

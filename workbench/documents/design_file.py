@@ -87,6 +87,7 @@ class _CompensatorFile:
     e_T: Estimate
     friction: Mapping[str, Estimate]
     filters: FiltersFile | None = None
+    excess: bool = False
 
 
 @dataclass(frozen=True)
@@ -158,6 +159,7 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
             Estimate(c.e_T, units.length),
             c.friction,
             None if c.filters is None or c.h is None else filters_file(c.filters, c.h),
+            c.excess,
         ),
         remarks=found.remarks,
         versions=found.versions,

@@ -129,6 +129,7 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
             {name: _nine(e, name, units) for name, e in c.friction.items()},
             None if c.filters is None else filters_of(c.filters),
             None if c.filters is None else positive(c.filters.h, "s", "compensator.filters.h"),
+            c.excess,
         ),
         remarks=found.remarks,
         versions=found.versions,

@@ -107,6 +107,7 @@ def _compensator(what: Exported) -> dict[str, Any]:
         **{name: getattr(own.friction, name) for name in NAMES},
         "N_c": own.N_c,
         "e_T": own.e_T,
+        "excess": own.excess,
         "filters": {name: {"b": one.b, "a": one.a} for name, one in parts.items()},
     }
 

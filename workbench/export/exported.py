@@ -123,6 +123,10 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
         out.append(
             f"the design recommends it {'with' if told.compensator else 'without'} the compensator"
         )
+    if beside and found.compensator.excess:
+        out.append(
+            "compensator: F_sp and F_sn are what breakaway needs beyond sliding, F_cp, F_cn 0"
+        )
     if found.command.limit is None:
         out.append("no limit of the command is known: it is not clipped")
     if beside and found.compensator.assumed:

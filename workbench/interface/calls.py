@@ -45,7 +45,7 @@ from workbench.interface.inputs import (
     sources,
 )
 from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
-from workbench.interface.loops import DesignResult, ExperimentResult, ValidateResult
+from workbench.interface.loops import DesignResult, ExperimentResult, RobustResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
 from workbench.output import Bar, progress
@@ -60,6 +60,8 @@ from workbench.steps.identify_sources import Options, identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
 from workbench.steps.present import present_of_card
+from workbench.steps.robust.robust import ROBUST_STAGES, RobustAsked
+from workbench.steps.robust.robust import robust_design as robust_of_model
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import named_logs, trace_sources
@@ -152,6 +154,30 @@ def design(
     with _bar("designing"):
         found = design_of_model(known, asked, goals=wanted, source=source, period=period)
     return DesignResult(found, known)
+
+
+def robust_design(
+    model: ModelLike, wanted: RobustAsked | None = None, *,
+    poles: tuple[float, float] | None = None, integrator: bool = True, period: float | None = None,
+) -> RobustResult:  # fmt: skip
+    """The design that does best over the machines that a model's errors allow, as `workbench design
+    --robust`.
+
+    wanted: machines drawn, limits, on what share of the machines each has to hold; poles,
+    integrator, period as `design` has them. Raises BadSpecification where no loop can be placed,
+    NotIdentifiable where the mass is not known.
+    """
+    from design.tune import Asked
+
+    known = _model(model)
+    asked = Asked(poles, None, integrator)
+    with _bar("robust design", 1.0) as bar:
+        course = Course(bar, ROBUST_STAGES, time.monotonic, told=bar.told)
+        with watched(course):
+            found = robust_of_model(
+                known, wanted or RobustAsked(), asked, where=(None, period), report=course.report
+            )
+    return RobustResult(found, known)
 
 
 def validate(

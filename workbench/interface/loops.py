@@ -12,6 +12,7 @@ from workbench.documents.model import Model
 from workbench.interface.result import Part, Result
 from workbench.steps.experiment.planned import Experiment
 from workbench.steps.loop_figures import Traces
+from workbench.steps.robust.robust import ROBUST, Robust
 from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
@@ -89,6 +90,77 @@ class DesignResult(Result):
 
     def _files(self) -> Iterator[tuple[str, str]]:
         yield "design.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "design"
+
+
+@dataclass(frozen=True, repr=False)
+class RobustResult(Result):
+    """A design chosen over the machines drawn from a model, and what it promises of them."""
+
+    found: Robust
+    model: Model
+
+    @property
+    def design(self) -> DesignResult:
+        """The design itself, as `validate` and `export` take it."""
+        return DesignResult(self.found.design, self.model)
+
+    @property
+    def passed(self) -> bool:
+        """Whether each limit is kept with the probability asked for."""
+        return self.found.passed
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.robust.document import robust_document
+
+        return robust_document(self.found)
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """Every measure of the robust loop on every machine drawn, a row a machine."""
+        import pandas as pd
+
+        return pd.DataFrame(dict(self.found.promises[ROBUST].found.values))
+
+    def report(self) -> str:
+        from workbench.report.robust import robust_report
+
+        return robust_report(self.found, self.model.rotary)
+
+    def plot(self) -> "Figure":
+        from workbench.report.robust import robust_figure
+
+        return robust_figure(self.found, self.model.rotary)
+
+    def _view(self) -> object:
+        from workbench.report.robust import robust_view
+
+        return robust_view(self.found, None, self.model.rotary)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.robust import (
+            BESIDE_HEAD,
+            ROBUST_HEAD,
+            beside_rows,
+            promise_rows,
+            robust_lines,
+            robust_sentence,
+        )
+
+        rotary = self.model.rotary
+        return robust_sentence(self.found), [
+            Part(ROBUST_HEAD, promise_rows(self.found, rotary), robust_lines(self.found, rotary)),
+            Part(BESIDE_HEAD, beside_rows(self.found, rotary), []),
+        ]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        yield "design.json", self.design.to_json() + "\n"
+        yield "robust.json", self.to_json() + "\n"
         yield "report.html", self.report()
 
     @property

@@ -74,8 +74,9 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
             f"PID: k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s,"
             f" eps = {g.eps:.4g} s"
         )
+    pushed = "what breakaway needs beyond sliding" if c.excess else "the whole breakaway force"
     lines.append(
-        f"compensator: pushes with the whole breakaway force at a position error of"
+        f"compensator: pushes with {pushed} at a position error of"
         f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)"
     )
     lines.extend(f"no {name.upper()}: {why}" for name, why in found.refused.items())

@@ -188,7 +188,7 @@ def robust_figure(found: Robust, rotary: bool) -> "Figure":
         for axes, one in zip(every, wanted, strict=False):
             _shares(axes, found, one, rotary)
         for axes in every[len(wanted) :]:
-            axes.set_visible(False)
+            axes.remove()
         for axes in every[::3]:
             axes.set_ylabel("share of machines [%]")
         handles, names = every[0].get_legend_handles_labels()

@@ -62,7 +62,7 @@ def test_every_parameter_has_its_unit() -> None:
 def test_numbers_without_a_unit_are_coefficients_and_results_only() -> None:
     document = json.loads(dumps(design_document(found())))
     free = {"R", "S", "T", "W", "A", "B", "C", "slope"}  # coefficients
-    free |= {"auxiliary", "margins", "overshoot", "recommendation"}
+    free |= {"auxiliary", "excess", "margins", "overshoot", "recommendation"}
 
     def bare(value: object, name: str) -> list[str]:
         if isinstance(value, Mapping):

@@ -3,6 +3,7 @@
 import ctypes
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -80,6 +81,19 @@ def test_its_steps_are_the_simulations_in_every_bit(
     for build in (one for one in BUILDS if one.startswith(compiler)):
         found = driven(library(what, tmp_path, build), inputs)
         assert np.array_equal(found.view(np.int64), run.u.view(np.int64)), build
+
+
+def test_a_compensator_of_the_excess_alone_is_the_same_program(tmp_path: Path) -> None:
+    one = case("paper_table3")
+    own = replace(one.design.compensator, e_T=3e-4, N_c=1.05, excess=True)
+    design = replace(one.design, compensator=own)
+    what = exported(design, "rst", compensated=True)
+    assert "F_cp, F_cn 0" in " ".join(what.remarks)
+    run, inputs = simulated(one, what, FEWER)
+    found = driven(library(what, tmp_path, "gcc -O2"), inputs)
+    assert np.array_equal(found.view(np.int64), run.u.view(np.int64))
+    whole = exported(one.design, "rst", compensated=True)
+    assert not np.array_equal(simulated(one, whole, FEWER)[0].u, run.u)
 
 
 def test_a_limited_command_reaches_its_limit() -> None:

@@ -138,6 +138,19 @@ def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     shown_well(found, " recommended, position loop every")
 
 
+def test_robust_design(bench: Bench, model: Any, tmp_path: Path) -> None:
+    arguments = ("design", bench.path("model/model.json"), "--robust", "--draws", "20")
+    folder = bench.ran("robust", *arguments, "--poles", "15,1", "--seed", "4")
+    found = wb.robust_design(model, wb.RobustAsked(draws=20, seed=4), poles=(15.0, 1.0))
+    out = found.save(tmp_path / "saved")
+    for name in ("design.json", "robust.json", "report.html"):
+        assert (out / name).read_text("utf-8") == (folder / name).read_text("utf-8"), name
+    assert len(found.frame) == 20
+    assert found.passed == json.loads(found.to_json())["passed"]
+    assert wb.validate(model, found.design).found.passed
+    shown_well(found, "machines drawn")
+
+
 def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:
     paths = (bench.path("model/model.json"), bench.path("design/design.json"))
     folder = bench.ran("validation", "validate", *paths)

@@ -23,7 +23,7 @@ from workbench.steps.robust.outcomes import (
     outcomes,
     slow_ramp,
 )
-from workbench.steps.robust.search import Candidate, Searched, searched, spread_of
+from workbench.steps.robust.search import Candidate, Placing, Searched, searched, spread_of
 
 ROBUST_STAGES = {
     "nominal design": (0.0, 0.1),
@@ -125,10 +125,10 @@ def robust_design(
     search, anew, noise = np.random.default_rng(wanted.seed).spawn(3)
     limits = limits_by_name(wanted.limits, wanted.staircase)
     machines = drawn_machines(model, search, wanted.draws, wanted.drift)
-    motion, speed = _motion(model, nominal)
+    motion, speed = one_motion(model, nominal)
     found = searched(
-        machines, asked, goals, ("physical", where[1]), motion, limits, wanted.probability,
-        search, report,
+        machines, Placing(asked, goals, "physical", where[1]), motion, limits,
+        wanted.probability, search, report,
     )  # fmt: skip
     judges = drawn_machines(model, anew, wanted.draws, wanted.drift)
     promises = _promises(model, judges, found.chosen, nominal, limits, noise, report)
@@ -144,7 +144,7 @@ def robust_design(
     )
 
 
-def _motion(model: Model, nominal: Design, h: float | None = None) -> tuple[Motion, float]:
+def one_motion(model: Model, nominal: Design, h: float | None = None) -> tuple[Motion, float]:
     """One motion for all loops: that of the nominal design's validation, and a slow ramp."""
     period = h or (nominal.force.h if nominal.force else nominal.plant.h)
     steps, smooth, _ = references(model, nominal, period, SMOOTH_LAPS)
@@ -169,7 +169,7 @@ def _promises(
     out = {}
     for i, (name, (controller, compensator, loop)) in enumerate(loops.items()):
         report("what it promises", i / len(loops))
-        motion, _ = _motion(model, nominal, loop.h)
+        motion, _ = one_motion(model, nominal, loop.h)
         judges = machines if name == ROBUST else some_of(machines, MOST_BESIDE)
         found = outcomes(judges, loop, motion, seeds)
         out[name] = promise_of(controller, compensator, found, limits)

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from design.filters import CompensatorFilters, scaled_filters
+from design.filters import quick_filters, scaled_filters
+from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
 from identification.progress import Progress
@@ -22,8 +23,11 @@ from workbench.steps.robust.machines import DrawnMachines, some_of
 from workbench.steps.robust.outcomes import MEASURES, Motion, Outcomes, outcomes
 
 SPEEDS_TRIED = (1.0, 0.7, 0.5)  # of the fastest loop that keeps its margins
-# The compensator's e_T and its filters' time constants, in units of the usual ones; None: without.
-COMPENSATIONS: tuple[tuple[float, float] | None, ...] = (None, (1.0, 1.0), (0.3, 0.3), (0.1, 0.3))
+# The whole compensator's e_T and its filters' time constants, in units of the usual ones.
+WHOLE_TRIED = ((1.0, 1.0), (0.3, 0.3), (0.1, 0.3))
+# e_T of one that gives the excess alone, in the position's noise, and its N_c.
+EXCESS_TRIED = (5.0, 20.0)
+EXCESS_N_C = 1.05
 FEW = 6  # machines that sort the candidates
 FINALISTS = 2  # candidates that all machines judge
 # Errors below which less is no better: of step and amplitude; a staircase, in the sensor's noise.
@@ -51,6 +55,17 @@ class Candidate:
         return driven_loop(model, self.design, self.controller, value)
 
 
+@dataclass(frozen=True)
+class Placing:
+    """What is asked of the poles and margins; the linear plant and the period [s] to place on, None
+    where they are chosen."""
+
+    asked: Asked
+    goals: Goals
+    source: From | None = None
+    period: float | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Searched:
     """The candidate chosen, how many were tried, and whether it kept every limit in the search."""
@@ -61,17 +76,15 @@ class Searched:
 
 
 def searched(
-    machines: DrawnMachines, asked: Asked, goals: Goals, where: tuple[From | None, float | None],
-    motion: Motion, limits: dict[str, float], probability: float, rng: np.random.Generator,
-    report: Progress,
+    machines: DrawnMachines, placing: Placing, motion: Motion, limits: dict[str, float],
+    probability: float, rng: np.random.Generator, report: Progress,
 ) -> Searched:  # fmt: skip
     """The best of all candidates by their loops on the machines.
 
-    where: linear plant and period asked for; limits: by measure. Raises BadSpecification where no
-    loop can be placed at all.
+    limits: by measure. Raises BadSpecification where no loop can be placed at all.
     """
     model = machines.model
-    every = list(candidates(machines, asked, goals, where, probability, report))
+    every = list(candidates(machines, placing, probability, report))
     seeds = rng.spawn(len(machines.plants))
     sorted_by = some_of(machines, min(FEW, len(machines.plants)))
     tried: list[Candidate] = []
@@ -93,12 +106,12 @@ def searched(
 
 
 def candidates(
-    machines: DrawnMachines, asked: Asked, goals: Goals, where: tuple[From | None, float | None],
-    probability: float, report: Progress,
-) -> Iterator[Candidate]:  # fmt: skip
+    machines: DrawnMachines, placing: Placing, probability: float, report: Progress
+) -> Iterator[Candidate]:
     """Every loop that is tried. Raises BadSpecification where none can be placed."""
     refusal: BadSpecification | None = None
     placed = 0
+    asked = placing.asked
     wanted = [
         (replace(asked, integrator=integrator), speed)
         for integrator in ((True, False) if asked.integrator else (False,))
@@ -111,18 +124,18 @@ def candidates(
         if speed < 1.0 and first is None:
             continue
         top = None if first is None else _speed(first) * speed
-        period = where[1] if first is None else first.plant.h
+        period = placing.period if first is None else first.plant.h
         try:
             found = placed_design(
-                machines.model, one, goals=replace(goals, fastest=top), source=where[0],
-                period=period,
+                machines.model, one, goals=replace(placing.goals, fastest=top),
+                source=placing.source, period=period,
                 drawn=lambda plant, force: machines.linear(plant.h, force, probability),
             )  # fmt: skip
         except BadSpecification as error:
             refusal = refusal or error
             continue
         fastest.setdefault(one.integrator, found)
-        for candidate in _of_design(found):
+        for candidate in _of_design(machines.model, found):
             placed += 1
             yield candidate
     if not placed:
@@ -133,24 +146,33 @@ def _speed(found: Design) -> float:
     return max(one.dominant[0] for one in found.controllers.values())
 
 
-def _of_design(found: Design) -> Iterator[Candidate]:
+def _of_design(model: Model, found: Design) -> Iterator[Candidate]:
     """Its controllers that keep their goals, each without and with compensators."""
     names: tuple[Recommended, ...] = ("rst", "pid")
     kept = [n for n in names if n in found.controllers and not found.controllers[n].missed]
     for name in kept or [n for n in names if n in found.controllers]:
-        for sizes in COMPENSATIONS:
-            if sizes is None:
-                yield Candidate(found, name, compensator=False)
-            else:
-                own = compensator_of(found.compensator, *sizes)
-                yield Candidate(replace(found, compensator=own), name, compensator=True)
+        yield Candidate(found, name, compensator=False)
+        controller = found.controllers[name]
+        for own in compensators(model, found.compensator, controller):
+            yield Candidate(replace(found, compensator=own), name, compensator=True)
 
 
-def compensator_of(usual: CompensatorValues, e_T: float, filters: float) -> CompensatorValues:
-    """The compensator with e_T and its filters' time constants in units of the usual ones."""
-    period = usual.h or 0.0
-    own: CompensatorFilters | None = scaled_filters(period, filters) if period else usual.filters
-    return replace(usual, e_T=e_T * usual.e_T, filters=own)
+def compensators(
+    model: Model, usual: CompensatorValues, controller: Controller
+) -> Iterator[CompensatorValues]:
+    """The compensators that are tried around a controller; beside an integrator, which holds the
+    sliding friction, also of the excess alone, where the machine has one."""
+    h = usual.h or controller.h
+    for e_T, times in WHOLE_TRIED:
+        yield replace(usual, e_T=e_T * usual.e_T, filters=scaled_filters(h, times), h=h)
+    friction, noise = usual.value.friction, model.fit.noise_y
+    excess = max(friction.F_sp - friction.F_cp, -friction.F_sn - friction.F_cn)
+    if excess > 0.0 and noise > 0.0 and integrates(np.ones(1), controller.rst):
+        filters = quick_filters(h, noise, min(friction.dv_p, -friction.dv_n))
+        for many in EXCESS_TRIED:
+            yield replace(
+                usual, N_c=EXCESS_N_C, e_T=many * noise, filters=filters, h=h, excess=True
+            )
 
 
 def _short(one: Candidate, limits: dict[str, float], probability: float) -> float:
