@@ -54,8 +54,8 @@ def walkers_for(unknowns: int) -> int:
 
 
 def independent_ensembles(
-    cost: Cost, seeds: Array, rng: np.random.Generator, *, judged: int, steps: int = MOST_WALK_STEPS,
-    on_progress: Callable[[float], None] | None = None,
+    cost: Cost, seeds: Array, rng: np.random.Generator, *, judged: int,
+    steps: int = MOST_WALK_STEPS, on_progress: Callable[[float], None] | None = None,
 ) -> Walks:  # fmt: skip
     """Samples of exp(-cost / 2), walked in rounds that double until the ensembles agree.
 
