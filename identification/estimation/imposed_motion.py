@@ -71,9 +71,7 @@ def fit_imposed(
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
     noise_F = float(np.median([one.noise_F for one in recorded.logs]))
-    moved = [motion_log(log, held=False, by_command=False, imposed=True) for log in logs]
-    rows = _rows(moved, recorded.name)
-    fit = _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART)
+    fit, rows = force_fit(recorded)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
     samples = np.tile(center, (NORMAL_SETS, 1))
@@ -113,6 +111,16 @@ def fit_imposed(
             " force",
         ),
     )
+
+
+def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
+    """Sliding friction by the force equation, and the rows that it was fitted on.
+
+    Raises NotIdentifiable where no log slides enough in both directions.
+    """
+    moved = [motion_log(one, held=False, by_command=False, imposed=True) for one in recorded.plain]
+    rows = _rows(moved, recorded.name)
+    return _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART), rows
 
 
 def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:

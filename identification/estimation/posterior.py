@@ -1,4 +1,4 @@
-"""Posterior of the fitted parameters by an ensemble of walkers, started from the global optimum."""
+"""Posterior of a fit's parameters by several independent ensembles, started around the fit."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -7,39 +7,62 @@ from types import MappingProxyType
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.ensemble import ensemble
-from identification.estimation.plain_search.likely_sets import granted_samples, log_cost, reweighed
-from identification.estimation.plain_search.local_search import pack, refine
-from identification.estimation.plain_search.problem import pose
-from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.independent_ensembles import (
+    ENSEMBLES,
+    ESS_LEAST,
+    MOST_WALK_STEPS,
+    R_HAT_MOST,
+    Walks,
+    independent_ensembles,
+    walkers_for,
+)
+from identification.estimation.likelihood import Likelihood, likelihood_of
 from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
-from identification.model.plant import Actuator
-from identification.simulation.karnopp_step import K2, kernel_parameters
 
-POSTERIOR_WALKERS = 64
-POSTERIOR_STEPS = 6000
+BEGUN_WIDER = 1.5  # times the fit's deviations, about which walkers begin: wider than they end
+DRAWN_CLOSER = 0.5  # of that, where too few of them can be
+DRAWN_ROUNDS = 12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Posterior:
-    """Samples (k, d) of the parameters `names` (d,), and whether the chain can be believed.
+    """Chains (ensembles, draws, d) of the parameters `names` (d,), and whether to believe them.
 
-    autocorrelation: the longest, in steps; `converged` where the kept half of the chain is at
-    least 50 of them long; `verdict` says so in words.
+    A chain holds one walker's steps after another's. r_hat: rank-normalised, of the ensembles; ess:
+    independent draws that all are worth; both by name. way: on what the likelihood is; evaluations:
+    of it, in all; steps: of a walker. `verdict` says in a line whether it has converged.
     """
 
     names: tuple[str, ...]
-    samples: Array
-    autocorrelation: float
+    chains: Array
+    r_hat: Mapping[str, float]
+    ess: Mapping[str, float]
+    way: str
     acceptance: float
     walkers: int
     steps: int
+    evaluations: int
     converged: bool
     verdict: str
 
+    @property
+    def ensembles(self) -> int:
+        """How many walked independently."""
+        return len(self.chains)
+
+    @property
+    def samples(self) -> Array:
+        """The draws of all ensembles, (k, d)."""
+        return self.chains.reshape(-1, len(self.names))
+
     def interval(self, level: float = 0.95) -> Mapping[str, tuple[float, float, float]]:
-        """Median and the bounds of the central `level` interval, by name: (low, median, high)."""
+        """Median and the bounds of the central `level` interval, by name: (low, median, high).
+
+        Empty where the walk has not converged: its spread is then no one's.
+        """
+        if not self.converged:
+            return MappingProxyType({})
         tails = np.array([0.5 - 0.5 * level, 0.5, 0.5 + 0.5 * level])
         bounds = np.quantile(self.samples, tails, axis=0)
         rows = {name: tuple(bounds[:, i].tolist()) for i, name in enumerate(self.names)}
@@ -52,52 +75,68 @@ def sample_posterior(
     rng: np.random.Generator,
     *,
     rig: Rig,
-    walkers: int = POSTERIOR_WALKERS,
-    steps: int = POSTERIOR_STEPS,
+    steps: int = MOST_WALK_STEPS,
     on_progress: Callable[[float], None] | None = None,
 ) -> Posterior:
-    """Posterior of a fit's parameters on the logs it was made from, under flat priors.
+    """Posterior of a fit's parameters, effects' too, on the logs that it was made from.
 
-    The walkers start around the fit. Where the fit leaves more than noise, a set's likelihood is
-    that of as many independent samples as the residual's correlation leaves.
+    By the likelihood by which the fit was settled, with its noise, under flat priors inside the
+    estimator's bounds. steps: of each walker at most; the walk ends when its ensembles agree.
     """
-    problem = pose(recorded_logs(logs, rig, fit.drive).plain, rig, fit.drive)
-    k1, k2 = 0.0, float(problem.row[K2])
-    if problem.drive == "command":
-        assert isinstance(fit.actuator, Actuator)
-        k1, k2 = fit.actuator.k1, fit.actuator.k2
-    row = kernel_parameters(fit.friction.array, k1, k2)
-    optimum = refine(problem.long_runs, row, problem.free)
-    runs = optimum.runs(problem.long_runs)
-    granted = None
-    if fit.adequate and problem.drive == "command":
-        runs = [reweighed(run, optimum.p) for run in runs]
-        optimum = refine(runs, optimum.p, problem.free)
-    else:
-        granted = granted_samples(problem, optimum)
-    center = pack(runs, optimum.p, optimum.starts, optimum.free)
-    spread = np.sqrt(np.diag(optimum.covariance)) if granted is None else 0.01 * optimum.scale
-    first = center + spread * rng.standard_normal((walkers, len(center)))
-    cost = log_cost(problem, runs, optimum, problem.box.wider(4.0), granted)
-    walk = ensemble(cost, first, steps, rng, on_progress)
-    names = tuple(fit.free)
-    samples = walk.samples[:, : len(names)]
+    found = likelihood_of(fit, logs, rig)
+    seeding, walking, between = rng.spawn(3)
+    seeds = _seeds(found, seeding)
+    walks = independent_ensembles(
+        found.cost, seeds, walking, judged=len(found.names), steps=steps, on_progress=on_progress
+    )
+    chains = np.moveaxis(walks.chains, 2, 1)[..., : len(found.names)]
+    chains = chains.reshape(len(seeds), -1, len(found.names))
     return Posterior(
-        names=names,
-        samples=samples,
-        autocorrelation=walk.autocorrelation,
-        acceptance=walk.acceptance,
-        walkers=walkers,
-        steps=steps,
-        converged=walk.converged,
-        verdict=_verdict(walk.converged, steps, walk.autocorrelation),
+        names=found.names,
+        chains=chains + found.aside * between.standard_normal(chains.shape),
+        r_hat=dict(zip(found.names, walks.r_hat.tolist(), strict=True)),
+        ess=dict(zip(found.names, walks.ess.tolist(), strict=True)),
+        way=found.way,
+        acceptance=walks.acceptance,
+        walkers=seeds.shape[1],
+        steps=walks.steps,
+        evaluations=walks.evaluations,
+        converged=walks.converged,
+        verdict=_verdict(found, walks),
     )
 
 
-def _verdict(converged: bool, steps: int, autocorrelation: float) -> str:
-    if not np.isfinite(autocorrelation):
-        return "not converged: the chain is too short to tell; take more steps"
-    length = f"{steps - steps // 2} kept steps are {(steps - steps // 2) / autocorrelation:.0f}"
-    if converged:
-        return f"converged: {length} autocorrelation times long"
-    return f"not converged: {length} autocorrelation times long, 50 needed; take more steps"
+def _seeds(found: Likelihood, rng: np.random.Generator) -> Array:
+    """Where the walkers begin, (ensembles, walkers, u), each where it can be."""
+    d = len(found.center)
+    count = ENSEMBLES * walkers_for(d)
+    values, vectors = np.linalg.eigh(0.5 * (found.covariance + found.covariance.T))
+    root = BEGUN_WIDER * vectors * np.sqrt(np.maximum(values, 0.0))
+    seeds = np.empty((0, d))
+    for _ in range(DRAWN_ROUNDS):
+        drawn = found.center + rng.standard_normal((2 * count, d)) @ root.T
+        seeds = np.concatenate([seeds, drawn[np.isfinite(found.cost(drawn))]])
+        if len(seeds) >= count:
+            break
+        root *= DRAWN_CLOSER
+    # Where hardly any can be they begin at the same few, apart by next to nothing.
+    seeds = np.concatenate([seeds, found.center[np.newaxis]])
+    picked = seeds[np.arange(count) % len(seeds)]
+    size = 1e-9 * np.maximum(np.abs(picked), np.std(seeds, axis=0))
+    picked = picked + size * rng.standard_normal(picked.shape)
+    return np.asarray(picked.reshape(ENSEMBLES, -1, d))
+
+
+def _verdict(found: Likelihood, walks: Walks) -> str:
+    """One line: whether the ensembles agree, by what figures, and what to do where not."""
+    worst, least = int(np.argmax(walks.r_hat)), int(np.argmin(walks.ess))
+    figures = (
+        f"R-hat at most {walks.r_hat[worst]:.3f} ({found.names[worst]}), at least"
+        f" {walks.ess[least]:.0f} independent draws ({found.names[least]})"
+    )
+    if walks.converged:
+        return f"converged: {figures}, of {len(walks.chains)} ensembles on {found.way}"
+    return (
+        f"not converged, so no interval: {figures}; R-hat up to {R_HAT_MOST} and {ESS_LEAST:.0f}"
+        " draws needed: log for longer, or fix what the logs do not tell"
+    )

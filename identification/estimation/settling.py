@@ -102,25 +102,25 @@ def _over_whole_runs(
     plant: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
 ) -> Spread | None:
     """By the likelihood of whole runs; None where these are not followed to the noise."""
-    problem = _posed(recorded)
+    problem = posed(recorded)
     problem = opened(problem) if problem.hold else problem
-    optimum = _nearest(problem, plant)
+    optimum = nearest(problem, plant)
     if optimum.cost > COMPLETE * problem.count:
         # A stop that turns on less than the noise makes minima beside the right one.
         other = searched_plant(
             recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
             halt=recorded.halt,
         )  # fmt: skip
-        optimum = min(optimum, _nearest(problem, other), key=lambda one: one.cost)
+        optimum = min(optimum, nearest(problem, other), key=lambda one: one.cost)
     if optimum.cost > ADEQUATE * problem.count:
         return None
     solution = weigh_noise(problem, optimum, rng, optimum.evaluations, report)
     return _of_solution(problem, solution)
 
 
-def _nearest(problem: Problem, plant: Plant) -> Optimum:
+def nearest(problem: Problem, plant: Plant) -> Optimum:
     """The minimum over whole runs that is nearest to a plant."""
-    row = _row(problem, plant)
+    row = kernel_row(problem, plant)
     # Its start first, or the first step goes astray.
     begun = refine(problem.long_runs, row, problem.free[:0])
     return refine(begun.runs(problem.long_runs), row, problem.free)
@@ -131,9 +131,9 @@ def _over_likely_sets(
 ) -> Spread:
     """By the mean over all sets that explain whole runs about as well."""
     # Begun in the measured state: a fitted one would take up what the model lacks.
-    problem = _posed(recorded)
+    problem = posed(recorded)
     box = problem.box.wider(2.0)
-    row = _row(problem, plant)
+    row = kernel_row(problem, plant)
     row[box.free] = box.moved_inside(row[np.newaxis, box.free])[0]
     optimum = refine(problem.long_runs, row, problem.free, cap=problem.cap)
     optimum = refine(optimum.runs(problem.long_runs), optimum.p, problem.free)
@@ -142,11 +142,11 @@ def _over_likely_sets(
     return _of_solution(problem, solution)
 
 
-def _posed(recorded: RecordedLogs) -> Problem:
+def posed(recorded: RecordedLogs) -> Problem:
     return pose(recorded.plain, recorded.rig, recorded.drive, recorded.halt)
 
 
-def _row(problem: Problem, plant: Plant) -> Array:
+def kernel_row(problem: Problem, plant: Plant) -> Array:
     """Kernel parameters (11,) of a plant."""
     k1, k2 = float(problem.row[K1]), float(problem.row[K2])
     if isinstance(plant.actuator, Actuator):

@@ -73,13 +73,14 @@ def in_si(found: ModelFile, library: Library) -> Model:
     except BadModel as error:
         said = str(error)
         raise BadModel(said if said.startswith("[") else f"[effects] {said}") from None
+    shapes = {f"{key}.{n}": e.unit for key, own in effects.items() for n, e in own.items()}
     in_units = replace(
         found,
         friction={n: in_unit(e, friction[n], f"[friction.{n}]") for n, e in found.friction.items()},
         actuator=drive
         and {n: in_unit(e, actuator[n], f"[actuator.{n}]") for n, e in drive.items()},
         effects=effects,
-        posterior=_posterior_in_si(found.posterior, {**friction, **actuator}),
+        posterior=_posterior_in_si(found.posterior, {**friction, **actuator, **shapes}),
     )
     refuse_changed_units(found, in_units)
     return Model(**fields_of(in_units), library=library, read=tuple(_read(found, in_units)))

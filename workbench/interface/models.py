@@ -89,19 +89,19 @@ class IdentifyResult(_OfModel):
         return (*self.found.remarks, *self.model.fit.remarks)
 
     def to_arviz(self) -> Any:
-        """The posterior as arviz.InferenceData, a chain a walker.
+        """The posterior as arviz.InferenceData, a chain an independent ensemble.
 
+        An effect's parameters are named as key.name. Attributes: units, verdict, converged.
         Raises BadModel where none was sampled, MissingLibrary without arviz.
         """
         walk = self.found.walk
         if walk is None:
             raise BadModel("no posterior was sampled; call identify(..., posterior=True)")
         arviz = _arviz()
-        kept = len(walk.samples) // walk.walkers
-        chains = walk.samples.reshape(kept, walk.walkers, -1)
-        posterior = {name: chains[:, :, k].T for k, name in enumerate(walk.names)}
+        posterior = {name: walk.chains[:, :, k] for k, name in enumerate(walk.names)}
         units = {name: self.found.fit.estimates[name].unit for name in walk.names}
-        return arviz.from_dict(posterior=posterior, attrs={"units": str(units)})
+        said = {"units": str(units), "verdict": walk.verdict, "converged": int(walk.converged)}
+        return arviz.from_dict(posterior=posterior, attrs=said)
 
     def report(self) -> str:
         from workbench.report.reports import identification_report

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.estimation.estimates import told_estimate
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from workbench.documents.model import Model
 from workbench.documents.plain import as_number
@@ -77,21 +77,33 @@ def _walk(
 
 
 def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
-    """What the walkers found, as model.json holds it."""
+    """What the ensembles found, as model.json holds it: no intervals unless they agree."""
+    units = {name: fit.estimates[name].unit for name in found.names}
+    told = {name: Estimate(None, unit, reason=found.verdict) for name, unit in units.items()}
     spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
-    told = {
-        name: told_estimate(
-            median, fit.estimates[name].unit, spread[name], interval=(low, high),
-            bounds=(-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf),
+    bounds = _bounds(fit)
+    for name, (low, median, high) in found.interval().items():
+        told[name] = told_estimate(
+            median, units[name], spread[name], interval=(low, high), bounds=bounds[name]
         )
-        for name, (low, median, high) in found.interval().items()
-    }  # fmt: skip
     return {
         "converged": found.converged,
         "verdict": found.verdict,
-        "autocorrelation": found.autocorrelation,
-        "acceptance": found.acceptance,
+        "likelihood": found.way,
+        "ensembles": found.ensembles,
         "walkers": found.walkers,
         "steps": found.steps,
+        "evaluations": found.evaluations,
+        "acceptance": found.acceptance,
+        "r_hat": dict(found.r_hat),
+        "ess": dict(found.ess),
         "parameters": {name: as_number(one) for name, one in told.items()},
     }
+
+
+def _bounds(fit: KarnoppFit) -> dict[str, tuple[float, float]]:
+    """Where each parameter can lie, by name (an effect's as key.name)."""
+    out = {name: (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf) for name in fit.estimates}
+    for acting in fit.effects:
+        out |= {f"{acting.key}.{p.name}": (p.low, p.high) for p in acting.effect.params}
+    return out

@@ -105,7 +105,7 @@ def weigh_misfit(
     The residual counts for as many independent samples as its correlation leaves of it, at least
     FEWEST; a set is then as likely as (mean square)^(-n/2).
     """
-    box = _trusted(problem)
+    box = trusted_box(problem)
     runs = optimum.runs(problem.long_runs)
     chi_square = optimum.cost / problem.count
     granted = granted_samples(problem, optimum)
@@ -125,7 +125,7 @@ def weigh_misfit(
     return Solution(optimum, members, chi_square, adequate, spent, problem.noise)
 
 
-def _trusted(problem: Problem) -> Box:
+def trusted_box(problem: Problem) -> Box:
     """The search's box cut to what the force equation, regressed alone, allows by a wide margin.
 
     A position that drifts for a whole log bounds the parameters poorly; the force does not.

@@ -36,14 +36,18 @@ def _card() -> Any:
     return load_card(card_path("paper_table1_rich"))
 
 
-def walk(steps: int = 30, walkers: int = 4) -> Posterior:
-    """A chain whose value says its parameter, walker and step: 1000 k + walker + step / 100."""
-    names = identified().fit.free
-    step, walker, k = np.meshgrid(
-        np.arange(steps), np.arange(walkers), np.arange(len(names)), indexing="ij"
+def walk(draws: int = 30) -> Posterior:
+    """Chains whose values say parameter, ensemble and draw: 1000 k + ensemble + draw / 100."""
+    names = tuple(identified().fit.free)
+    ensemble, draw, k = np.meshgrid(
+        np.arange(4), np.arange(draws), np.arange(len(names)), indexing="ij"
     )
-    samples = (1000.0 * k + walker + step / 100.0).reshape(-1, len(names))
-    return Posterior(tuple(names), samples, 1.0, 0.3, walkers, 2 * steps, True, "converged")
+    chains = 1000.0 * k + ensemble + draw / 100.0
+    told = dict.fromkeys(names, 1.0)
+    way = "the run over the whole of each log"
+    return Posterior(
+        names, chains, told, told, way, 0.3, 32, draws, 32 * draws, True, "converged"
+    )  # fmt: skip
 
 
 def test_the_plant_and_the_loop_in_python_control() -> None:
@@ -64,11 +68,12 @@ def test_the_plant_and_the_loop_in_python_control() -> None:
     assert model.to_control(period=0.02).dt == pytest.approx(0.02)
 
 
-def test_the_posterior_in_arviz_has_a_chain_for_each_walker() -> None:
+def test_the_posterior_in_arviz_has_a_chain_for_each_ensemble() -> None:
     found = result(walk()).to_arviz()
     names = identified().fit.free
     assert list(found.posterior.data_vars) == list(names)
     assert dict(found.posterior.sizes) == {"chain": 4, "draw": 30}
+    assert found.attrs["verdict"] == "converged"
     for k, name in enumerate(names):
         chains = found.posterior[name].to_numpy()
         expected = 1000.0 * k + np.arange(4)[:, None] + np.arange(30)[None, :] / 100.0

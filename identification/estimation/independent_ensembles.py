@@ -1,0 +1,174 @@
+"""Several ensembles of walkers that know nothing of each other, walked until they agree.
+
+Each is one of emcee's. Half of its moves are along the walkers' own differences, which cross the
+ridges of a rough likelihood; the others are drawn from a t-distribution about what the ensemble has
+seen so far: where the likelihood is about normal one of those forgets all that was before.
+"""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.estimation.convergence import bulk_ess, rank_r_hat
+
+ENSEMBLES = 4  # as many as Vehtari et al. (2021) ask for, so that one astray is seen
+R_HAT_MOST = 1.01  # their limits of chains that can be believed: of R-hat,
+ESS_LEAST = 400.0  # and of independent draws of each parameter
+WARM_STEPS = 100  # before the first steps that may be kept; each round then doubles the walk
+MOST_WALK_STEPS = 6400  # of each walker
+WALKERS_APIECE = 4  # walkers for each unknown, in whole blocks of the kernels' lanes (twice 16)
+WALKER_BLOCK = 32
+OWN_FREEDOM = 8.0  # degrees of freedom of the moves drawn about what has been seen
+OWN_WIDTH = 1.1  # times the spread seen: narrower tails than the likelihood's would hold walkers
+MOVE_SHARES = (0.4, 0.4, 0.2)  # of the own, the differential-evolution and the stretch moves
+Cost = Callable[[Array], Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Walks:
+    """Kept chains (ensembles, steps, walkers, d), and what they say of themselves.
+
+    r_hat, ess (j,): of the first j unknowns, those judged; steps: of each walker, kept or not.
+    """
+
+    chains: Array
+    r_hat: Array
+    ess: Array
+    acceptance: float
+    steps: int
+    evaluations: int
+
+    @property
+    def converged(self) -> bool:
+        """Whether the ensembles agree, and are worth enough independent draws."""
+        agree = np.max(self.r_hat) <= R_HAT_MOST
+        return bool(agree and np.min(self.ess) >= ESS_LEAST)
+
+
+def walkers_for(unknowns: int) -> int:
+    """Walkers of one ensemble."""
+    return WALKER_BLOCK * max(1, -(-WALKERS_APIECE * unknowns // WALKER_BLOCK))
+
+
+def independent_ensembles(
+    cost: Cost, seeds: Array, rng: np.random.Generator, *, judged: int,
+    steps: int = MOST_WALK_STEPS, on_progress: Callable[[float], None] | None = None,
+) -> Walks:  # fmt: skip
+    """Samples of exp(-cost / 2), walked in rounds that double until the ensembles agree.
+
+    cost: members (k, d) to costs (k,), infinite where a member cannot be; called from a thread for
+    each ensemble. seeds (ensembles, walkers, d): where they begin, of finite cost; judged: how many
+    of the unknowns, from the first on, have to agree; steps: of a walker at most. A round begins
+    with moves made to what the one before has seen, and only the last round is kept.
+    """
+    walks = [_Ensemble(cost, own, one) for own, one in zip(seeds, rng.spawn(len(seeds)),
+                                                           strict=True)]  # fmt: skip
+    done, now = 0, min(WARM_STEPS, steps)
+    with ThreadPoolExecutor(len(walks)) as pool:
+        while True:
+            shares = [0] * len(walks)
+
+            def report(which: int, made: int, counts: list[int] = shares, was: int = done) -> None:
+                counts[which] = made
+                if on_progress and which == 0:
+                    on_progress((was + min(counts)) / steps)
+
+            jobs = [pool.submit(one.round, now, report, i) for i, one in enumerate(walks)]
+            chains = np.array([job.result() for job in jobs])
+            done += now
+            found = _judged(chains, walks, judged, done)
+            if (done > WARM_STEPS and found.converged) or done >= steps:
+                break
+            now = min(done, steps - done)
+    if on_progress:
+        on_progress(1.0)
+    return found
+
+
+class _Ensemble:
+    """One ensemble of walkers, at the place to which its rounds have brought it."""
+
+    def __init__(self, cost: Cost, first: Array, rng: np.random.Generator) -> None:
+        import emcee
+
+        self.cost, self.accepted, self.moves = cost, 0.0, 0
+        self.evaluations = len(first)
+        self.state = emcee.State(
+            first, random_state=np.random.RandomState(int(rng.integers(2**32))).get_state()
+        )
+        self.seen: Array | None = None
+
+    def round(self, steps: int, report: Callable[[int, int], None], which: int) -> Array:
+        """The next steps, (steps, walkers, d)."""
+        import emcee
+
+        walkers, d = self.state.coords.shape
+        sampler = emcee.EnsembleSampler(
+            walkers, d, self._log_probability, vectorize=True, moves=self._moves(d)
+        )
+        chain = sampler.sample(self.state, iterations=steps, skip_initial_state_check=True)
+        with np.errstate(invalid="ignore"):  # a walker where none can be compares infinities
+            for made, state in enumerate(chain, start=1):
+                self.state = state
+                report(which, made)
+        self.seen = np.asarray(sampler.get_chain(), dtype=np.float64)
+        self.accepted += float(np.mean(sampler.acceptance_fraction)) * steps
+        self.moves += steps
+        return self.seen
+
+    def _log_probability(self, members: Array) -> Array:
+        values = -0.5 * self.cost(members)
+        self.evaluations += len(members)
+        return np.where(np.isfinite(values), values, -np.inf)
+
+    def _moves(self, d: int) -> Sequence[tuple[object, float]]:
+        import emcee
+
+        own, evolution, stretch = MOVE_SHARES
+        others = [(emcee.moves.DEMove(), evolution), (emcee.moves.StretchMove(), stretch)]
+        if self.seen is None:
+            return others
+        half = self.seen[len(self.seen) // 2 :].reshape(-1, d)
+        return [(emcee.moves.MHMove(_OwnDraw(half), ndim=d), own), *others]
+
+
+class _OwnDraw:
+    """Draws from a t-distribution about samples (k, d), whatever the walkers are."""
+
+    def __init__(self, samples: Array) -> None:
+        self.center = np.mean(samples, axis=0)
+        self.scale = np.maximum(np.std(samples, axis=0), 1e-300)
+        covariance = np.atleast_2d(np.cov(((samples - self.center) / self.scale).T))
+        values, vectors = np.linalg.eigh(covariance)
+        self.root = OWN_WIDTH * vectors * np.sqrt(np.maximum(values, 1e-12 * values[-1]))
+        self.inverse = np.linalg.inv(self.root)
+
+    def __call__(self, members: Array, random: np.random.RandomState) -> tuple[Array, Array]:
+        """New members (k, d), and the logarithm of how much likelier the way back is, (k,)."""
+        normal = random.standard_normal(members.shape)
+        drawn = normal * np.sqrt(OWN_FREEDOM / random.chisquare(OWN_FREEDOM, (len(members), 1)))
+        new = self.center + self.scale * (drawn @ self.root.T)
+        old = ((members - self.center) / self.scale) @ self.inverse.T
+        return new, self._log_density(old) - self._log_density(drawn)
+
+    def _log_density(self, at: Array) -> Array:
+        square = np.sum(at**2, axis=1) / OWN_FREEDOM
+        return np.asarray(-0.5 * (OWN_FREEDOM + at.shape[1]) * np.log1p(square))
+
+
+def _judged(chains: Array, walks: Sequence[_Ensemble], judged: int, steps: int) -> Walks:
+    """The chains (ensembles, steps, walkers, d) with what they say of themselves."""
+    e, n, w, _ = chains.shape
+    # An ensemble is one chain in order of time; its walkers are told apart for how much it is
+    # worth, since a draw says little of the next of the same walker.
+    r_hat = [rank_r_hat(chains[..., k].reshape(e, n * w)) for k in range(judged)]
+    apart = np.moveaxis(chains, 2, 1)
+    ess = [bulk_ess(apart[..., k].reshape(e * w, n)) for k in range(judged)]
+    return Walks(
+        chains, np.array(r_hat), np.array(ess),
+        float(np.mean([one.accepted / max(one.moves, 1) for one in walks])), steps,
+        sum(one.evaluations for one in walks),
+    )  # fmt: skip

@@ -1,0 +1,157 @@
+"""The likelihood by which a fit was settled, with its noise and bounds, for a walk around the fit.
+
+The same four ways as of the fit: white noise over whole runs, its level taken from what is left;
+where a plain run leaves more than noise, so many independent samples as its correlation grants;
+windows from measured states, whose uncertainty is integrated out, and with it the walk of a
+measured force; the rows of the force equation where the motion is imposed. Priors are flat.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.estimation.contradicted import corrected
+from identification.estimation.imposed_motion import force_fit
+from identification.estimation.likely_windows import LikelyWindows
+from identification.estimation.plain_search.likely_sets import (
+    granted_samples,
+    log_cost,
+    reweighed,
+    trusted_box,
+)
+from identification.estimation.plain_search.local_search import Optimum, pack, refine
+from identification.estimation.plain_search.problem import Problem
+from identification.estimation.plain_search.search import opened
+from identification.estimation.plain_search.search_bounds import Box
+from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
+from identification.estimation.settling import BETWEEN, kernel_row, nearest, posed
+from identification.estimation.windowed_run.parameters import values_of
+from identification.estimation.windowed_run.run_errors import misfit
+from identification.estimation.windowed_run.windows import walks
+from identification.log import Log, Rig
+from identification.model.estimates import KarnoppFit
+from identification.model.karnopp import NAMES
+from identification.model.plant import Plant
+from identification.thresholds import ADEQUATE, FOLLOWED, NEARLY_FOLLOWED
+
+LOOKED_FOR = 3  # rounds in which a fit's bad samples are looked for again, as in the fit
+ROOM = 4.0  # times the search's box, in which parameters of a whole run may lie
+WHOLE_RUNS = "the run over the whole of each log"
+LIKELY_SETS = "the run over the whole of each log, of which more than noise is left"
+IN_WINDOWS = "the run in windows from measured states"
+BY_FORCE = "the force equation"
+
+
+@dataclass(frozen=True, eq=False)
+class Likelihood:
+    """Minus twice a log likelihood, of the parameters `names` (d,) and then the runs' own starts.
+
+    center (u,), covariance (u, u): where it is largest, and how wide about there. cost: members
+    (k, u) to (k,), infinite outside the bounds. aside (d,): deviations of what the likelihood
+    cannot hold, the force between its samples. way: on what it is, in words.
+    """
+
+    names: tuple[str, ...]
+    center: Array
+    covariance: Array
+    cost: Callable[[Array], Array]
+    aside: Array
+    way: str
+
+
+def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
+    """The likelihood of a fit's parameters on the logs that it was made from.
+
+    Raises BadLog where the logs lack a signal, NotIdentifiable where nothing moves.
+    """
+    recorded = recorded_logs(logs, rig, fit.drive)
+    if fit.imposed:
+        return _by_force(recorded)
+    plant = Plant(fit.friction, fit.actuator, fit.effects)
+    left = misfit(plant, recorded.logs, recorded.drive)
+    for _ in range(LOOKED_FOR if fit.bad else 0):
+        recorded = corrected(plant, recorded, left).recorded
+        left = misfit(plant, recorded.logs, recorded.drive)
+    walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
+    if recorded.drive == "command" and not plant.effects and not walking:
+        if left <= FOLLOWED:
+            found = _over_whole_runs(plant, recorded)
+            if found is not None:
+                return found
+        elif left > NEARLY_FOLLOWED:
+            return _over_likely_sets(plant, recorded)
+    return _over_windows(fit, plant, recorded)
+
+
+def _over_whole_runs(plant: Plant, recorded: RecordedLogs) -> Likelihood | None:
+    """White noise of the level that the runs leave; None where they are not followed."""
+    problem = posed(recorded)
+    problem = opened(problem) if problem.hold else problem
+    optimum = nearest(problem, plant)
+    if optimum.cost > ADEQUATE * problem.count:
+        return None
+    runs = [reweighed(run, optimum.p) for run in optimum.runs(problem.long_runs)]
+    optimum = refine(runs, optimum.p, problem.free)
+    box = _around(problem.box.wider(ROOM), optimum)
+    return _of_runs(problem, optimum, box, None, WHOLE_RUNS)
+
+
+def _over_likely_sets(plant: Plant, recorded: RecordedLogs) -> Likelihood:
+    """So many independent samples of the misfit as its correlation leaves."""
+    problem = posed(recorded)
+    box = trusted_box(problem)
+    row = kernel_row(problem, plant)
+    row[box.free] = box.moved_inside(row[np.newaxis, box.free])[0]
+    optimum = refine(problem.long_runs, row, problem.free)
+    granted = granted_samples(problem, optimum)
+    # A misfit's curvature counts each sample; walkers spread from there to what is granted.
+    wider = replace(optimum, covariance=optimum.covariance * optimum.cost / granted)
+    return _of_runs(problem, wider, _around(box, optimum), granted, LIKELY_SETS)
+
+
+def _around(box: Box, optimum: Optimum) -> Box:
+    """The box with the optimum in it, which a refinement may have led out of it."""
+    size = np.abs(optimum.p[box.free])
+    return replace(box, low=np.minimum(box.low, 0.5 * size), high=np.maximum(box.high, 2.0 * size))
+
+
+def _of_runs(
+    problem: Problem, optimum: Optimum, box: Box, granted: float | None, way: str
+) -> Likelihood:
+    runs = problem.long_runs
+    if granted is None:
+        runs = tuple(reweighed(run, optimum.p) for run in optimum.runs(problem.long_runs))
+    names = tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free)
+    return Likelihood(
+        names, pack(runs, optimum.p, optimum.starts, optimum.free), optimum.covariance,
+        log_cost(problem, runs, optimum, box, granted), np.zeros(len(names)), way,
+    )  # fmt: skip
+
+
+def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:
+    """Windows of any plant; the fit's own parameters, of which some may be held."""
+    covariance = np.atleast_2d(fit.covariance)
+    windows = LikelyWindows.of(plant, recorded.logs, recorded.drive, fit.free, covariance)
+    by_force = 1.0 if recorded.drive == "force" else max(one.gain for one in recorded.logs) ** 2
+    center = values_of(plant, fit.free)
+    # What the windows are stretched to has that in it already.
+    by_force = by_force if windows.stretch is None else 0.0
+    aside = by_force * np.array([BETWEEN.get(name, 0.0) for name in fit.free]) * np.abs(center)
+    return Likelihood(fit.free, center, covariance, windows.cost, aside, IN_WINDOWS)
+
+
+def _by_force(recorded: RecordedLogs) -> Likelihood:
+    """The rows of the force equation: linear in its parameters, so it is normal but for signs."""
+    found, _ = force_fit(recorded)
+    information = np.linalg.pinv(found.covariance, hermitian=True)
+
+    def cost(members: Array) -> Array:
+        off = members - found.theta
+        square = np.einsum("ki,ij,kj->k", off, information, off)
+        return np.where(np.all(members >= 0.0, axis=1), square, np.inf)
+
+    names = tuple(NAMES[i] for i in found.used)
+    center = np.maximum(found.theta, 0.0)
+    return Likelihood(names, center, found.covariance, cost, np.zeros(len(names)), BY_FORCE)

@@ -1,0 +1,224 @@
+"""Likelihood of any plant by its run in windows, with what the windows are unsure of taken out.
+
+A window begins in a measured state of normal, known uncertainty, with which the run changes about
+linearly: so the states are integrated out, r'(I + B B')^-1 r for residuals r and their changes B.
+
+A measured force drives a run with its noise, which turns on stops and walks: no density of all
+samples at once is to be had then. What is left is a likelihood of each by itself, with the weights
+of the estimator. Such a one is sure beyond measure; here it is stretched about its maximum so that
+there it is as wide as draws of the noise move the estimator (Ribatet, Cooley, Davison, Statistica
+Sinica 22 (2012) 813, eq. 2.10): the shape is the likelihood's, the width that of the errors.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, IntArray
+from identification.compiled import compiled_fast
+from identification.errors import BadModel
+from identification.estimation.gauss_newton import smooth_jacobian
+from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.windowed_run.parameters import (
+    on_bristle,
+    plant_is_motor,
+    plant_with,
+    units_in,
+    values_of,
+)
+from identification.estimation.windowed_run.refinement import MOTOR_WINDOW
+from identification.estimation.windowed_run.run_errors import (
+    NOISE_LOSS,
+    ROBUST_FROM,
+)
+from identification.estimation.windowed_run.windows import (
+    RUN_WINDOW,
+    WHOLE,
+    Freed,
+    freed,
+    starts,
+    walks,
+    window_errors,
+    window_run,
+)
+from identification.model.estimates import Drive
+from identification.model.plant import Plant
+from identification.thresholds import ADEQUATE
+
+# Of the robust square, for normal noise: the mean curvature of its half, and how much narrower than
+# the errors of its minimum it is itself (curvature over mean square slope), which is made up for.
+CURVATURE, AS_NOISE = 0.7761, 1.2523
+TOGETHER = 8  # factors of which one logarithm is taken
+REACH = 5.0  # times its value, and the largest force of friction, how far a parameter may lie
+LEAST_OF = 0.2  # of its value, that a mass, a band or an actuator's gain has at least
+SCALES = ("m", "dv_p", "dv_n", "k1", "k2")
+
+
+@dataclass(frozen=True, eq=False)
+class LikelyWindows:
+    """Logs in windows, as a likelihood of parameters `names` (d,) of a plant like this one.
+
+    found: by log, what its windows are unsure of; low, high (d,): bounds; center (d,): the plant's
+    own values; stretch (d, d): of what is off them, in cost; factor: of the robust square sum;
+    granted: independent samples for which a residual that is no noise counts, 0 where it is noise.
+    """
+
+    plant: Plant
+    drive: Drive
+    names: tuple[str, ...]
+    logs: tuple[MotionLog, ...]
+    found: tuple[Freed, ...]
+    low: Array
+    high: Array
+    stretch: Array | None = None
+    factor: float = 1.0
+    granted: float = 0.0
+
+    @classmethod
+    def of(
+        cls, plant: Plant, logs: Sequence[MotionLog], drive: Drive, names: Sequence[str],
+        covariance: Array,
+    ) -> "LikelyWindows":  # fmt: skip
+        """The logs in the windows in which a refinement of the plant ends.
+
+        Where these are the whole log but the run loses a stop in it, they are shorter. covariance
+        (d, d): of the fit's errors. Raises BadModel where the plant cannot be followed.
+        """
+        walking = any(walks(one, drive) for one in logs)
+        steady = drive == "command" and not walking and not on_bristle(plant)
+        longest = MOTOR_WINDOW if plant_is_motor(plant) else WHOLE
+        low, high = _bounds(plant, names)
+        tried = []
+        for seconds in (longest, RUN_WINDOW) if steady else (RUN_WINDOW,):
+            found = [freed(plant, one, drive, starts(one, drive, seconds)) for one in logs]
+            own = tuple(one for one in found if one is not None)
+            if len(own) < len(logs):
+                continue
+            posed = cls(plant, drive, tuple(names), tuple(logs), own, low, high)
+            if walking:
+                return replace(posed, stretch=posed.stretched(covariance))
+            left = posed.square(plant) / posed.count / NOISE_LOSS
+            if left <= ADEQUATE:
+                return replace(posed, factor=AS_NOISE / left)
+            # What the model lacks walks for as long as a window.
+            windows = float(sum(len(one.begun.at) for one in own))
+            tried.append((left, replace(posed, granted=windows)))
+        if not tried:
+            raise BadModel(f"{logs[0].log.name}: the fitted plant's run cannot be followed")
+        return min(tried, key=lambda one: one[0])[1]
+
+    @property
+    def count(self) -> int:
+        """Number of compared values."""
+        return sum(one.weight.size for one in self.found)
+
+    @property
+    def center(self) -> Array:
+        """The plant's own values (d,)."""
+        return values_of(self.plant, self.names)
+
+    def cost(self, members: Array) -> Array:
+        """Minus twice the log likelihood of members (k, d), (k,); infinite outside the bounds."""
+        inside = np.all((members >= self.low) & (members <= self.high), axis=1)
+        at = members
+        if self.stretch is not None:
+            at = self.center + (members - self.center) @ self.stretch.T
+            inside &= np.all((at >= self.low) & (at <= self.high), axis=1)
+        out = np.full(len(members), np.inf)
+        for i in np.flatnonzero(inside):
+            out[i] = self.square(plant_with(self.plant, self.names, at[i]))
+        return self.granted * np.log(out / self.count) if self.granted else self.factor * out
+
+    def square(self, plant: Plant) -> float:
+        """Robust square sum of what a plant leaves, infinite where it cannot be followed."""
+        total = 0.0
+        for one, own in zip(self.logs, self.found, strict=True):
+            run = window_run(plant, one, self.drive, own.begun)
+            if run is None:
+                return np.inf
+            r = window_errors(run, one, self.drive)
+            total += likely_square(own.begun.at, own.B, own.inverse, own.weight * r, ROBUST_FROM)
+        return total if np.isfinite(total) else np.inf
+
+    def stretched(self, covariance: Array) -> Array:
+        """Matrix (d, d) by which what is off the center is stretched, so that the cost there
+        curves as the inverse of the covariance (d, d)."""
+        unit = np.maximum(np.sqrt(np.diag(covariance)), 1e-300)
+        size = units_in(self.plant, self.names, self.center)
+
+        def errors(x: Array) -> Array:
+            tried = plant_with(self.plant, self.names, x * size)
+            return np.concatenate([
+                self._left(tried, one, own) for one, own in zip(self.logs, self.found, strict=True)
+            ])  # fmt: skip
+
+        J = smooth_jacobian(errors, self.center / size) * (unit / size)
+        curvature = _root(CURVATURE * J.T @ J)
+        wanted = _root(np.linalg.inv(covariance / np.outer(unit, unit)))
+        return np.asarray((np.linalg.inv(curvature) @ wanted) * unit[:, np.newaxis] / unit)
+
+    def _left(self, plant: Plant, one: MotionLog, own: Freed) -> Array:
+        run = window_run(plant, one, self.drive, own.begun)
+        if run is None:
+            return np.zeros(own.weight.size)
+        return own(window_errors(run, one, self.drive)).ravel()
+
+
+def _root(square: Array) -> Array:
+    """Symmetric root (d, d) of a matrix, of which nothing counts as less than a 1e-12 of most."""
+    values, vectors = np.linalg.eigh(0.5 * (square + square.T))
+    values = np.maximum(values, 1e-12 * float(values[-1]))
+    return np.asarray((vectors * np.sqrt(values)) @ vectors.T)
+
+
+def _bounds(plant: Plant, names: Sequence[str]) -> tuple[Array, Array]:
+    """Where the parameters may lie, low and high (d,): a refinement's reach of the nine and the
+    actuator's, and an effect's own bounds, as the search for its shape has them."""
+    values = values_of(plant, names)
+    p = plant.friction
+    force = max(p.F_cp, p.F_cn, p.F_sp, -p.F_sn)
+    low, high = np.empty(len(names)), np.empty(len(names))
+    ends = [values_of(plant_with(plant, names, side * np.full(len(names), 1e300)), names)
+            for side in (-1.0, 1.0)]  # fmt: skip
+    for i, name in enumerate(names):
+        low[i], high[i] = ends[0][i], ends[1][i]
+        if "." in name:
+            continue
+        size, sign = abs(values[i]), -1.0 if values[i] < 0 else 1.0
+        most = REACH * size + (0.0 if name in SCALES else REACH * force)
+        least = LEAST_OF * size if name in SCALES else 0.0
+        near, far = sorted((sign * least, sign * most))
+        low[i], high[i] = max(near, low[i]), min(far, high[i])
+    return low, high
+
+
+@compiled_fast
+def likely_square(at: IntArray, B: Array, inverse: Array, r: Array, far: float) -> float:
+    """Robust square sum of weighted errors r (k, n) less what is likeliest of the states in which
+    the windows, from samples `at` on, begin, and the square of these; `r` is left as it is.
+
+    B (3, k, n), inverse (windows, 3, 3): as in `windows.Freed`.
+    """
+    rows, n = r.shape
+    total = 0.0
+    for w in range(len(at)):
+        low, high = at[w], at[w + 1] if w + 1 < len(at) else n
+        a, b, c = 0.0, 0.0, 0.0
+        for i in range(rows):
+            for k in range(low, high):
+                a += B[0, i, k] * r[i, k]
+                b += B[1, i, k] * r[i, k]
+                c += B[2, i, k] * r[i, k]
+        x = inverse[w, 0, 0] * a + inverse[w, 0, 1] * b + inverse[w, 0, 2] * c
+        y = inverse[w, 1, 0] * a + inverse[w, 1, 1] * b + inverse[w, 1, 2] * c
+        z = inverse[w, 2, 0] * a + inverse[w, 2, 1] * b + inverse[w, 2, 2] * c
+        total += x * x + y * y + z * z
+        for i in range(rows):
+            for first in range(low, high, TOGETHER):
+                product = 1.0
+                for k in range(first, min(first + TOGETHER, high)):
+                    left = r[i, k] - x * B[0, i, k] - y * B[1, i, k] - z * B[2, i, k]
+                    product *= 1.0 + left * left / (far * far)
+                total += np.log(product) * far * far
+    return total
