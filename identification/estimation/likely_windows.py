@@ -5,9 +5,10 @@ linearly: so the states are integrated out, r'(I + B B')^-1 r for residuals r an
 
 A measured force drives a run with its noise, which turns on stops and walks: no density of all
 samples at once is to be had then. What is left is a likelihood of each by itself, with the weights
-of the estimator. Such a one is sure beyond measure; here it is stretched about its maximum so that
-there it is as wide as draws of the noise move the estimator (Ribatet, Cooley, Davison, Statistica
-Sinica 22 (2012) 813, eq. 2.10): the shape is the likelihood's, the width that of the errors.
+of the estimator. Such a one is sure beyond measure; here it counts for less and is stretched about
+its maximum, so that there it is as wide as draws of the noise move the estimator (Ribatet, Cooley,
+Davison, Statistica Sinica 22 (2012) 813, eqs. 2.8 and 2.10): the shape is the likelihood's, the
+width that of the errors.
 """
 
 from collections.abc import Sequence
@@ -97,7 +98,8 @@ class LikelyWindows:
                 continue
             posed = cls(plant, drive, tuple(names), tuple(logs), own, low, high)
             if walking:
-                return replace(posed, stretch=posed.stretched(covariance))
+                factor, stretch = posed.stretched(covariance)
+                return replace(posed, factor=factor, stretch=stretch)
             left = posed.square(plant) / posed.count / NOISE_LOSS
             if left <= ADEQUATE:
                 return replace(posed, factor=AS_NOISE / left)
@@ -141,9 +143,13 @@ class LikelyWindows:
             total += likely_square(own.begun.at, own.B, own.inverse, own.weight * r, ROBUST_FROM)
         return total if np.isfinite(total) else np.inf
 
-    def stretched(self, covariance: Array) -> Array:
-        """Matrix (d, d) by which what is off the center is stretched, so that the cost there
-        curves as the inverse of the covariance (d, d)."""
+    def stretched(self, covariance: Array) -> tuple[float, Array]:
+        """Factor of the cost, and matrix (d, d) by which what is off the center is stretched, so
+        that the cost there curves as the inverse of the covariance (d, d).
+
+        The factor makes it as wide on the whole, the matrix in each direction: a cost that is only
+        stretched keeps its steps where stops come and go, in which walkers are caught.
+        """
         unit = np.maximum(np.sqrt(np.diag(covariance)), 1e-300)
         size = units_in(self.plant, self.names, self.center)
 
@@ -154,9 +160,12 @@ class LikelyWindows:
             ])  # fmt: skip
 
         J = smooth_jacobian(errors, self.center / size) * (unit / size)
-        curvature = _root(CURVATURE * J.T @ J)
-        wanted = _root(np.linalg.inv(covariance / np.outer(unit, unit)))
-        return np.asarray((np.linalg.inv(curvature) @ wanted) * unit[:, np.newaxis] / unit)
+        curvature = CURVATURE * J.T @ J
+        wanted = np.linalg.inv(covariance / np.outer(unit, unit))
+        larger = np.linalg.slogdet(wanted)[1] - np.linalg.slogdet(curvature)[1]
+        factor = float(min(np.exp(larger / len(unit)), 1.0))
+        stretch = np.linalg.inv(_root(factor * curvature)) @ _root(wanted)
+        return factor, np.asarray(stretch * unit[:, np.newaxis] / unit)
 
     def _left(self, plant: Plant, one: MotionLog, own: Freed) -> Array:
         run = window_run(plant, one, self.drive, own.begun)
