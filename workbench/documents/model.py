@@ -140,6 +140,20 @@ class ParameterCorrelation:
 
 
 @dataclass(frozen=True)
+class Told:
+    """Whether the logs can tell a parameter, why (not), and what run to add where they cannot.
+
+    within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
+    """
+
+    name: str
+    can: bool
+    why: str
+    add: str = ""
+    within: float | None = None
+
+
+@dataclass(frozen=True)
 class ModelFile:
     """A model as model.json has it, in the units that are written there; see `Model`."""
 
@@ -158,6 +172,7 @@ class ModelFile:
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
     controller: PresentFile | None = None
+    identifiability: tuple[Told, ...] = ()
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -185,8 +200,9 @@ class Model(ModelFile):
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
     posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
     the logs lie from the model, each alone; bad_samples: what was set aside of them; controller:
-    the one that the machine has now. library: where the effects' equations are. read: what to say
-    of its file, a line for each value in another unit than ours.
+    the one that the machine has now; identifiability: what the logs could tell before a fit, empty
+    where not asked. library: where the effects' equations are. read: what to say of its file, a
+    line for each value in another unit than ours.
     """
 
     library: Library = field(default_factory=built_in, compare=False, repr=False)

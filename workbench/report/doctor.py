@@ -10,6 +10,7 @@ import numpy as np
 from identification.model.karnopp import NAMES
 from workbench.cards.readable import number
 from workbench.cards.units import si_unit
+from workbench.documents.model import Told
 from workbench.report.figures import (
     BAND,
     MEASURED,
@@ -23,7 +24,7 @@ from workbench.report.figures import (
     style,
 )
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
-from workbench.steps.told_by_log import Told, Way
+from workbench.steps.told_by_log import Way
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -114,6 +114,9 @@ def fit_lines(model: Model) -> list[str]:
     if model.fit.force_relative is not None:
         share = 100 * model.fit.force_relative
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
+    runs = runs_to_add(model)
+    if runs:
+        lines.append(f"to tell the rest: {'; '.join(runs)}")
     if model.posterior is not None:
         lines.append(f"posterior: {model.posterior['verdict']}")
     if model.plant is None:
@@ -126,6 +129,18 @@ def fit_lines(model: Model) -> list[str]:
             f" {length(p.one_step_rms, model.rotary)} rms on held-out samples"
         )
     return lines
+
+
+def runs_to_add(model: Model) -> tuple[str, ...]:
+    """Runs that would tell what neither the logs could, by the look before the fit, nor the fit."""
+    found = {**model.friction, **(model.actuator or {})}
+    return tuple(
+        dict.fromkeys(
+            one.add.removeprefix("add ")
+            for one in model.identifiability
+            if one.add and one.name in found and not found[one.name].known
+        )
+    )
 
 
 def held(model: Model) -> str:

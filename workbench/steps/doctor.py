@@ -5,29 +5,17 @@ whether a parameter can be told is asked of the same thresholds, with the events
 motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from identification.arrays import Array
-from identification.effects._library import built_in
-from identification.errors import BadLog, NotIdentifiable
-from identification.estimation.recorded_logs import (
-    RecordedLogs,
-    commanded,
-    led_by_rig,
-    left_by_actuator,
-    recorded_logs,
-)
-from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
-from identification.estimation.regression.three_step import first_estimate
-from identification.experiment.identifiability import tellable_effects
+from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
-from identification.model.plant import units_of
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_time
 from identification.signals.clean import (
@@ -37,18 +25,17 @@ from identification.signals.clean import (
     prepare,
     repair,
 )
-from identification.signals.differentiate import Motion, differentiate, low_pass, resolution
+from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
-from identification.signals.sampling import samples
 from identification.signals.thin import thinned
-from identification.thresholds import LINEAR_ACTUATOR
-from identification.tracing.constant_force import constant_force, constant_remark
 from workbench.cards.card import Card
 from workbench.cards.units import conversion
+from workbench.documents.model import Told
 from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import read_signals, with_force
-from workbench.steps.told_by_log import Told, Ways, told_by, ways_of
+from workbench.steps.runs_tell import RunsTell, runs_tell
+from workbench.steps.told_by_log import Ways
 
 DOCTOR_SCHEMA = "doctor/1"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
@@ -192,9 +179,9 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     found = looked(path, card)
     log, runs = found.log, found.runs
     seen = (
-        _moved(runs, found.rig, effects)
+        runs_tell(runs, found.rig, effects=effects)
         if runs and not found.refused
-        else _Moved(reason=found.refused)
+        else RunsTell(reason=found.refused)
     )
     remarks = list(found.remarks)
     if log is not None and not found.refused:
@@ -225,54 +212,6 @@ def _command_unit(card: Card) -> str:
     if spec is None:
         return ""
     return next((unit for unit in ("V", "A") if conversion(spec.unit, unit)), "")
-
-
-@dataclass(frozen=True, eq=False)
-class _Moved:
-    """What the motion of the runs tells, or why nothing."""
-
-    motion: Motion | None = None
-    ways: Ways | None = None
-    told: tuple[Told, ...] = ()
-    reason: str = ""
-    remarks: tuple[str, ...] = ()
-    effects: Mapping[str, float] | None = None
-
-
-def _moved(runs: Sequence[Log], rig: Rig, effects: bool) -> _Moved:
-    """Motion, directions and what they tell of each parameter."""
-    log = max(runs, key=len)
-    motion = differentiate(log["y"], log.h)
-    try:
-        if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
-            runs = [run.with_signals(F=run["u"]) for run in runs]
-            rig = replace(rig, force_per_command=1.0)
-        recorded = recorded_logs(runs, rig)
-        m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
-    except (BadLog, NotIdentifiable) as error:
-        return _Moved(motion, reason=str(error))
-    events = [breakaways(one, m) for one in recorded.logs]
-    rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
-    ways = ways_of(recorded.logs, events, rests)
-    follows = _actuator_follows(recorded)
-    try:
-        told = told_by(recorded, ways, imposed=led_by_rig(recorded), actuator=follows)
-    except NotIdentifiable as error:
-        return _Moved(motion, ways, reason=str(error))
-    always = constant_force(recorded.plain, held=recorded.held)
-    unit = units_of(rig.motion)["F_cp"]
-    said = () if always is None else (constant_remark(always, unit),)
-    shown = None
-    if effects and not led_by_rig(recorded):
-        shown = tellable_effects(recorded, built_in())
-    return _Moved(motion, ways, told, remarks=said, effects=shown)
-
-
-def _actuator_follows(recorded: RecordedLogs) -> bool | None:
-    """Whether the force follows the command as a linear actuator's; None without a command."""
-    if recorded.held or not commanded(recorded.plain):
-        return None
-    return left_by_actuator(recorded.plain) <= LINEAR_ACTUATOR
 
 
 def _as_far_as_it_goes(raw: Log, path: Path, card: Card) -> tuple[Log, ...]:

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import NORMAL_95, told_estimate
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from workbench.documents.model import Model
@@ -14,11 +14,14 @@ from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
 from workbench.steps.present import present_of_card
+from workbench.steps.runs_tell import runs_tell
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
 
 __all__ = ["Identified", "Options", "identify_sources"]
+
+BROKEN = 2.0  # times what a log promised before the fit, above which an interval is told to be so
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ def identify_sources(
 
     Raises NotIdentifiable where the logs tell nothing, BadLog where a signal is missing.
     """
+    options = options or Options()
+    gate = runs_tell([source.log for source in sources.runs], sources.rig, options.drive)
     model, fit = identify(
         sources.runs,
         np.random.default_rng(seed),
@@ -54,11 +59,32 @@ def identify_sources(
         on_progress=on_progress,
     )
     now = present_of_card(sources.card, sources.rig, model.period)
-    model = replace(model, bad_samples=(*sources.bad, *fit.bad), controller=now)
+    bad = (*sources.bad, *fit.bad)
+    model = replace(model, bad_samples=bad, controller=now, identifiability=gate.told)
     walk = _walk(sources, fit, seed, on_progress) if posterior else None
     if walk is not None:
         model = replace(model, posterior=_posterior(walk, fit))
-    return Identified(model, fit, sources.runs, (*sources.remarks, *model_remarks(model)), walk)
+    remarks = (*sources.remarks, *model_remarks(model), *broken_promises(model))
+    return Identified(model, fit, sources.runs, remarks, walk)
+
+
+def broken_promises(model: Model) -> tuple[str, ...]:
+    """A line where intervals are far wider than the logs promised before the fit."""
+    wider = []
+    for one in model.identifiability:
+        found = {**model.friction, **(model.actuator or {})}.get(one.name)
+        if not found or one.within is None or not found.value or found.sd is None:
+            continue
+        half = NORMAL_95 * found.sd / abs(found.value)
+        if half > BROKEN * one.within:
+            wider.append(f"{one.name} {half:.1%} ({one.within:.1%})")
+    if not wider:
+        return ()
+    why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
+    return (
+        f"known within {', '.join(wider)}; in brackets what the logs promised before the fit:"
+        f" {why}, or their noise is no sensor's",
+    )
 
 
 def _walk(

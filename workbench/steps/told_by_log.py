@@ -15,6 +15,7 @@ from identification.estimation.regression.weighted_rows import solve_rows, stack
 from identification.experiment.identifiability import Tellable, identifiability
 from identification.model.karnopp import NAMES
 from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
+from workbench.documents.model import Told
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
 # Starts and stops with which a fit surely has EVENTS_NEEDED (benchmarks/gate.py, seeds below 1500)
@@ -52,20 +53,6 @@ class Ways:
     rests: int
     rested: float
     events: Events
-
-
-@dataclass(frozen=True)
-class Told:
-    """Whether a parameter can be told, why (not), and what to add where it cannot.
-
-    within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
-    """
-
-    name: str
-    can: bool
-    why: str
-    add: str = ""
-    within: float | None = None
 
 
 def ways_of(

@@ -1,0 +1,83 @@
+"""The gate before a fit: what runs can tell of each parameter."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from identification.effects._library import built_in
+from identification.errors import BadLog, NotIdentifiable
+from identification.estimation.recorded_logs import (
+    RecordedLogs,
+    commanded,
+    led_by_rig,
+    left_by_actuator,
+    recorded_logs,
+)
+from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
+from identification.estimation.regression.three_step import first_estimate
+from identification.experiment.identifiability import tellable_effects
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.model.plant import units_of
+from identification.signals.differentiate import Motion, differentiate
+from identification.signals.sampling import samples
+from identification.thresholds import LINEAR_ACTUATOR
+from identification.tracing.constant_force import constant_force, constant_remark
+from workbench.documents.model import Told
+from workbench.steps.told_by_log import Ways, told_by, ways_of
+
+
+@dataclass(frozen=True, eq=False)
+class RunsTell:
+    """What the motion of the runs tells, or the reason why nothing.
+
+    motion: of the longest run; effects: by how many deviations of the noise each effect would show
+    at a size that matters, None where that was not asked.
+    """
+
+    motion: Motion | None = None
+    ways: Ways | None = None
+    told: tuple[Told, ...] = ()
+    reason: str = ""
+    remarks: tuple[str, ...] = ()
+    effects: Mapping[str, float] | None = None
+
+
+def runs_tell(
+    runs: Sequence[Log], rig: Rig, drive: Drive | None = None, *, effects: bool = False
+) -> RunsTell:
+    """Motion, directions and what they tell of each parameter, of at least one run, before any fit.
+
+    drive: what the fit is asked to be driven by; effects: also which effects the runs could show.
+    """
+    log = max(runs, key=len)
+    motion = differentiate(log["y"], log.h)
+    try:
+        if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
+            runs = [run.with_signals(F=run["u"]) for run in runs]
+            rig = replace(rig, force_per_command=1.0)
+        recorded = recorded_logs(runs, rig, drive)
+        m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
+    except (BadLog, NotIdentifiable) as error:
+        return RunsTell(motion, reason=str(error))
+    events = [breakaways(one, m) for one in recorded.logs]
+    rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
+    ways = ways_of(recorded.logs, events, rests)
+    try:
+        told = told_by(
+            recorded, ways, imposed=led_by_rig(recorded), actuator=_actuator_follows(recorded)
+        )
+    except NotIdentifiable as error:
+        return RunsTell(motion, ways, reason=str(error))
+    always = constant_force(recorded.plain, held=recorded.held)
+    said = () if always is None else (constant_remark(always, units_of(rig.motion)["F_cp"]),)
+    shown = None
+    if effects and not led_by_rig(recorded):
+        shown = tellable_effects(recorded, built_in())
+    return RunsTell(motion, ways, told, remarks=said, effects=shown)
+
+
+def _actuator_follows(recorded: RecordedLogs) -> bool | None:
+    """Whether the force follows the command as a linear actuator's; None without a command."""
+    if recorded.held or not commanded(recorded.plain):
+        return None
+    return left_by_actuator(recorded.plain) <= LINEAR_ACTUATOR
