@@ -18,43 +18,17 @@ from benchmarks.blind_machines import random_machine, simulated
 from benchmarks.experiment import poor_log
 from identification.errors import UserError
 from identification.estimation.fit import fit_plant
-from identification.estimation.recorded_logs import (
-    RecordedLogs,
-    commanded,
-    left_by_actuator,
-    recorded_logs,
-)
-from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
-from identification.estimation.regression.three_step import first_estimate
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
-from identification.signals.sampling import samples
-from identification.thresholds import LINEAR_ACTUATOR
-from workbench.steps.told_by_log import Told, told_by, ways_of
+from workbench.steps.runs_tell import runs_tell
 
 RICH = 15.0  # s
 TWICE = 2.0
 
 
-def gate(log: Log, rig: Rig) -> tuple[Told, ...]:
-    """What `doctor` says of a log."""
-    recorded = recorded_logs([log], rig)
-    mass = float(first_estimate(log, held=recorded.held).nine[0])
-    events = [breakaways(one, mass) for one in recorded.logs]
-    rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
-    ways = ways_of(recorded.logs, events, rests)
-    return told_by(recorded, ways, imposed=False, actuator=_follows(recorded))
-
-
-def _follows(recorded: RecordedLogs) -> bool | None:
-    if recorded.held or not commanded(recorded.plain):
-        return None
-    return left_by_actuator(recorded.plain) <= LINEAR_ACTUATOR
-
-
 def judged(log: Log, rig: Rig, seed: int, count: Counter[str]) -> str:
     """Counts of one log's parameters; the wrong ones in words."""
-    said = gate(log, rig)
+    said = runs_tell([log], rig).told
     fit = fit_plant([log], np.random.default_rng(seed), rig=rig)
     wrong = []
     for one in said:

@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from workbench.threads import one_thread_by_default
+
 ROOT = Path(__file__).resolve().parent.parent
 LONG_FIRST = (  # files and folders whose tests take longest, so that no worker ends alone with one
     "end_to_end/test_scenario.py",
@@ -23,6 +25,8 @@ LONG_FIRST = (  # files and folders whose tests take longest, so that no worker 
     "design/test_effect_loop.py",
     "contract",
 )
+
+one_thread_by_default(os.environ)  # of every library that a test loads from here on
 
 settings.register_profile("desk", deadline=None)
 settings.register_profile("ci", deadline=None, derandomize=True, print_blob=True)

@@ -25,6 +25,7 @@ from workbench.ending import (
     step,
     write_status,
 )
+from workbench.threads import one_thread_by_default
 
 COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
@@ -168,6 +169,7 @@ def verdict(error: BaseException) -> tuple[int, str]:
 def main(argv: Sequence[str] | None = None) -> int:
     """Exit status of the command line `argv`, by default the arguments of this process."""
     arguments = tuple(sys.argv[1:] if argv is None else argv)
+    one_thread_by_default(os.environ)
     try:
         with _cleared_on_a_signal(), warnings.catch_warnings():
             if not _debug(arguments):  # "error" filters, as in the tests, still act

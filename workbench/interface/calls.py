@@ -19,8 +19,8 @@ import math
 import os
 import sys
 import time
-from collections.abc import Iterable, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -66,6 +66,7 @@ from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.stages import IDENTIFY_STAGES, TRACE_STAGES
 from workbench.steps.trace import named_logs, trace_sources
 from workbench.steps.validate import validate as validate_design
+from workbench.threads import one_thread
 
 if TYPE_CHECKING:
     from typing import Literal
@@ -305,9 +306,11 @@ def load_model(path: PathLike, effects: Iterable[PathLike] = ()) -> Model:
     return read_model(Path(path), library([Path(one) for one in effects]))
 
 
-def _bar(label: str, total: float | None = None) -> AbstractContextManager[Bar]:
-    """A bar as the commands show it; none in a notebook, where its traces would stay."""
-    return progress(label, total, as_json="ipykernel" in sys.modules)
+@contextmanager
+def _bar(label: str, total: float | None = None) -> Iterator[Bar]:
+    """Work with a bar as the commands show it; none in a notebook, where its traces would stay."""
+    with one_thread(), progress(label, total, as_json="ipykernel" in sys.modules) as bar:
+        yield bar
 
 
 def _model(given: ModelLike) -> Model:
