@@ -16,6 +16,7 @@ from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.model_errors import (
     carries,
     errors_of,
+    hardly_predicted,
     noise_floor,
     on_test,
     predicted,
@@ -71,7 +72,8 @@ def judgement(
     was = on_test(plain, errors_before["test"], unseen, rows.drive)
     now = was if after is plain else on_test(after, errors_after["test"], unseen, rows.drive)
     share = share_left(was, now, noise)
-    doubts = _doubts(found, errors_before, errors_after, share, chosen.pieces, bool(changed))
+    loud = hardly_predicted(now, noise)
+    doubts = _doubts(found, errors_before, errors_after, share, chosen.pieces, bool(changed), loud)
     of_other_law = other_law(choice, left, share)
     headline = bool(choice.steps) and not doubts and not of_other_law and is_headline(share)
     verdict = verdict_of(choice, left, changed, headline=headline)
@@ -127,12 +129,12 @@ STANDS_IN = (
 
 def _doubts(
     found: Refinement, before: Mapping[str, Errors], after: Mapping[str, Errors], share: float,
-    apart: bool, changed: bool,
+    apart: bool, changed: bool, loud: bool,
 ) -> tuple[str, ...]:  # fmt: skip
     """Why the effects found may stand in for one that the library lacks.
 
     share: of what was missing, that is left; apart: the search came on pieces of a law of place;
-    changed: by drift.
+    changed: by drift; loud: the test logs are left far more than noise.
     """
     choice, model = found.choice, found.model
     carried = model.stage.imposed or not equations_explained(choice.base) or carries(before, after)
@@ -146,7 +148,7 @@ def _doubts(
         and carried
         and not is_headline(share)
         and not (changed and share < 1.0),
-        UNSURE: bool(choice.steps) and model.misfit > ASTRAY and unsized(choice, model),
+        UNSURE: bool(choice.steps) and (loud or model.misfit > ASTRAY) and unsized(choice, model),
     }
     return tuple(said for said, holds in doubts.items() if holds)
 

@@ -127,6 +127,12 @@ def predicted(left: OnTest, noise: NoiseFloor) -> bool:
     return left.misfit is None or left.misfit <= ADEQUATE
 
 
+def hardly_predicted(left: OnTest, noise: NoiseFloor) -> bool:
+    """Whether a model leaves far more force on the test logs than the sensors do."""
+    force = left.errors.force_rms
+    return force is not None and force > MUCH * noise.force_rms
+
+
 def seen_by(stage: EffectRows, steps: Sequence[Step], logs: Sequence[MotionLog]) -> EffectRows:
     """The stage of other logs with the same structure and effects taken out of their signals."""
     own = replace(stage, logs=tuple(logs), chosen=(), taken=(), scales={})

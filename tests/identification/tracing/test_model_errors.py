@@ -2,7 +2,14 @@
 
 import pytest
 
-from identification.tracing.model_errors import NoiseFloor, OnTest, carries, predicted, share_left
+from identification.tracing.model_errors import (
+    NoiseFloor,
+    OnTest,
+    carries,
+    hardly_predicted,
+    predicted,
+    share_left,
+)
 from identification.tracing.result import Errors
 
 
@@ -70,3 +77,10 @@ def test_a_model_is_complete_that_leaves_hardly_more_than_noise(
     force: float | None, misfit: float | None, expected: bool
 ) -> None:
     assert predicted(left_of(force, None, misfit), NoiseFloor(1.0, None)) is expected
+
+
+@pytest.mark.parametrize(("force", "expected"), [(2.1, True), (1.9, False), (None, False)])
+def test_a_model_hardly_predicts_logs_that_are_left_far_more_than_noise(
+    force: float | None, expected: bool
+) -> None:
+    assert hardly_predicted(left_of(force, None), NoiseFloor(1.0, None)) is expected
