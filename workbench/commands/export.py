@@ -21,7 +21,7 @@ WHAT_NEXT = {
     "plcopen": "import it as PLCopen XML; FB_{name}_test.passed tells whether it computes as it"
     " should",
     "fmu": "it holds C source: compile it by your tool, or by 'fmpy compile'",
-    "json": "what it holds is said in docs/contract.md",
+    "json": "what it holds is said in the manual: Contract, design.json",
     "mat": "load it; {name}.law has R, S, T, W",
 }
 

@@ -115,7 +115,7 @@ def proposed(path: Path, name: str | None = None) -> Proposal:
         raise BadLog(
             f"{path}: no column moves as a body that another one drives (looked at: {there}); a"
             " position is needed that goes both ways, and beside it a force, two pressures or a"
-            " motor's command; or write the card by hand (docs/contract.md)"
+            " motor's command; or write the card by hand (manual: The card, key by key)"
         )
     _refuse_resting(columns, roles)
     roles, area = _pressure_beside_force(columns, roles)

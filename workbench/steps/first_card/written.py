@@ -16,7 +16,7 @@ _RIG_WORDS = {
 }
 LEGEND = (
     '"sure" and "guess" say how far the log itself tells a line; look at each guess before you use',
-    "the card. All keys: docs/contract.md, Card.",
+    "the card. Every key is explained in the manual: The card, key by key.",
 )
 
 
