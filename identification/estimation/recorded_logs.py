@@ -8,9 +8,9 @@ import numpy as np
 from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regression.equation_rows import (
+    MECHANICAL,
     MotionLog,
     actuator,
-    mechanical,
     motion_log,
 )
 from identification.estimation.regression.held_command import (
@@ -20,6 +20,7 @@ from identification.estimation.regression.held_command import (
     unseen,
 )
 from identification.estimation.regression.inertia import inertia_has_no_part
+from identification.estimation.regression.row_fit import first_stage
 from identification.estimation.regression.weighted_rows import Fitted, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
@@ -153,14 +154,16 @@ def plain_share(recorded: RecordedLogs) -> float:
     if recorded.held:
         if any(not len(one.sliding.start) for one in recorded.logs):
             return 0.0
-        first = solve_rows(stacked([mechanical(one, NO_NOISE) for one in recorded.logs])).theta
-        rows = [mechanical(one, first) for one in recorded.logs]
-    elif recorded.by_command:
+        # Near standstill a fine encoder shows what the equation of sliding does not hold.
+        sliding = first_stage(recorded.logs, recorded.by_command)[1].get(MECHANICAL)
+        if sliding is None:
+            return 0.0
+        return share_between(recorded.logs, sliding.rows, sliding.slowest)
+    if recorded.by_command:
         first = solve_rows(stacked([actuator(one, NO_NOISE[:3]) for one in recorded.logs])).theta
         rows = [actuator(one, first) for one in recorded.logs]
-    else:
-        return 0.0
-    return share_between(recorded.logs, stacked(rows))
+        return share_between(recorded.logs, stacked(rows))
+    return 0.0
 
 
 def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:

@@ -2,7 +2,8 @@
 
 What such a log has is the command of one period of the loop; until its next sample the machine was
 given the mean of several. Where the command changes smoothly that mean is the logged one and a
-share of the step to the next, (R - 1) / (2 R) for R periods a sample. The share is a coefficient in
+share of the step to the next, (R - 1) / (2 R) for R periods a sample, less a part of how the
+command bends. The share is a coefficient in
 the equation of motion of a motor, whose force the command is, and in that of an actuator. What the
 loop adds from period to period (its encoder's counts) no log shows: it is noise of a motor's force.
 """
@@ -77,8 +78,24 @@ def between_samples(log: Log, share: float, held: bool) -> Log:
     if share == 0.0:
         return log
     keys = ("u", "F") if held else ("u",)
-    means = {key: log[key] + share * _steps(log[key]) for key in keys if key in log}
+    kernel = _mean_until_next(share)
+    means = {
+        key: np.convolve(np.pad(np.asarray(log[key], dtype=np.float64), (1, 2), "edge"), kernel,
+                         "valid")
+        for key in keys
+        if key in log
+    }  # fmt: skip
     return log.with_signals(**means)
+
+
+def _mean_until_next(share: float) -> Array:
+    """Weights of the sample after the next, the next, the sample itself and the one before, whose
+    sum is the mean command until the next sample.
+
+    Of a parabola: the mean of s (s - 1) / 2 over the R periods is -share (1 - share) / 3.
+    """
+    bend = share * (1.0 - share) / 6.0
+    return np.array([-bend, share + bend, 1.0 - share + bend, -bend])
 
 
 def period_of(share: float, h: float) -> float | None:
@@ -104,13 +121,15 @@ def unseen(log: Log, share: float) -> float:
     """
     if share == 0.0:
         return 0.0
-    means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), [1.0 - share, share])
+    kernel = _mean_until_next(share)
+    means = np.convolve(np.convolve([1.0, -1.0], [1.0, -2.0, 1.0]), kernel)
     third = np.diff(np.asarray(log["F"]), 3)
     count = len(third) // STRETCH_OF_LOOP
     power = np.mean(third[: count * STRETCH_OF_LOOP].reshape(count, STRETCH_OF_LOOP) ** 2, axis=1)
     white = float(np.median(power)) / float(means @ means)
     R = min(1.0 / max(1.0 - 2.0 * share, 1e-9), FAR_FASTER)
-    return float(np.sqrt(white * ((R - 1.0) / R**2 + 2.0 * share**2)))
+    of_samples = kernel - np.array([0.0, 0.0, 1.0 / R, 0.0])
+    return float(np.sqrt(white * ((R - 1.0) / R**2 + of_samples @ of_samples)))
 
 
 def _steps(x: Array) -> Array:

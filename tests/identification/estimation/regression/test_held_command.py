@@ -13,10 +13,13 @@ M, F_C, F_V = 2.0, 5.0, 10.0
 RIG = Rig("motor", force_per_command=1.0)
 
 
-def driven(R: int, chatter: float = 0.0, ripple: float = 0.0) -> tuple[Log, Array]:
+def driven(
+    R: int, chatter: float = 0.0, ripple: float = 0.0, slow: float = 0.0
+) -> tuple[Log, Array]:
     """A body under a loop of R periods a sample, and its mean force over every sample.
 
-    chatter [N]: of the loop, white from period to period; ripple [N]: a force along the stroke.
+    chatter [N]: of the loop, white from period to period; ripple [N]: a force along the stroke;
+    slow [N]: friction that is gone at 50 mm/s.
     The acceleration is constant over a period, so the motion is exact.
     """
     n, tick = round(SECONDS / H), H / R
@@ -31,6 +34,7 @@ def driven(R: int, chatter: float = 0.0, ripple: float = 0.0) -> tuple[Log, Arra
     middle = 0.5 * (v[1:] + v[:-1])
     F = M * np.diff(v) / tick + F_C * np.sign(middle) + F_V * middle
     F += ripple * np.sin(400.0 * y[:-1])
+    F += slow * np.sign(middle) * np.exp(-np.abs(middle) / 0.01)
     shown = y[:-1:R] + 3e-7 * np.random.default_rng(1).standard_normal(n)
     signals = {"t": H * np.arange(n), "y": shown, "u": F[::R], "F": F[::R]}
     return Log("driven", signals), F.reshape(n, R).mean(axis=1)
@@ -46,6 +50,21 @@ def smooth(log: Log) -> BoolArray:
 def test_the_share_is_that_of_the_loops_periods_in_a_sample(R: int, share: float) -> None:
     recorded = recorded_logs([driven(R)[0]], RIG)
     assert recorded.share == pytest.approx(share, abs=0.03)
+
+
+def test_slow_motion_that_friction_does_not_explain_hides_no_share() -> None:
+    recorded = recorded_logs([driven(4, slow=5.0)[0]], RIG)
+    assert recorded.share == pytest.approx(0.375, abs=0.03)
+
+
+@pytest.mark.parametrize("R", [2, 4, 50])
+def test_the_mean_of_a_command_that_bends_is_exact(R: int) -> None:
+    s = np.arange(40 * R) / R
+    u = 1.0 + 0.3 * s - 0.02 * s**2
+    log = Log("bends", {"t": H * np.arange(40), "y": np.zeros(40), "u": u[::R]})
+    found = between_samples(log, (R - 1) / (2 * R), held=False)
+    mean = u.reshape(40, R).mean(axis=1)
+    assert found["u"][1:-2] == pytest.approx(mean[1:-2], rel=1e-12)
 
 
 @pytest.mark.parametrize("R", [2, 8])
