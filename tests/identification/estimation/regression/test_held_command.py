@@ -61,7 +61,9 @@ def test_slow_motion_that_friction_does_not_explain_hides_no_share() -> None:
 def test_the_mean_of_a_command_that_bends_is_exact(R: int) -> None:
     s = np.arange(40 * R) / R
     u = 1.0 + 0.3 * s - 0.02 * s**2
-    log = Log("bends", {"t": H * np.arange(40), "y": np.zeros(40), "u": u[::R]})
+    t: Array = H * np.arange(40, dtype=np.float64)
+    signals = {"t": t, "y": np.zeros(40), "u": u[::R]}
+    log = Log("bends", signals)
     found = between_samples(log, (R - 1) / (2 * R), held=False)
     mean = u.reshape(40, R).mean(axis=1)
     assert found["u"][1:-2] == pytest.approx(mean[1:-2], rel=1e-12)
