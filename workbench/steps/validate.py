@@ -126,6 +126,9 @@ def _remarks(
         f"{'' if one.stable else ', unstable'}"
         for place, one in figures[judged + COMPENSATED].items()
     ]
+    if found.recommended == "none":
+        why = f" ({found.recommendation.why})" if found.recommendation else ""
+        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is judged")
     out += dict.fromkeys(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )

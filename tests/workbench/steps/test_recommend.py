@@ -10,11 +10,12 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.cards.controller import CardController
-from workbench.documents.design import Design
+from workbench.documents.design import Design, Recommendation
 from workbench.documents.drive import DriveUnits, present_file
 from workbench.documents.model import Model
 from workbench.report.validation_tables import validation_head, validation_rows
 from workbench.steps import recommend
+from workbench.steps.design import with_choice
 from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import force_period, periods
 from workbench.steps.loop_figures import PRESENT, LoopFigures
@@ -118,6 +119,15 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     assert 0.0 < off < 1.2 * 25.0 / (35.15 * 150.0)
     assert any("present on the model" in line for line in result.remarks) or row["limit cycle"]
     assert result.why.startswith(found.recommended.upper())
+
+
+def test_a_design_that_recommends_nothing_is_told_as_such() -> None:
+    model, found = motor()
+    none = with_choice(model, found, Recommendation("none", False, "staircase of 3 mm"))
+    told, _ = validate(model, none, np.random.default_rng(0))
+    assert told.remarks[0] == (
+        "the design recommends no controller (staircase of 3 mm); its RST is judged"
+    )
 
 
 def test_a_present_controller_that_cannot_be_simulated_is_told() -> None:

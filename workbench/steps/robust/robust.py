@@ -12,7 +12,6 @@ from workbench.documents.design import Design, From, Recommendation
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
-from workbench.steps.linear_loop import unknown_viscous
 from workbench.steps.loop_figures import PRESENT, Limits, references
 from workbench.steps.robust.machines import DrawnMachines, drawn_machines, some_of
 from workbench.steps.robust.outcomes import (
@@ -225,8 +224,9 @@ def _chosen(
 
 def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
     out = []
-    if names := unknown_viscous(model):
-        out.append(f"{' and '.join(names)}: not identified, drawn around what is assumed")
+    if model.assumed:
+        names = ", ".join(model.assumed)
+        out.append(f"no log tells {names}: values within a third of the assumed ones were drawn")
     if wanted.drift:
         widest = max(wanted.drift, key=lambda name: (wanted.drift or {})[name])
         out.append(

@@ -9,6 +9,7 @@ import pytest
 
 from design.tune import Asked
 from identification.errors import NotIdentifiable
+from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from tests.chain import TABLES, model_of
 from workbench.documents.design_file import design_document
@@ -152,3 +153,11 @@ def test_without_a_mass_there_is_nothing_to_draw_around() -> None:
     mass = replace(model.friction["m"], value=None, reason="no breakaway", assumed=1.0)
     with pytest.raises(NotIdentifiable, match="physical plant"):
         robust_design(replace(model, friction={**model.friction, "m": mass}), WANTED)
+
+
+def test_what_no_log_told_is_named() -> None:
+    untold = Estimate(None, "N", reason="no breakaway", assumed=18.0)
+    model = uncertain()
+    model = replace(model, friction={**model.friction, "F_sp": untold})
+    one = robust_design(model, replace(WANTED, draws=4), POLES)
+    assert any(line.startswith("no log tells F_sp: ") for line in one.remarks)
