@@ -1,34 +1,49 @@
-# make demo | make docs | make test | make bench; needs Python 3.11 or newer (make PYTHON=python3.12 demo).
+# make demo | make test | make test-all | make docs | make bench; needs Python 3.11 or newer
+# (make PYTHON=python3.12 demo).
 PYTHON ?= python3
 WORKERS ?= 2
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+PYTEST := $(BIN)/pytest -n $(WORKERS) --no-loadscope-reorder
 NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
-.PHONY: demo test environment lint types floors wheel docs kernels tests bench format clean
+# uv installs five times as fast as pip, which does it where uv cannot.
+UV := $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt
+install = $(UV) $(1) 2>/dev/null || $(PIP) install --constraint constraints.txt $(1)
+
+.PHONY: demo test test-all environment lint types floors kernels tests wheel docs slow verdicts \
+	bench format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/workbench demo
 
-# Two at a time: what one core checks goes on beside what the other compiles and tests.
+# What a change has to pass. Two at a time: types are checked on one core while the other compiles.
 test: environment
-	$(MAKE) --no-print-directory -j 2 lint types floors kernels
-	$(MAKE) --no-print-directory -j 2 docs wheel tests
+	$(MAKE) --no-print-directory -j 2 lint floors types kernels
+	$(MAKE) --no-print-directory tests
+
+# What `make test` leaves out because it takes long.
+test-all: environment
+	$(MAKE) --no-print-directory kernels
+	$(MAKE) --no-print-directory -j 2 wheel docs
+	$(MAKE) --no-print-directory slow
+	$(MAKE) --no-print-directory verdicts
 
 environment: $(VENV)/.installed-dev
 
 $(VENV)/.installed: pyproject.toml constraints.txt
 	@$(PYTHON) -c '$(NEEDED)'
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(PIP) install --constraint constraints.txt hatchling 'setuptools>=70.1'
-	$(PIP) install --constraint constraints.txt --no-build-isolation --editable .
+	-$(PIP) install --constraint constraints.txt uv
+	$(call install,hatchling 'setuptools>=70.1')
+	$(call install,--no-build-isolation --editable .)
 	touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
-	$(PIP) install --constraint constraints.txt --no-build-isolation --editable '.[dev]'
+	$(call install,--no-build-isolation --editable '.[dev]')
 	touch $@
 
 lint: environment
@@ -41,19 +56,25 @@ types: environment
 floors: environment
 	$(BIN)/lint-imports
 
-wheel: environment
-	$(BIN)/python tools/check_wheel.py
-
 kernels: environment
 	$(BIN)/python tools/compile_kernels.py
+
+tests: environment
+	$(PYTEST) --dist loadfile -m "not slow and not verdicts"
+
+wheel: environment
+	$(BIN)/python tools/check_wheel.py
 
 # Runs every command of the pages; -E reads all pages anew, whose outputs are of this code.
 docs: environment
 	$(BIN)/python -m sphinx -W --keep-going -E -q -d build/doctrees docs build/site
 	@echo "the site: build/site/index.html"
 
-tests: environment
-	$(BIN)/pytest -n $(WORKERS) --dist loadfile --no-loadscope-reorder
+slow: environment
+	$(PYTEST) --dist loadfile -m slow
+
+verdicts: environment
+	$(PYTEST) --dist worksteal -m verdicts
 
 bench: environment
 	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"

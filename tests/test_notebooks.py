@@ -26,6 +26,7 @@ def test_outputs_are_stripped(path: Path) -> None:
             assert cell.execution_count is None, f"{path.name}: run nbstripout (make format)"
 
 
+@pytest.mark.slow
 @each_notebook
 def test_runs(path: Path, tmp_path: Path) -> None:
     place = {"metadata": {"path": str(tmp_path)}}

@@ -29,6 +29,7 @@ def test_the_cases_are_many_and_differ() -> None:
     assert len({case.name for case in found}) > 560
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("case", SAMPLE, ids=lambda case: case.name.encode("unicode_escape"))
 def test_a_bad_input_ends_in_one_line(
     case: Case, shop: Shop, capfd: pytest.CaptureFixture[str]

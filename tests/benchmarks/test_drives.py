@@ -47,6 +47,7 @@ def slip(v: Array, one: Machine) -> Array:
     return np.asarray(np.where(v > 0.0, p.F_cp + p.F_vp * v, -p.F_cn + p.F_vn * v))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_momentum_is_what_driving_force_and_friction_leave(family: str) -> None:
     rate = 64000
@@ -130,6 +131,7 @@ def test_a_clock_that_jitters_reads_another_instant() -> None:
     assert 0.0 < np.std(off[np.abs(motion[1]) > 0.05]) < 3.0 * 0.02 / 500 * np.max(motion[1])
 
 
+@pytest.mark.slow
 def test_every_effect_has_a_size_and_shows_in_the_log() -> None:
     for family in FAMILIES:
         one = bare(family, 500)

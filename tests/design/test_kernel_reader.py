@@ -68,6 +68,7 @@ def servos(draw: st.DrawFn) -> tuple[Servo, bool]:
     return servo, motor
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=60)
 @given(servos(), st.integers(0, 2**31))
 def test_the_program_is_the_simulations_step(made: tuple[Servo, bool], seed: int) -> None:
@@ -85,6 +86,7 @@ def test_the_program_is_the_simulations_step(made: tuple[Servo, bool], seed: int
     assert np.array_equal(bits([step.step(*row) for row in inputs]), bits(run.u))
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(servos())
 def test_the_test_vector_takes_every_branch_of_a_friction_compensator(

@@ -131,6 +131,7 @@ def many(count: int, actuator: Actuator | Motor, seed: int = 0) -> list[Plant]:
     return [Plant(Karnopp.from_array(table(1).array * row), actuator) for row in factors]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("controller", [PD, PID, GENERAL])
 @pytest.mark.parametrize("motor", [False, True])
 def test_many_plants_are_each_alone(controller: RST, motor: bool) -> None:

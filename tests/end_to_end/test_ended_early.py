@@ -87,6 +87,7 @@ def test_a_budget_that_is_over_at_once_is_one_too(
     assert "--budget" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_ctrl_c_ends_with_the_best_so_far(shop: Path, tmp_path: Path) -> None:
     done = interrupted(shop, tmp_path, 1)
     assert done.returncode == 0, done.stderr
@@ -94,6 +95,7 @@ def test_ctrl_c_ends_with_the_best_so_far(shop: Path, tmp_path: Path) -> None:
     assert {path.name for path in (tmp_path / "out").iterdir()} == FILES
 
 
+@pytest.mark.slow
 def test_a_second_one_aborts_and_leaves_nothing(shop: Path, tmp_path: Path) -> None:
     done = interrupted(shop, tmp_path, 2)
     assert (done.returncode, done.stdout) == (130, "")

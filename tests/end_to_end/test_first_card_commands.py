@@ -157,6 +157,7 @@ def on_a_terminal(answers: str, *arguments: str) -> tuple[int, str]:
     return process.wait(), shown.decode("utf-8", "replace")
 
 
+@pytest.mark.slow
 def test_a_terminal_is_asked_about_each_guess(shop: Path) -> None:
     (shop / "card.toml").write_text("mine", "utf-8")
     status, shown = on_a_terminal("n\n", "init", "run.csv")

@@ -48,6 +48,7 @@ def refused(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
     return shown.err
 
 
+@pytest.mark.slow
 def test_a_fleet_with_a_bad_log_and_then_again(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

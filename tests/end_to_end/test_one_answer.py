@@ -34,6 +34,7 @@ def both(
     return fit.estimates, found.parameters_after
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("signals", [("t", "y", "F", "u"), ("t", "y", "F")])
 @pytest.mark.parametrize("name", RECIPES)
 def test_of_a_recipe_without_effects(name: str, signals: tuple[str, ...]) -> None:
@@ -49,6 +50,7 @@ def test_of_a_recipe_without_effects(name: str, signals: tuple[str, ...]) -> Non
     assert any(one.value is not None for one in told.values())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", SETS)
 def test_of_a_measured_set(
     name: str, workbench_data: Path, monkeypatch: pytest.MonkeyPatch

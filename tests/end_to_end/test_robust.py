@@ -37,6 +37,7 @@ def done(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.slow
 def test_its_files_serve_validate_and_export(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -49,6 +50,7 @@ def test_its_files_serve_validate_and_export(
     assert main(["export", "made/design.json", "--to", "c", "--out", "code"]) == 0
 
 
+@pytest.mark.slow
 def test_a_machines_drift_so_far_widens_the_draws(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -60,6 +62,7 @@ def test_a_machines_drift_so_far_widens_the_draws(
     assert found["drift"] == {"F_cp": pytest.approx(0.0953, rel=1e-2)}
 
 
+@pytest.mark.slow
 def test_what_no_loop_keeps_ends_with_the_run_to_make(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -26,6 +26,7 @@ def told(home: Path) -> list[Told]:
     return story(home, 5, LOGGED)
 
 
+@pytest.mark.slow
 def test_every_log_has_one_verdict(told: list[Told]) -> None:
     assert [one.day for one in told] == DAYS
     verdicts = {one.day.number: one.outcome.verdict for one in told}

@@ -44,6 +44,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "sim" / "paper_table1.csv"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGHUP, 129)])
 def test_nothing_is_left_of_a_result(
     tmp_path: Path, log: Path, number: signal.Signals, status: int
@@ -54,6 +55,7 @@ def test_nothing_is_left_of_a_result(
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_a_pass_gives_its_machine_back(tmp_path: Path, log: Path) -> None:
     home = tmp_path / "machines" / "a"
     (home / "logs").mkdir(parents=True)

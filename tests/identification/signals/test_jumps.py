@@ -140,6 +140,7 @@ def test_noise_rates_and_encoders_are_no_fault(h: float, count: float, noise: fl
     assert prepare(log, RIG).remarks == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("h", [2e-2, 5e-3, 1e-3, 1e-4])
 @pytest.mark.parametrize("bounce", [0.0, 0.6])
 def test_impacts_on_end_stops_are_no_fault(h: float, bounce: float) -> None:

@@ -66,6 +66,7 @@ def asks(logs: tuple[Log, Log], whole: Trace) -> int:
     return asked.count
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.0, 1e-3, 0.01, 0.05, 0.2, 0.5, 0.8, 0.85, 0.9, 0.95])
 def test_it_ends_at_any_ask_with_a_whole_result(
     logs: tuple[Log, Log], asks: int, share: float
@@ -87,6 +88,7 @@ def test_it_ends_at_any_ask_with_a_whole_result(
         assert "give it more time" in found.next_experiment
 
 
+@pytest.mark.slow
 def test_what_the_equations_call_for_is_kept_though_the_run_has_not_judged_it(
     logs: tuple[Log, Log], asks: int
 ) -> None:

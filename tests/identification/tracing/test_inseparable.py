@@ -1,6 +1,7 @@
 """Two effects that one run cannot tell apart are called so, and the run named tells them apart."""
 
 import numpy as np
+import pytest
 
 from design.effect_loop import simulate_effect_loop
 from design.loop import Cascade, ForcePI, LoopNoise
@@ -48,6 +49,7 @@ def traced(speeds: tuple[float, ...]) -> Trace:
     return trace([logs[0]], [logs[1]], Rig("force"), built_in(), np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_the_run_that_is_named_tells_the_rivals_apart() -> None:
     found = traced((0.1,))
     assert found.verdict == "inseparable"

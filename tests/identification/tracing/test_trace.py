@@ -95,6 +95,7 @@ def test_nothing_is_missing_where_nothing_is() -> None:
         assert np.sqrt(np.mean(errors**2)) == pytest.approx(model["train"].position_rms)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "values"),
     [

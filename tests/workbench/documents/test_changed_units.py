@@ -60,6 +60,7 @@ def unit_of(table: str, name: str, unit: str) -> Callable[[Document], None]:
     return change
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "unit", "why"),
     [
@@ -188,6 +189,7 @@ def run(capsys: pytest.CaptureFixture[str], *words: str | Path) -> tuple[int, st
     return status, shown.out, shown.err
 
 
+@pytest.mark.slow
 def test_every_command_says_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     model = model_file(tmp_path, in_grams)
     log, card = tmp_path / "run.csv", tmp_path / "card.toml"
