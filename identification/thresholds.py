@@ -57,6 +57,8 @@ CARRIED = 2.0  # times the training logs' force error, that the test logs' may b
 LEAST_DEPENDENCE = 0.08  # share of the rest that a signal explains, or it depends on none
 MOST_PLACES = 3  # effects of place in one machine, which rather are pieces of another law
 
+WORSE_PREDICTION = 1.1  # times the plain model's error of the held-out position, with effects
+
 # What differs between the logs: drift (blind.py: drift; chapters.py).
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
 DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
@@ -68,6 +70,16 @@ SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
 CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
 LOST_FIT = 100.0  # times the misfit of fits of the model's own logs, from which a fit says nothing
 VANISHED = 0.99  # of its value, that a mass or friction parameter loses where its fit has no hold
+
+# What the equation of motion's own least squares are to a fit (real.py).
+WORSE_THAN_EQUATION = 1.05  # times what they leave of the force unseen, that a fit may leave
+MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of its numbers holds
+
+# What acts beside the applied force and is taken out first (real.py: rigs and cases).
+LAG_FROM = 0.4  # samples, from which motion and force are not of one instant
+SURROUNDINGS_LEAVE = 0.8  # of the equation's square, left at most by a lag, or by gravity
+SURE_OF_SURROUNDINGS = 4.0  # deviations from 0, of either
+BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
@@ -91,3 +103,5 @@ RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
 REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
 RESIDUAL_WALKS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
+PLACES_SET_ASIDE = 5  # of a log, by the word of a run that follows it but for these
+SHARE_SET_ASIDE = 1e-3  # of its samples, the same

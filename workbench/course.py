@@ -47,6 +47,8 @@ class Course:
     _from: float = field(init=False, default=0.0)
     _since: float = field(init=False)
     _stopped: bool = field(init=False, default=False)
+    _compiled: float = field(init=False, default=0.0)
+    _compiles: float | None = field(init=False, default=None)
     _moving: threading.Lock = field(init=False, default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
@@ -64,8 +66,11 @@ class Course:
         self.beat()
 
     def keep_going(self) -> bool:
-        """Whether the computation is to go on: within its budget, and not told to end."""
-        return not self._stopped and self.clock() - self._begun < self.budget
+        """Whether the computation is to go on: within its budget, and not told to end.
+
+        What kernels take to be compiled, once after an installation, does not count.
+        """
+        return not self._stopped and self.clock() - self._begun - self._compiled < self.budget
 
     def stop(self) -> None:
         """From now on it is to end."""
@@ -86,6 +91,12 @@ class Course:
 
     def compiling(self, begins: bool) -> None:
         """Kernels are being compiled, or no longer: nothing else goes on meanwhile."""
+        now = self.clock()
+        if begins:
+            self._compiles = now
+        elif self._compiles is not None:
+            self._compiled += now - self._compiles
+            self._compiles = None
         self.told(COMPILING if begins else self._stage)
 
     def done(self) -> None:

@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.errors import NotIdentifiable
 from identification.estimation.contradicted import Corrected, corrected, told_of
-from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.imposed_motion import fit_imposed, left_by
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
     RecordedLogs,
@@ -24,6 +25,7 @@ from identification.estimation.recorded_logs import (
     led_by_rig,
     recorded_logs,
 )
+from identification.estimation.regression.equation_rows import MotionLog
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
@@ -31,22 +33,33 @@ from identification.estimation.structure_fit import (
     search_is_hopeless,
     searched,
 )
+from identification.estimation.surroundings import surrounding_estimates, surroundings
 from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
+from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
-from identification.progress import Progress, quiet
+from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
+from identification.signals.check import check_driven
 from identification.thresholds import (
     ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
     COMPLETE,
+    MOST_UNEXPLAINED,
     NO_RUN,
+    PLACES_SET_ASIDE,
+    SHARE_SET_ASIDE,
+    WORSE_THAN_EQUATION,
 )
 
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
+ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
+FLOOR_WHY = (
+    "the free run is not followed, and bends mass and friction; stick limits and band are not told"
+)
 CORRECTIONS = 3  # rounds in which bad samples are looked for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
@@ -59,17 +72,42 @@ def fit_plant(
     drive: Drive | None = None,
     prior: Plant | None = None,
     on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
 ) -> KarnoppFit:
     """The parameters of a machine from its logs.
 
     logs: each with y [m] and F [N] (F_e), and u [V] for a drive by command, on an even clock.
     drive: "command" or "force"; by default the command where a linear actuator explains the
     force. prior: the plant that was in force, from which the fit begins, with the effects that it
-    has. Raises BadLog where a signal is missing, NotIdentifiable where nothing moves.
+    has. keep_going: asked before every run; once it says no, the best so far is the result, and a
+    remark says so. Without a prior, a constant force, gravity and a lag of the columns are told
+    beside friction. Raises BadLog where a signal is missing, NotIdentifiable where nothing moves.
     """
+    halt = Halt(keep_going)
+    if prior is not None:
+        return _fit(logs, rng, rig, drive, prior, on_progress, halt)
+    for log in logs:
+        check_driven(log)
+    around = surroundings(logs, rig)
+    fit = _fit([around.taken_out(log) for log in logs], rng, rig, drive, None, on_progress, halt)
+    if halt.reached():
+        fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
+    if around.none:
+        return fit
+    return replace(
+        fit, surroundings=around, effects=around.effects,
+        estimates={**fit.estimates, **surrounding_estimates(around)},
+    )  # fmt: skip
+
+
+def _fit(
+    logs: Sequence[Log], rng: np.random.Generator, rig: Rig, drive: Drive | None,
+    prior: Plant | None, on_progress: Progress | None, halt: Halt,
+) -> KarnoppFit:  # fmt: skip
+    """As `fit_plant`, of logs beside whose applied force nothing acts but what the prior has."""
     report = on_progress or quiet
     report("refining", 0.0)
-    recorded = recorded_logs(logs, rig, drive)
+    recorded = recorded_logs(logs, rig, drive, halt)
     begin, settle = rng.spawn(2)
     if prior is not None and prior.effects:
         fit = _with_effects(prior, recorded, settle, report)
@@ -135,20 +173,38 @@ def _without_bad(
     """The logs without the samples that the plain plant contradicts, that plant, and those samples.
 
     Looked for where the plant follows the logs but for a few places; again from the plant without
-    what was found.
+    what was found. A run that contradicts a log in more than a handful of places is a wrong model,
+    and nothing is set aside for it.
     """
-    found = plain_structure(recorded, rng)
+    given, none = recorded, set_aside
+    found = first = plain_structure(recorded, rng)
     for seed in rng.spawn(CORRECTIONS):
-        if found.imposed:
+        if found.imposed or recorded.halt.reached():
             break
-        made = corrected(found.plant, recorded, found.misfit)
+        with recorded.halt.closing():
+            made = corrected(found.plant, recorded, found.misfit)
         if not made.bad:
             break
+        if not are_few((*set_aside.bad, *made.bad), given.logs):
+            return given, first, none
         again = plain_structure(made.recorded, seed)
         if again.misfit > max(found.misfit, COMPLETE):
             break
         recorded, found, set_aside = made.recorded, again, set_aside.and_of(made)
     return recorded, found, set_aside
+
+
+def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
+    """Whether what runs contradict is so little of every log that it may be the log's fault."""
+    by_log: dict[str, list[int]] = {}
+    for one in bad:
+        by_log.setdefault(one.log, []).append(one.samples)
+    lengths = {one.log.name: len(one.log) for one in logs}
+    return all(
+        len(found) <= PLACES_SET_ASIDE
+        and sum(found) <= max(PLACES_SET_ASIDE, SHARE_SET_ASIDE * lengths.get(name, 0))
+        for name, found in by_log.items()
+    )
 
 
 def finished(
@@ -168,13 +224,61 @@ def finished(
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded, found.misfit)
         if said:
-            forced = recorded_logs(recorded.plain, recorded.rig, "force")
+            forced = recorded_logs(recorded.plain, recorded.rig, "force", recorded.halt)
             again = finished(plain_structure(forced, other), forced, settle, report, by="force")
             return replace(again, remarks=(said, *again.remarks))
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else f"no free run follows (misfit {found.misfit:.3g})"
         return fit_imposed(recorded, settle, why)
-    return settled(found.plant, recorded, found.misfit, settle, report)
+    try:
+        fit = settled(found.plant, recorded, found.misfit, settle, report)
+    except Halted:
+        with recorded.halt.closing():
+            fit = settled(found.plant, recorded, found.misfit, settle, report, quick=True)
+    return _on_the_floor(fit, recorded, other)
+
+
+def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
+    """The fit, or that of the equation of motion alone where its run is not followed and it leaves
+    clearly more of that equation than least squares do, on stretches that these have not seen."""
+    if fit.adequate or fit.effects:
+        return fit
+    left = left_by(fit, recorded)
+    if left is None:
+        return fit
+    if bends_the_equation(left[0], left[1]):
+        try:
+            fit = fit_imposed(recorded, rng, FLOOR_WHY, by_rig=False)
+        except NotIdentifiable:
+            return fit
+    share = min(left[0], left[1]) / left[2]
+    return _untold(fit, share) if is_unexplained(share) else fit
+
+
+def bends_the_equation(left: float, by_equation: float) -> bool:
+    """Whether a fit leaves clearly more force than the equation of motion does by itself."""
+    return left > WORSE_THAN_EQUATION * by_equation
+
+
+def is_unexplained(share: float) -> bool:
+    """Whether a model leaves so much of the force that none of its numbers holds."""
+    return share > MOST_UNEXPLAINED
+
+
+def _untold(fit: KarnoppFit, share: float) -> KarnoppFit:
+    """The fit with none of the nine told: its model leaves this share of the force."""
+    reason = (
+        f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
+        " larger than friction acts (`workbench trace` looks for it), so no number would hold"
+    )
+    values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
+    untold = {
+        name: replace(one, value=None, sd=None, low=None, high=None, at_most=None,
+                      reason=reason, assumed=values[name])
+        if name in NAMES else one
+        for name, one in fit.estimates.items()
+    }  # fmt: skip
+    return replace(fit, estimates=untold)
 
 
 def is_no_run(misfit: float) -> bool:

@@ -17,6 +17,7 @@ from identification.estimation.estimates import NORMAL_SETS, Events, estimates, 
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
+    OF_FORCE,
     MotionLog,
     mechanical,
     motion_log,
@@ -26,12 +27,13 @@ from identification.estimation.regression.three_step import FirstEstimate, first
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
-from identification.model.plant import Plant
+from identification.model.plant import Motor, Plant
 from identification.signals.initial_state import measured_start
 from identification.thresholds import SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
+FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
@@ -62,16 +64,21 @@ def fit_imposed(
     rng: np.random.Generator,
     why: str,
     remarks: Sequence[str] = (),
+    *,
+    by_rig: bool = True,
 ) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
-    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`.
+    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`. by_rig:
+    a rig leads the body, so that its motion may be smoothed until its direction is sure.
     Raises NotIdentifiable where no log slides enough in both directions.
     """
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
     noise_F = float(np.median([one.noise_F for one in recorded.logs]))
-    fit, rows = force_fit(recorded)
+    # A motor's force is as exact as its command: what is left is then no noise, but no number too.
+    noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
+    fit, rows = force_fit(recorded, by_rig=by_rig)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
     samples = np.tile(center, (NORMAL_SETS, 1))
@@ -83,12 +90,12 @@ def fit_imposed(
     names = tuple(FIVE[i] for i in fit.used)
     return KarnoppFit(
         friction=friction,
-        actuator=None,
+        actuator=_motor(recorded),
         estimates=found,
         free=names,
         covariance=fit.covariance,
         samples=drawn,
-        drive="force",
+        drive="command" if recorded.held else "force",
         noise_y=float(np.median([first.motion.noise for first in firsts])),
         noise_F=noise_F,
         chi_square=(fit.rms / noise_F) ** 2,
@@ -113,12 +120,20 @@ def fit_imposed(
     )
 
 
-def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
-    """Sliding friction by the force equation, and the rows that it was fitted on.
+def _motor(recorded: RecordedLogs) -> Motor | None:
+    gives = recorded.rig.force_per_command
+    return Motor(gives) if recorded.held and gives is not None else None
+
+
+def force_fit(recorded: RecordedLogs, *, by_rig: bool = True) -> tuple[ForceFit, list[Rows]]:
+    """Sliding friction by the force equation, and the rows that it was fitted on; by_rig: as above.
 
     Raises NotIdentifiable where no log slides enough in both directions.
     """
-    moved = [motion_log(one, held=False, by_command=False, imposed=True) for one in recorded.plain]
+    moved = [
+        motion_log(one, held=recorded.held, by_command=False, imposed=by_rig)
+        for one in recorded.plain
+    ]
     rows = _rows(moved, recorded.name)
     return _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART), rows
 
@@ -203,6 +218,33 @@ def _estimates(
     used = [FIVE[i] for i in fit.used]
     told = _of_sliding(used, fit.theta, samples[:, list(fit.used)], (up, down), fastest, recorded)
     return _reasoned(told, nine, fit.share, recorded)
+
+
+def left_by(fit: KarnoppFit, recorded: RecordedLogs) -> tuple[float, float, float] | None:
+    """Force [N] that a fit leaves of the equation of motion while sliding, that the equation's own
+    least squares leave on stretches that they have not seen, and the force itself; root mean
+    squares.
+
+    None where too little slides. Of rows faster than the fit's band, in which it says something
+    else of friction.
+    """
+    logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
+    p = fit.friction
+    theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
+    rows = stacked([mechanical(one, theta) for one in logs])
+    fast = rows.speed > np.where(rows.X[:, 1] > 0.5, p.dv_p, -p.dv_n)
+    if np.count_nonzero(fast) < FEWEST_JUDGED:
+        return None
+    own = (rows.b - rows.X @ theta)[fast]
+    unseen = np.zeros(len(rows.b))
+    for block in np.unique(rows.block[fast]):
+        out = rows.block == block
+        best = solve_rows(rows, fast & ~out).theta
+        unseen[out] = (rows.b - rows.X @ best)[out]
+    own_rms, unseen_rms, whole = (
+        float(np.sqrt(np.mean(x**2))) for x in (own, unseen[fast], rows.b[fast])
+    )
+    return own_rms, unseen_rms, whole
 
 
 def imposed_estimates(

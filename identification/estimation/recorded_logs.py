@@ -166,8 +166,11 @@ def plain_share(recorded: RecordedLogs) -> float:
     return 0.0
 
 
-def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> RecordedLogs:
+def recorded_logs(
+    logs: Sequence[Log], rig: Rig, drive: Drive | None = None, halt: Halt | None = None
+) -> RecordedLogs:
     """The logs with their motion; drive: by default the command where an actuator follows it.
+    halt: whether what is made of them is to go on.
 
     A command is its mean until the next sample, where they show it. Raises BadLog where a signal is
     missing, or the asked drive is not to be had, NotIdentifiable where nothing moves.
@@ -175,7 +178,8 @@ def recorded_logs(logs: Sequence[Log], rig: Rig, drive: Drive | None = None) -> 
     for log in logs:
         check_driven(log)
     slower = needed(logs, rig)
-    found = RecordedLogs((), rig, chosen_drive(slower, rig, drive)).of(slower)
+    chosen = chosen_drive(slower, rig, drive)
+    found = RecordedLogs((), rig, chosen, halt=halt or Halt()).of(slower)
     for one in found.logs:
         if not np.any(one.signals["d"]):
             raise NotIdentifiable(

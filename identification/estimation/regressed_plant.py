@@ -13,13 +13,13 @@ from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import ACTUATOR, BREAKAWAY, FIVE, MECHANICAL
 from identification.estimation.regression.row_fit import RowFit, with_sizes
 from identification.estimation.regression.standstill import borne
+from identification.estimation.regression.weighted_rows import OVERLAP
 from identification.estimation.windowed_run.nudged_search import STICK_PER_COULOMB
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import INERT
 
 USUAL_STICK = 1.2  # times the Coulomb level, of a stick limit of which nothing is known
-OVERLAP = 2.5  # rows that share samples are worth one in so many
 SHAPE = 0.03  # relative trust in a searched parameter
 EQUATION_DEVIATIONS = 4.0  # deviations within which a search keeps what the equations tell
 LOST = 1e3  # times a parameter's size, of a deviation from which a part of an effect begins as none

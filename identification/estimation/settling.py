@@ -80,14 +80,15 @@ class Spread:
 
 def settled(
     plant: Plant, recorded: RecordedLogs, misfit: float, rng: np.random.Generator,
-    report: Progress, *, refined: Refit | None = None,
+    report: Progress, *, refined: Refit | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
     """The fit of a plant that a search or refinement has come to, near its minimum.
 
-    misfit: what it leaves in windows; refined: the refinement that it comes from, if it is one.
+    misfit: what it leaves in windows; refined: the refinement that it comes from, if it is one;
+    quick: by the windows, which take no search.
     """
     walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
-    exact = recorded.drive == "command" and not plant.effects and not walking
+    exact = recorded.drive == "command" and not plant.effects and not walking and not quick
     spread = None
     if exact and misfit <= FOLLOWED:
         spread = _over_whole_runs(plant, recorded, rng, report)

@@ -10,6 +10,7 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor
+from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.bad_samples import BadSamples
 
 Drive = Literal["command", "force"]
@@ -68,7 +69,8 @@ class KarnoppFit:
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
     bad: samples of the logs that the run contradicts, which were set aside.
     command_period: time [s] after which the drive gives its next command, None where no log shows
-    that it is sooner than the next sample.
+    that it is sooner than the next sample. surroundings: what acts beside the applied force, which
+    was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
     """
 
     friction: Karnopp
@@ -89,6 +91,7 @@ class KarnoppFit:
     effects: tuple[Acting, ...] = ()
     bad: tuple[BadSamples, ...] = ()
     command_period: float | None = None
+    surroundings: Surroundings = NO_SURROUNDINGS
 
     @property
     def imposed(self) -> bool:

@@ -8,9 +8,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
-from identification.model.plant import units_of
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
-from identification.tracing.constant_force import beyond_friction, constant_remark
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.model_errors import (
@@ -171,9 +169,6 @@ def _remarks(
             f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
             " band and stick limits are not to be trusted, or more is missing"
         )
-    always = beyond_friction(choice.end.theta)
-    if always is not None:
-        yield constant_remark(always, units_of(rig.motion)["F_cp"])
     if left.swing > 0.0:
         yield (
             f"what is left swings at {left.swing:.3g} Hz whatever the motion does: a vibration from"

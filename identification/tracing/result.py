@@ -8,6 +8,7 @@ from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
+from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 
 TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
 
@@ -123,7 +124,8 @@ class Trace:
     each. complete: the model predicts the test logs down to the sensors' noise; left: what is
     missing beside the effects named. not_tried: in words, what a halted trace has not looked
     for, so that its verdict is one for the time being. command_period: as of a fit. curves: of the
-    effects named that are a function of a logged signal.
+    effects named that are a function of a logged signal. surroundings: what acts beside the applied
+    force, which is part of the plain model: errors and parameters are of logs without it.
     """
 
     verdict: TraceVerdict
@@ -149,3 +151,4 @@ class Trace:
     not_tried: tuple[str, ...] = ()
     command_period: float | None = None
     curves: tuple[FreeCurve, ...] = ()
+    surroundings: Surroundings = NO_SURROUNDINGS

@@ -11,8 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from identification.effects._library import Library
-from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL, MotionLog
+from identification.estimation.regression.equation_rows import (
+    ACTUATOR,
+    MECHANICAL,
+    MotionLog,
+    motion_log,
+)
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.surroundings import surroundings
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
@@ -22,6 +28,7 @@ from identification.tracing.free_curve import free_curves
 from identification.tracing.judgement import Judgement, judgement
 from identification.tracing.model_errors import row_noise
 from identification.tracing.plain_model import plain_model
+from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
 from identification.tracing.result import Trace, TraceVerdict
@@ -34,7 +41,9 @@ from identification.tracing.structure_search import (
     selection,
     settled_plain,
     share_beside,
+    without_effects,
 )
+from identification.tracing.surroundings_told import with_surroundings
 from identification.tracing.verdict import (
     found_effect,
     next_experiment,
@@ -44,6 +53,8 @@ from identification.tracing.verdict import (
     run_residual,
 )
 
+ALWAYS_THERE = ("gravity",)  # where they show, in the plain model: they are nothing to be found
+MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing is proved"
 FOR_NOW = "for now, since the trace ended early"
 
 
@@ -63,6 +74,13 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
+    around = surroundings(train, rig)
+    recorded_as = train, test
+    train, test = ([around.taken_out(log) for log in logs] for logs in (train, test))
+    library = {key: effect for key, effect in library.items() if key not in ALWAYS_THERE}
+    still = bool(test) and not any(_slides(log, rig) for log in test)
+    if still:  # nothing could be proved of an effect
+        library = {}
     begin, settle, choose = rng.spawn(3)
     halt = Halt(keep_going)
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
@@ -73,8 +91,40 @@ def trace(
     report("telling", 0.0)
     with halt.closing():
         seen = [chosen.plain.rows.recorded.given(log) for log in test]
+        found, doubt = _proved(chosen, found, seen)
         judged = judgement(chosen, found, seen, rig)
-        return _told(chosen, found, judged, seen, halt.not_tried)
+        told = _told(chosen, found, judged, seen, halt.not_tried)
+    if doubt:
+        told = replace(told, remarks=(*told.remarks, doubt))
+    if still:
+        told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
+    return told if around.none else with_surroundings(told, around, *recorded_as, rig)
+
+
+def _slides(log: Log, rig: Rig) -> bool:
+    """Whether the body slides in a log, for long enough to judge."""
+    one = motion_log(log, held=rig.kind == "motor", by_command=False)
+    return len(one.sliding.start) > 0
+
+
+def _proved(
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
+) -> tuple[Refinement, str]:
+    """The refinement, or the plain model where that predicts the held-out position better; and
+    what to say of it."""
+    plain, after = chosen.plain.model, found.model
+    if not (seen and found.choice.steps) or plain.imposed or after.imposed:
+        return found, ""
+    worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
+    if worse is None:
+        return found, ""
+    names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
+    said = (
+        f"the equations call for {names}, but with it the position of the test logs is predicted"
+        f" worse over {worse.seconds:g} s ({worse.before:.3g} -> {worse.after:.3g} times its"
+        " noise): not named"
+    )
+    return Refinement(without_effects(chosen.plain, found.choice), plain), said
 
 
 def _chosen(

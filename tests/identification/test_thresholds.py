@@ -25,7 +25,13 @@ from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.estimation import contradicted
 from identification.estimation.estimates import Events, estimates
-from identification.estimation.fit import is_no_run, leaves_much
+from identification.estimation.fit import (
+    are_few,
+    bends_the_equation,
+    is_no_run,
+    is_unexplained,
+    leaves_much,
+)
 from identification.estimation.gauss_newton import Minimum
 from identification.estimation.recorded_logs import chosen_drive, recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
@@ -42,6 +48,12 @@ from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows
 from identification.estimation.settling import is_adequate
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.surroundings import (
+    apart,
+    explains,
+    larger_than_friction,
+    stands_out,
+)
 from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
@@ -50,6 +62,7 @@ from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
+from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_walk import shows
 from identification.signals.frozen import frozen
@@ -76,6 +89,7 @@ from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
+from identification.tracing.predictive_check import is_worse
 from identification.tracing.recorded_rows import told_by_speed
 from identification.tracing.regression.candidates import EffectCandidate, shaped
 from identification.tracing.regression.significance import by_luck, chance
@@ -739,6 +753,74 @@ def test_gate_margin(monkeypatch: pytest.MonkeyPatch) -> None:
     limit = 0.255 / 3.0
     assert can(0.8 * limit)
     assert not can(1.25 * limit)
+
+
+def test_lag_from() -> None:
+    """Columns so many samples apart, of either sign, are of two instants."""
+    assert not apart(0.32) and not apart(-0.32)
+    assert apart(0.5) and apart(-0.5)
+
+
+def test_surroundings_leave() -> None:
+    """A lag or gravity leaves at most so much of the square."""
+    assert explains(1.0, 0.64)
+    assert not explains(1.0, 1.0)
+    assert explains(1.0, 0.79) and not explains(1.0, 0.81)
+
+
+def test_sure_of_surroundings() -> None:
+    """So many deviations from 0, of either."""
+    assert not stands_out(3.2, 1.0) and not stands_out(-3.2, 1.0)
+    assert stands_out(5.0, 1.0) and stands_out(-5.0, 1.0)
+
+
+def test_beyond_friction() -> None:
+    """By so much of one Coulomb level the other is below 0 where a weight is more than both."""
+    assert not larger_than_friction(30.0, -0.04 * 30.0)
+    assert larger_than_friction(-0.0625 * 30.0, 30.0)
+
+
+def test_worse_than_equation() -> None:
+    """So many times what the equation's own least squares leave, a fit may leave of it."""
+    assert not bends_the_equation(1.04, 1.0) and not bends_the_equation(0.6, 1.0)
+    assert bends_the_equation(1.06, 1.0)
+
+
+def test_most_unexplained() -> None:
+    """A model that leaves more of the force than this has no number to tell."""
+    assert not is_unexplained(0.4)
+    assert is_unexplained(0.625)
+
+
+def test_worse_prediction() -> None:
+    """So many times the plain model's error of the position, effects may leave."""
+    assert not is_worse(10.0, 10.8) and is_worse(10.0, 11.2)
+    assert not is_worse(1.0, 1.4)  # both are noise
+
+
+def contradicted_at(*lengths: int) -> list[BadSamples]:
+    return [
+        BadSamples("a", "u", "spike", float(k), float(k), length, None, "interpolated")
+        for k, length in enumerate(lengths)
+    ]
+
+
+def test_places_set_aside() -> None:
+    """A run that contradicts a log in more places than these is a wrong model."""
+    logs = [seen(made(3))]
+    logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
+    assert are_few(contradicted_at(1, 1, 1, 1), logs)
+    assert are_few(contradicted_at(1, 1, 1, 1, 1), logs)
+    assert not are_few(contradicted_at(1, 1, 1, 1, 1, 1), logs)
+
+
+def test_share_set_aside() -> None:
+    """Nor is more of a log than this share set aside for it."""
+    logs = [seen(made(3))]
+    logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
+    assert len(logs[0].log) == 10_000
+    assert are_few(contradicted_at(8), logs)
+    assert not are_few(contradicted_at(12), logs)
 
 
 def test_every_threshold_has_a_test() -> None:

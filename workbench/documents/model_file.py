@@ -30,6 +30,7 @@ def model_document(model: Model) -> dict[str, Any]:
         key: {name: as_number(value) for name, value in found.items()}
         for key, found in model.effects.items()
     }
+    document["lag"] = None if model.lag is None else as_number(model.lag)
     if model.controller is not None:
         document["controller"] = plain(model.controller)
     return {"schema": document.pop("schema"), **document}

@@ -19,13 +19,16 @@ from identification.arx.residual_tests import residual_tests
 from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
+from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, Estimate, KarnoppFit
 from identification.model.inverse_model import ForceError, Smoothing, force_error
 from identification.model.karnopp import NAMES
-from identification.model.plant import Actuator, Motor, actuator_units, units_of
+from identification.model.plant import Actuator, Motor, actuator_units
+from identification.model.surroundings import Surroundings
+from identification.progress import KeepGoing, without_end
 from identification.signals.differentiate import differentiate
-from identification.tracing.constant_force import constant_force, constant_remark
+from workbench.cards.effect_values import relabelled
 from workbench.cards.parameter_units import friction_units
 from workbench.documents.model import (
     ArxPlant,
@@ -68,9 +71,11 @@ def identify(
     rig: Rig,
     options: Options | None = None,
     on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
 ) -> tuple[Model, KarnoppFit]:
     """The model of one machine from its runs, and the fit it comes from.
 
+    keep_going: whether it is to go on, else the best so far is the model.
     Raises NotIdentifiable where nothing can be told, BadLog where a signal is missing.
     """
     options = options or Options()
@@ -79,13 +84,12 @@ def identify(
         check_period(options.design_period, log.name, log.duration)
         decimation(log.h, options.design_period)
     (alone,) = rng.spawn(1)
-    fit = fit_plant(logs, rng, rig=rig, drive=options.drive, on_progress=on_progress)
-    unit = units_of(rig.motion)["F_cp"]
-    always = None if fit.adequate else constant_force(logs, held=rig.kind == "motor")
+    fit = fit_plant(
+        logs, rng, rig=rig, drive=options.drive, on_progress=on_progress, keep_going=keep_going
+    )
     if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
-        why = f"m: {first}" if always is None else constant_remark(always, unit)
-        raise NotIdentifiable(f"none of the nine parameters is identifiable: {why}")
+        raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
     plant, reason = _arx_or_reason(logs, options)
     model = Model(
         card=card,
@@ -96,22 +100,35 @@ def identify(
         plant_reason=reason,
         fit=_summary(
             fit,
-            _force_error(logs[0], fit, rig),
-            [] if always is None else [constant_remark(always, unit)],
+            _force_error(fit.surroundings.taken_out(logs[0]), fit, rig),
             closed_loop_remarks(logs),
         ),
         log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
         versions=versions(),
         correlation=_correlation(fit),
+        effects=surrounding_effects(fit.surroundings, rig),
+        lag=lag_estimate(fit.surroundings),
     )
     known = with_own_logs(model_in_force(model, ""), logs, alone)
     return replace(model, own_logs=known.own_logs), fit
 
 
-def _summary(
-    fit: KarnoppFit, errors: ForceError | None, always: Sequence[str], closed: Sequence[str]
-) -> FitSummary:
-    """What the fit left; always, closed: lines on a constant force and on closed loops."""
+def surrounding_effects(around: Surroundings, rig: Rig) -> Mapping[str, Mapping[str, Estimate]]:
+    """What acts beside the applied force as a model's effects, under the machine's own units."""
+    known = surrounding_estimates(around)
+    return {
+        one.key: relabelled(
+            one.effect,
+            {p.name: known[f"{one.key}.{p.name}"] for p in one.effect.params},
+            rig.motion,
+            rig.command_unit,
+        )
+        for one in around.effects
+    }
+
+
+def _summary(fit: KarnoppFit, errors: ForceError | None, closed: Sequence[str]) -> FitSummary:
+    """What the fit left; closed: lines on closed loops."""
     return FitSummary(
         drive=fit.drive,
         stiffness=0.0,
@@ -122,7 +139,7 @@ def _summary(
         evaluations=fit.evaluations,
         force_relative=errors.relative if errors else None,
         force_rms=errors.rms if errors else None,
-        remarks=(*fit.remarks, *always, *closed),
+        remarks=(*fit.remarks, *closed),
         command_period=fit.command_period,
     )
 

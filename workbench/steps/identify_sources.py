@@ -8,6 +8,7 @@ import numpy as np
 from identification.estimation.estimates import NORMAL_95, told_estimate
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
+from identification.progress import KeepGoing, without_end
 from workbench.documents.model import Model
 from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
@@ -15,6 +16,7 @@ from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
 from workbench.steps.present import present_of_card
 from workbench.steps.runs_tell import runs_tell
+from workbench.steps.surrounding_lines import surrounding_lines
 
 if TYPE_CHECKING:
     from identification.estimation.posterior import Posterior
@@ -43,9 +45,11 @@ def identify_sources(
     *,
     posterior: bool = False,
     on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
 ) -> Identified:
     """The model of the machine that the sources are of.
 
+    keep_going: whether it is to go on, else the best so far is the model.
     Raises NotIdentifiable where the logs tell nothing, BadLog where a signal is missing.
     """
     options = options or Options()
@@ -57,6 +61,7 @@ def identify_sources(
         rig=sources.rig,
         options=options,
         on_progress=on_progress,
+        keep_going=keep_going,
     )
     now = present_of_card(sources.card, sources.rig, model.period)
     bad = (*sources.bad, *fit.bad)
@@ -64,7 +69,10 @@ def identify_sources(
     walk = _walk(sources, fit, seed, on_progress) if posterior else None
     if walk is not None:
         model = replace(model, posterior=_posterior(walk, fit))
-    remarks = (*sources.remarks, *model_remarks(model), *broken_promises(model))
+    remarks = (
+        *surrounding_lines(fit.surroundings, sources.rig),
+        *sources.remarks, *model_remarks(model), *broken_promises(model),
+    )  # fmt: skip
     return Identified(model, fit, sources.runs, remarks, walk)
 
 
@@ -93,9 +101,10 @@ def _walk(
     from identification.estimation.posterior import sample_posterior
 
     report = on_progress or (lambda _stage, _share: None)
+    around = fit.surroundings
     return sample_posterior(
-        fit,
-        [source.log for source in sources.runs],
+        replace(fit, effects=() if not around.none else fit.effects),
+        [around.taken_out(source.log) for source in sources.runs],
         np.random.default_rng(seed),
         rig=sources.rig,
         on_progress=lambda share: report("posterior", share),

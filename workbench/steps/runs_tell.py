@@ -14,15 +14,16 @@ from identification.estimation.recorded_logs import (
 )
 from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
 from identification.estimation.regression.three_step import first_estimate
+from identification.estimation.surroundings import surroundings
 from identification.experiment.identifiability import tellable_effects
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
-from identification.model.plant import units_of
+from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
 from identification.thresholds import LINEAR_ACTUATOR
-from identification.tracing.constant_force import constant_force, constant_remark
 from workbench.documents.model import Told
+from workbench.steps.surrounding_lines import surrounding_lines
 from workbench.steps.told_by_log import Ways, told_by, ways_of
 
 
@@ -40,6 +41,7 @@ class RunsTell:
     reason: str = ""
     remarks: tuple[str, ...] = ()
     effects: Mapping[str, float] | None = None
+    surroundings: Surroundings = NO_SURROUNDINGS
 
 
 def runs_tell(
@@ -55,6 +57,8 @@ def runs_tell(
         if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
             rig = replace(rig, force_per_command=1.0)
+        around = surroundings(runs, rig)
+        runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
         m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
     except (BadLog, NotIdentifiable) as error:
@@ -68,12 +72,11 @@ def runs_tell(
         )
     except NotIdentifiable as error:
         return RunsTell(motion, ways, reason=str(error))
-    always = constant_force(recorded.plain, held=recorded.held)
-    said = () if always is None else (constant_remark(always, units_of(rig.motion)["F_cp"]),)
     shown = None
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
-    return RunsTell(motion, ways, told, remarks=said, effects=shown)
+    said = surrounding_lines(around, rig)
+    return RunsTell(motion, ways, told, remarks=said, effects=shown, surroundings=around)
 
 
 def _actuator_follows(recorded: RecordedLogs) -> bool | None:

@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.estimation.surroundings import lag_estimate
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
@@ -24,8 +25,9 @@ from workbench.documents.plausible import model_remarks
 from workbench.documents.versions import versions
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
-from workbench.steps.identify import arx_plant, speed_of
+from workbench.steps.identify import arx_plant, speed_of, surrounding_effects
 from workbench.steps.present import present_of_card
+from workbench.steps.surrounding_lines import surrounding_lines
 
 TRACE_SCHEMA = "trace/1"
 Progress = Callable[[str, float], None]
@@ -91,7 +93,10 @@ def trace_sources(
         on_progress=on_progress,
         keep_going=keep_going,
     )
-    remarks = (*train.remarks, *(test.remarks if test else ()), *_held_out(train))
+    remarks = (
+        *surrounding_lines(found.surroundings, train.rig),
+        *train.remarks, *(test.remarks if test else ()), *_held_out(train),
+    )  # fmt: skip
     model = traced_model(found, train, library)
     bad = (*train.bad, *(test.bad if test else ()))
     now = present_of_card(train.card, train.rig, model.period)
@@ -149,7 +154,11 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
         ),
         log=tuple(_entry(source, errors, chi) for source in sources.runs),
         versions=versions(),
-        effects={e.effect.key: effect_estimates(e, rig) for e in found.effects},
+        effects={
+            **surrounding_effects(found.surroundings, rig),
+            **{e.effect.key: effect_estimates(e, rig) for e in found.effects},
+        },
+        lag=lag_estimate(found.surroundings),
         library=library,
     )
 
@@ -213,6 +222,7 @@ def trace_document(traced: Traced) -> dict[str, Any]:
             }
             for e in found.effects
         ],
+        **_surroundings(traced),
         "curves": [_curve(one) for one in found.curves],
         "rivals": [asdict(rival) for rival in found.rivals],
         "unknown": {
@@ -231,6 +241,18 @@ def trace_document(traced: Traced) -> dict[str, Any]:
         "bad_samples": [one.as_json() for one in traced.bad],
         "remarks": [*traced.remarks, *found.remarks],
         "versions": versions(),
+    }
+
+
+def _surroundings(traced: Traced) -> dict[str, Any]:
+    """Gravity, constant force and lag, which the plain model has; null where none shows."""
+    model = traced.model
+    gravity, force = model.effects.get("gravity"), model.effects.get("constant_force")
+    shown = not traced.trace.surroundings.none
+    return {
+        "gravity": _numbers(gravity) if gravity and shown else None,
+        "constant_force": as_number(force["F_0"]) if force and shown else None,
+        "lag": None if model.lag is None else as_number(model.lag),
     }
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray, IntArray
 
+OVERLAP = 2.5  # rows that share samples are worth one in so many
 BLOCKS = 8  # stretches of a log that are left out in turn
 NEVER_NEGATIVE = frozenset({"m", "F_vp", "F_vn"})  # a constant force may bring either F_c below 0
 

@@ -1,0 +1,256 @@
+"""What every real machine has beside friction: a constant force, gravity, columns of two instants.
+
+The equation of motion in weak form, over windows of sliding in one direction (N):
+    F(t - lag) + F_0 - a sin y - b cos y = m y'' + (+-)F_c + F_v y'
+lag: by how much the motion follows the column of the force (either sign: a position that is read
+late, or a current that its drive filters); gravity of a rotary machine alone. They belong to the
+plain model: what they make of the force is taken out before anything else is fitted, each where
+the equation shows it beyond doubt, so that it costs nothing where it is zero.
+Sources: weak form, see `signals/weak_form`; gravity and constant force as terms of the inverse
+dynamic model, Gautier, Khalil, CDC 1988.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.errors import NotIdentifiable, UserError
+from identification.estimation.estimates import of_effect, told_estimate
+from identification.estimation.regression.equation_rows import (
+    MotionLog,
+    mechanical,
+    motion_log,
+)
+from identification.estimation.regression.weighted_rows import BLOCKS, OVERLAP
+from identification.log import Log, Rig
+from identification.model.estimates import Estimate
+from identification.model.surroundings import NO_SURROUNDINGS, NOT_SHOWN, Size, Surroundings
+from identification.thresholds import (
+    BEYOND_FRICTION,
+    LAG_FROM,
+    SURE_OF_SURROUNDINGS,
+    SURROUNDINGS_LEAVE,
+)
+
+LAG_STEP = 0.25  # of a sample, between the lags that are tried
+LEAD, LAG = -6.0, 12.0  # samples, between which they are
+FEWEST_WINDOWS = 40  # windows of sliding
+SLOWEST_PART = 0.3  # of the windows, in which the body may be within its stick band
+TURNS = 0.3  # rad of motion, from which gravity is no constant force
+PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
+SPRING = (*PLAIN, 5)  # with the angle itself
+GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
+NO_FIRST = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is known
+
+
+@dataclass(frozen=True, eq=False)
+class _Squares:
+    """Products of the equation's columns X with themselves (k, c, c) and with the force at every
+    lag (k, c, l), and its squares (k, l), of each block; lags in samples (l,);
+    rows: of all."""
+
+    columns: Array
+    with_force: Array
+    force: Array
+    lags: Array
+    rows: int
+
+    def left(self, kept: BoolArray, used: Sequence[int]) -> tuple[Array, Array]:
+        """Square left at every lag (l,) and coefficients (c, l), of these blocks and columns."""
+        at = np.asarray(used)
+        G = np.sum(self.columns[kept], axis=0)[np.ix_(at, at)]
+        size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+        c = np.sum(self.with_force[kept], axis=0)[at] / size[:, np.newaxis]
+        theta = np.linalg.pinv(G / np.outer(size, size), rcond=1e-10, hermitian=True) @ c
+        square = np.sum(self.force[kept], axis=0) - np.sum(c * theta, axis=0)
+        return np.maximum(square, 1e-300), theta / size[:, np.newaxis]
+
+    def least(self, used: Sequence[int]) -> float:
+        """Square left at the best lag, of all blocks and these columns."""
+        return float(np.min(self.left(np.ones(len(self.force), dtype=bool), used)[0]))
+
+
+def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
+    """What acts beside the applied force in logs of one machine, with y [m] and F [N].
+
+    Nothing where too little of their motion slides to tell.
+    """
+    held = rig.kind == "motor"
+    try:
+        moved = [motion_log(log, held=held, by_command=False) for log in logs]
+    except UserError:
+        return NO_SURROUNDINGS
+    turns = rig.motion == "rotary" and max(float(np.ptp(log["y"])) for log in logs) > TURNS
+    found = _squares(moved, turns, held)
+    if found is None:
+        return NO_SURROUNDINGS
+    used = GRAVITY if turns and _has_gravity(found) else PLAIN
+    lag, sampled = _lag(found, used), False
+    if held and lag.value:
+        current = _squares(moved, turns, held=False)
+        other = _lag(current, used) if current else NOT_SHOWN
+        sampled = bool(other.value) and current.least(used) < found.least(used)
+        lag, found = (other, current) if sampled else (lag, found)
+    theta, sd = _with_spread(found, used, lag.value)
+    force = sine = cosine = NOT_SHOWN
+    if used is GRAVITY:
+        sine, cosine = (Size(float(theta[i]), float(sd[i])) for i in (-2, -1))
+    up, down = float(theta[1]), float(theta[2])
+    if larger_than_friction(up, down):
+        force = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
+    h = logs[0].h
+    gives = rig.force_per_command if held else None
+    return Surroundings(Size(lag.value * h, lag.sd * h), force, sine, cosine, gives, sampled)
+
+
+def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
+    """Each with its interval, as key.name of the effect that it is."""
+    deviations = {
+        "gravity.a": around.sine.sd, "gravity.b": around.cosine.sd,
+        "constant_force.F_0": around.force.sd, "input_delay.tau": around.lag.sd,
+    }  # fmt: skip
+    return {
+        f"{acting.key}.{p.name}": of_effect(
+            p, acting.values[p.name], deviations.get(f"{acting.key}.{p.name}")
+        )
+        for acting in around.effects
+        for p in acting.effect.params
+    }
+
+
+def lag_estimate(around: Surroundings) -> Estimate | None:
+    """By how much the motion follows the column of the force [s]; None where it does not."""
+    if not around.lag.value:
+        return None
+    return told_estimate(around.lag.value, "s", around.lag.sd)
+
+
+def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:
+    """What the equation leaves of the force without the lag and with it [N], root mean squares.
+
+    Of these logs' own coefficients. Raises NotIdentifiable where too little of them slides.
+    """
+    held = rig.kind == "motor" and not around.sampled
+    moved = [motion_log(log, held=held, by_command=False) for log in logs]
+    found = _squares(moved, bool(around.sine.value or around.cosine.value), held)
+    if found is None:
+        raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_WINDOWS} windows of sliding")
+    used = GRAVITY if around.sine.value or around.cosine.value else PLAIN
+    left = found.left(np.ones(len(found.force), dtype=bool), used)[0]
+    at = (0.0, around.lag.value / logs[0].h)
+    without, with_it = (np.sqrt(np.interp(lag, found.lags, left) / found.rows) for lag in at)
+    return float(without), float(with_it)
+
+
+def _has_gravity(found: _Squares) -> bool:
+    """Whether the force goes by the sine of the angle, surely, for much of what is left without,
+    and no worse than by the angle itself, as a spring's would."""
+    plain, spring, weight = (found.least(used) for used in (PLAIN, SPRING, GRAVITY))
+    if not explains(plain, weight) or weight > spring:
+        return False
+    theta, sd = _with_spread(found, GRAVITY, 0.0)
+    return stands_out(*(float(np.hypot(x[-2], x[-1])) for x in (theta, sd)))
+
+
+def explains(without: float, left: float) -> bool:
+    """Whether a term that leaves this of a square, in place of that without it, explains it."""
+    return left <= SURROUNDINGS_LEAVE * without
+
+
+def stands_out(size: float, sd: float) -> bool:
+    """Whether a size is surely not 0."""
+    return abs(size) > SURE_OF_SURROUNDINGS * sd
+
+
+def larger_than_friction(up: float, down: float) -> bool:
+    """Whether a constant force makes one of the Coulomb levels negative, which friction cannot."""
+    return min(up, down) < -BEYOND_FRICTION * max(abs(up), abs(down))
+
+
+def apart(lag: float) -> bool:
+    """Whether columns so many samples apart are of two instants."""
+    return abs(lag) >= LAG_FROM
+
+
+def _lag(found: _Squares, used: Sequence[int]) -> Size:
+    """The lag in samples, nothing where none shows beyond doubt."""
+    every = np.ones(len(found.force), dtype=bool)
+    left, theta = found.left(every, used)
+    best = int(np.argmin(left))
+    without = float(left[int(np.argmin(np.abs(found.lags)))])
+    if best in (0, len(left) - 1) or theta[0, best] <= 0.0:
+        return NOT_SHOWN
+    lag = _lowest(found.lags, left)
+    if not apart(lag) or not explains(without, float(left[best])):
+        return NOT_SHOWN
+    each = [_lowest(found.lags, found.left(_but(every, k), used)[0]) for k in range(len(every))]
+    # By blocks, and by how sharp the minimum is: windows share samples, and with them their noise.
+    i = int(np.clip(best, 1, len(left) - 2))
+    bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / LAG_STEP**2, 1e-300)
+    by_likelihood = float(np.sqrt(2.0 * left[best] / (bend * found.rows / OVERLAP)))
+    sd = max(float(_spread(np.array(each))), by_likelihood)
+    return Size(lag, sd) if stands_out(lag, sd) else NOT_SHOWN
+
+
+def _lowest(lags: Array, left: Array) -> float:
+    """Lag of the least square, by the parabola through the lowest three."""
+    i = int(np.clip(np.argmin(left), 1, len(left) - 2))
+    low, middle, high = (float(x) for x in left[i - 1 : i + 2])
+    bend = low - 2.0 * middle + high
+    return float(lags[i]) + (0.5 * LAG_STEP * (low - high) / bend if bend > 0.0 else 0.0)
+
+
+def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Array, Array]:
+    """Coefficients (c,) at a lag in samples, and their deviations by leaving out blocks."""
+    every = np.ones(len(found.force), dtype=bool)
+
+    def of(kept: BoolArray) -> Array:
+        theta = found.left(kept, used)[1]
+        return np.array([np.interp(lag, found.lags, one) for one in theta])
+
+    return of(every), _spread(np.array([of(_but(every, k)) for k in range(len(every))]))
+
+
+def _but(every: BoolArray, k: int) -> BoolArray:
+    """All blocks but one."""
+    return every & (np.arange(len(every)) != k)
+
+
+def _spread(each: Array) -> Array:
+    """Standard deviations of estimates (k, ...), each made without one of k blocks."""
+    n, off = len(each), each - np.mean(each, axis=0)
+    return np.asarray(np.sqrt((n - 1) / n * np.sum(off**2, axis=0)))
+
+
+def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | None:
+    """The equation's rows at every lag, by blocks of time; None where there are too few.
+
+    held: the force's column stays until the next sample.
+    """
+    if not any(len(one.speed) for one in moved):
+        return None
+    lags = np.arange(LEAD, LAG + LAG_STEP / 2, LAG_STEP)
+    own, cross, square, rows = [], [], [], 0
+    slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
+    for one in moved:
+        w, plain = one.sliding, mechanical(one, NO_FIRST)
+        mean = w.held if held else w.mean
+        at, F, y = np.arange(len(one.log)), np.asarray(one.log["F"]), np.asarray(one.log["y"])
+        X = plain.X
+        if turns:
+            X = np.column_stack([X, w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y)])
+        B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in lags])
+        inside = (w.start >= LAG) & (w.start + w.length < len(F) + LEAD) & (plain.speed >= slow)
+        for k in range(BLOCKS):
+            in_block = inside & (plain.block == k)
+            if np.any(in_block):
+                x, b = X[in_block], B[in_block]
+                own.append(x.T @ x)
+                cross.append(x.T @ b)
+                square.append(np.sum(b**2, axis=0))
+                rows += len(b)
+    if rows < FEWEST_WINDOWS:
+        return None
+    return _Squares(np.array(own), np.array(cross), np.array(square), lags, rows)

@@ -1,0 +1,106 @@
+"""Gravity, a constant force and columns of two instants are found, with what friction is beside."""
+
+import numpy as np
+import pytest
+
+from identification.effects._library import built_in
+from identification.estimation.fit import fit_plant
+from identification.estimation.surroundings import lag_estimate, surroundings
+from identification.log import Log, Rig
+from identification.model.karnopp import Karnopp
+from identification.model.plant import Plant
+from identification.model.surroundings import NO_SURROUNDINGS, Size, Surroundings
+from identification.simulation.free_run import free_run
+from tests.identification.motor_logs import K_A, NINE, made
+from tests.identification.plants import made_log, table
+
+ROD = Karnopp(0.15, 0.3, 0.3, 0.05, 0.05, 0.01, -0.01, 0.36, -0.36)
+TURNING = Rig("force", motion="rotary")
+MOTOR = Rig("motor", force_per_command=K_A)
+
+
+def pendulum(seed: int, a: float, b: float = 0.0, seconds: float = 20.0) -> Log:
+    """A rod pushed to and fro by a torque that is measured; a sin y + b cos y pulls at it."""
+    h = 2e-3
+    t = h * np.arange(round(seconds / h), dtype=np.float64)
+    rng = np.random.default_rng(seed)
+    pulls = ((0.25, 1.6), (0.6, 1.2), (1.3, 0.8))
+    F = sum(size * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f, size in pulls)
+    blank = Log("rod", {"t": t, "y": np.zeros(len(t)), "F": np.asarray(F)})
+    weight = built_in()["gravity"].acting({"a": a, "b": b})
+    run = free_run(Plant(ROD, None, (weight,)), blank, (0.0, 0.0, float(F[0])), "force")
+    noise = rng.standard_normal((2, len(t)))
+    return blank.with_signals(y=run.y + 1e-4 * noise[0], F=F + 5e-3 * noise[1])
+
+
+@pytest.mark.parametrize(("a", "b"), [(3.0, 0.0), (2.0, 1.5)])
+def test_gravity_is_found_with_its_interval(a: float, b: float) -> None:
+    found = surroundings([pendulum(1, a, b)], TURNING)
+    assert found.sine.value == pytest.approx(a, abs=4.0 * found.sine.sd + 0.01)
+    assert found.cosine.value == pytest.approx(b, abs=4.0 * found.cosine.sd + 0.01)
+    assert found.sine.sd < 0.05
+
+
+def test_a_rod_without_weight_has_none() -> None:
+    assert surroundings([pendulum(2, 0.0)], TURNING).none
+
+
+def test_a_linear_machine_has_no_gravity_by_angle() -> None:
+    found = surroundings([pendulum(1, 3.0)], Rig("force"))
+    assert found.sine == found.cosine == Size()
+
+
+@pytest.mark.parametrize("samples", [-4.0, 4.0, 6.0])
+def test_columns_of_two_instants_are_found(samples: float) -> None:
+    log = made(4)
+    at = np.arange(len(log))
+    early = np.interp(at + samples, at, log["u"])  # whose effect comes so much later
+    late = log.with_signals(u=early, F=K_A * early)
+    found = surroundings([late], MOTOR)
+    assert found.lag.value == pytest.approx(samples * log.h, abs=3.0 * found.lag.sd)
+    assert found.lag.sd < 0.5 * log.h
+    told = lag_estimate(found)
+    assert told is not None and told.low is not None and told.high is not None
+    assert told.low < told.high
+
+
+@pytest.mark.parametrize("force", [-60.0, 60.0])
+def test_a_weight_larger_than_friction_is_taken_out(force: float) -> None:
+    log = made(3)
+    pulled = log.with_signals(F=log["F"] - force, u=log["u"] - force / K_A)
+    found = surroundings([pulled], MOTOR)
+    assert found.force.value == pytest.approx(force, abs=0.5 * abs(NINE.F_cp - NINE.F_cn) + 0.5)
+    freed = found.taken_out(pulled)
+    assert freed["F"] == pytest.approx(pulled["F"] + found.force.value)
+    assert freed["u"] == pytest.approx(freed["F"] / K_A)
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 4, 5, 6])
+def test_nothing_is_found_where_there_is_nothing(seed: int) -> None:
+    assert surroundings([made(seed)], MOTOR).none
+    assert surroundings([made_log(table(1), seed, seconds=8.0)], Rig("force")).none
+
+
+def test_what_is_not_there_changes_no_log() -> None:
+    log = made(1)
+    assert NO_SURROUNDINGS.taken_out(log) is log
+    assert NO_SURROUNDINGS.effects == ()
+
+
+def test_a_shifted_log_loses_the_samples_whose_force_is_not_known() -> None:
+    log = made(1, n=500)
+    later = Surroundings(lag=Size(2.5 * log.h), gives=K_A).taken_out(log)
+    earlier = Surroundings(lag=Size(-2.5 * log.h), gives=K_A).taken_out(log)
+    assert len(later) == len(earlier) == 497
+    assert later["t"][0] == log["t"][3] and earlier["t"][-1] == log["t"][496]
+    assert later["F"][0] == pytest.approx(0.5 * (log["F"][0] + log["F"][1]))
+    assert [one.key for one in Surroundings(lag=Size(0.01), gives=K_A).effects] == ["input_delay"]
+    assert Surroundings(lag=Size(-0.01), gives=K_A).effects == ()
+
+
+def test_friction_is_told_beside_gravity() -> None:
+    fit = fit_plant([pendulum(3, 3.0)], np.random.default_rng(1), rig=TURNING)
+    assert fit.estimates["gravity.a"].value == pytest.approx(3.0, rel=0.01)
+    for name, true in (("m", 0.15), ("F_cp", 0.3), ("F_cn", 0.3)):
+        assert fit.estimates[name].value == pytest.approx(true, rel=0.05), name
+    assert [one.key for one in fit.effects] == ["gravity"]

@@ -1,0 +1,43 @@
+"""In words: gravity, a constant force, a position and a force that are not of one instant."""
+
+import math
+
+from identification.estimation.estimates import NORMAL_95
+from identification.log import Rig
+from identification.model.plant import units_of
+from identification.model.surroundings import Size, Surroundings
+from workbench.cards.readable import number
+
+MS = 1e3
+
+
+def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
+    """A line on each that shows in the logs; all of them are in the model."""
+    unit, lines = units_of(rig.motion)["F_cp"], []
+    if around.sine.value or around.cosine.value:
+        size = math.hypot(around.sine.value, around.cosine.value)
+        rest = math.atan2(-around.cosine.value, around.sine.value)
+        lines.append(
+            f"gravity: {number(size)} {unit} at most ({_interval(around.sine)} {unit} by the sine"
+            f" of the angle), hanging at {number(rest, 2)} rad"
+        )
+    if around.force.value:
+        lines.append(
+            f"constant force: {number(around.force.value)} {unit} ({_interval(around.force)}) acts"
+            " beside the applied one and is larger than friction (a weight, a tilt, a sensor's"
+            " offset, a wrong area or supply pressure): F_cp and F_cn are told beside it, as equal"
+        )
+    if around.lag.value:
+        lag, behind = around.lag, around.lag.value > 0.0
+        what = "command" if around.gives else "force"
+        lines.append(
+            f"the position of a row is {'older' if behind else 'newer'} than its {what} by"
+            f" {number(MS * abs(lag.value))} ms"
+            f" ({_interval(Size(MS * abs(lag.value), MS * lag.sd))}): taken into account"
+        )
+    return tuple(lines)
+
+
+def _interval(of: Size) -> str:
+    low, high = (of.value + sign * NORMAL_95 * of.sd for sign in (-1.0, 1.0))
+    return f"{number(low)} to {number(high)}"
