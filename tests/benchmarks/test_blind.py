@@ -33,6 +33,7 @@ def test_a_run_from_case_to_table(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "spring" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_the_tracing_process_cannot_open_a_truth(tmp_path: Path) -> None:
     (tmp_path / "truth.json").write_text("{}", encoding="utf-8")
     script = (

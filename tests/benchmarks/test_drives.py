@@ -86,6 +86,7 @@ def test_the_packages_run_of_the_truth_is_the_log(family: str) -> None:
     assert np.mean(np.abs(run.F - motion[2])) < 1e-4 * one.coulomb
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("effect", "values"),
     [

@@ -58,6 +58,7 @@ def test_recipe_card_reads_its_own_log(name: str) -> None:
     assert len(card.recipe.t) == (30001 if name == "demo" else 40001)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("name", "file"), FILES)
 def test_file_reads_to_plausible_values(
     name: str, file: str, workbench_data: Path, monkeypatch: pytest.MonkeyPatch

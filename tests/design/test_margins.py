@@ -38,6 +38,7 @@ def test_printed_controller_has_the_known_margins(paper: tuple[Array, Array, RST
         assert getattr(found, name) == pytest.approx(wanted["value"], abs=wanted["tolerance"])
 
 
+@pytest.mark.slow
 @given(plant(4), st.floats(2, 60), st.floats(0.2, 1.2), st.booleans())
 @settings(max_examples=25)
 def test_margins_agree_with_a_dense_grid_and_with_the_poles(

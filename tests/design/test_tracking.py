@@ -129,6 +129,7 @@ def test_where_none_keeps_the_overshoot_the_least_is_taken_and_told() -> None:
     assert any("a step overshoots by" in said for said in found.missed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("m", "f"), [(1.0, 250.0), (3.5, 288.0), (6.5, 130.0)])
 def test_tuned_loops_overshoot_little_and_follow(m: float, f: float) -> None:
     plant = linear_plant(m, f, H, ACTUATOR, force_gains(ACTUATOR, H / 10), 10)

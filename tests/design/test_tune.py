@@ -18,6 +18,7 @@ def plant(m: float, f: float) -> tuple[Array, Array]:
     return linear_plant(m, f, H, ACTUATOR, force_gains(ACTUATOR, H / 10), 10)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("m", "f"), [(1.0, 250.0), (3.5, 288.0), (6.5, 130.0)])
 def test_defaults_keep_the_goals_on_the_paper_s_plants(m: float, f: float) -> None:
     A, B = plant(m, f)

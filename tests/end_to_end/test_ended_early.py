@@ -53,6 +53,7 @@ def interrupted(shop: Path, here: Path, times: int) -> subprocess.CompletedProce
     return subprocess.run(command, cwd=here, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("asks", [0, 5, 60, 700])
 def test_a_budget_gives_whole_files_that_say_so(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str],

@@ -68,6 +68,7 @@ def test_every_subcommand_has_help_with_an_example(
     assert "--json" in shown and "--registry" in shown
 
 
+@pytest.mark.slow
 def test_add_promote_and_roll_back(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     filled(capsys)
     (machine,) = done(capsys, "registry", "list")["machines"]

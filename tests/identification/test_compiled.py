@@ -109,6 +109,7 @@ def result(module: Any) -> tuple[float, bool]:
     return out, bool(hits)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "before", "after", "expected"),
     [

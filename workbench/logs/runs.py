@@ -4,7 +4,7 @@ import hashlib
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from identification.arrays import Array, frozen
 from identification.errors import BadCard, BadLog
 from identification.log import Log
 from identification.signals.clean import Prepared, Repaired, applied_force, check, prepare, repair
+from identification.signals.renewal import renewed
 from identification.signals.thin import LONGEST_UNTHINNED, thinned
 from workbench.cards.card import Card
 from workbench.cards.card_tables import SignalSpec
@@ -71,6 +72,9 @@ def read_runs(path: Path, card: Card) -> Prepared:
 def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     """As `read_runs`, of a table; path: what the run and the messages are called by."""
     raw = _signals_of(table, path, card)
+    period = raw.log.h
+    fresh = renewed(raw.log)
+    raw = replace(raw, log=fresh.log, remarks=(*raw.remarks, *fresh.remarks))
     first_row, read = raw.first_row, raw.remarks
     repaired = _repaired(raw, path, card)
     del raw  # of a long log a gigabyte
@@ -82,7 +86,7 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    return Prepared(prepared.runs, remarks, bad, repaired.log.h)
+    return Prepared(prepared.runs, remarks, bad, period if fresh.remarks else repaired.log.h)
 
 
 def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:

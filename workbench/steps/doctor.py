@@ -28,6 +28,7 @@ from identification.signals.clean import (
 from identification.signals.differentiate import Motion, low_pass, resolution
 from identification.signals.noise import local_noise
 from identification.signals.relations import command_lag, lead
+from identification.signals.renewal import renewed
 from identification.signals.thin import thinned
 from workbench.cards.card import Card
 from workbench.cards.units import conversion
@@ -148,12 +149,13 @@ def looked(path: Path, card: Card) -> Looked:
     bad, remarks = list[BadSamples](), list[str]()
     runs: tuple[Log, ...]
     try:
-        repaired = repair(raw, first_row, rotary=rig.motion == "rotary")
+        fresh = renewed(raw)
+        repaired = repair(fresh.log, first_row, rotary=rig.motion == "rotary")
         bad += repaired.bad
         slower = thinned(repaired.log)
         prepared = prepare(with_force(slower.log, path, card), rig, first_row)
         runs = prepared.runs
-        remarks += [*slower.remarks, *prepared.remarks]
+        remarks += [*fresh.remarks, *slower.remarks, *prepared.remarks]
     except BadLog as error:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)

@@ -426,6 +426,7 @@ def test_a_refused_chunk_leaves_no_trace() -> None:
     np.testing.assert_allclose(accumulator.factor().R, whole.R, rtol=1e-12, atol=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("noise", [1e-6, 1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("seed", range(5))
 def test_the_papers_order_and_delay_are_found(noise: float, seed: int) -> None:
@@ -454,6 +455,7 @@ def test_the_papers_order_without_noise_and_in_simulation() -> None:
 RANGES = ((0, 2), (1, 3), (1, 4), (0, 6))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(20))
 def test_random_plants_are_found(seed: int) -> None:
     rng = np.random.default_rng(seed)

@@ -86,6 +86,7 @@ def test_it_is_the_written_equation(key: str) -> None:
     assert size > 10.0 * error
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("key", "wrong"),
     [

@@ -130,6 +130,7 @@ def test_an_angle_modulo_a_turn_is_unwrapped_exactly() -> None:
     assert prepare(log.with_signals(y=np.unwrap(turns)), ROTARY).bad == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("h", [2e-2, 5e-3, 1e-3, 1e-4])
 @pytest.mark.parametrize("count", [0.0, 1e-6, 1e-5, 1e-4, 1e-3])
 @pytest.mark.parametrize("noise", [0.0, 1e-5, 1e-4])

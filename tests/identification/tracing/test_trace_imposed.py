@@ -62,6 +62,7 @@ def traced(train: Sequence[Log], test: Sequence[Log]) -> Trace:
     return trace(train, test, RIG, built_in(), np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_slow_strokes_count_as_fast_ones_do() -> None:
     # At 7 bar the rig is so slow that a quick derivative hardly tells its direction.
     at = ((1, 13e-3), (5, 9e-3), (7, 6e-3))
@@ -79,6 +80,7 @@ def test_slow_strokes_count_as_fast_ones_do() -> None:
     assert any("too alike" in remark and "stribeck" in remark for remark in found.remarks)
 
 
+@pytest.mark.slow
 def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     def falls(v: Array) -> Array:
         return np.asarray(2.0 * np.exp(-((v / 6e-3) ** 2)))
@@ -90,6 +92,7 @@ def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     assert not any("too alike" in remark for remark in found.remarks)
 
 
+@pytest.mark.slow
 def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
     one, other = (strokes(bar, [1.5e-3] * 4, bar, stroke=0.005) for bar in (1, 2))
     found = traced([one], [other])
@@ -102,6 +105,7 @@ def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
         )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_test_logs_are_recorded_as_the_training_logs_are() -> None:
     one = strokes(1, [1.5e-3] * 4, 1, stroke=0.005)  # sure of its direction only as a rig's
     found = traced([one], [one])
@@ -181,6 +185,7 @@ def test_rest_between_strokes_is_not_smoothed_away(rate: float) -> None:
     assert imposed.signals["v"] == pytest.approx(free.signals["v"])
 
 
+@pytest.mark.slow
 def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
     train = [strokes(1, [speed] * 4, 1) for speed in (4e-3, 5e-3)]
     slower = strokes(5, [3e-3] * 4, 3)  # slower than any that was learned from, at more pressure

@@ -102,6 +102,7 @@ def test_masses_and_accelerations_of_no_machine() -> None:
     assert "m in place of mm would make it" in slow
 
 
+@pytest.mark.slow
 def test_a_stored_log_and_a_design_that_are_off() -> None:
     model = scaled()
     off = replace(model, log=(replace(model.log[0], h=1.0, travel=(-20.0, 20.0), speed=50.0),))

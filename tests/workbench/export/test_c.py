@@ -67,6 +67,7 @@ def driven(code: ctypes.CDLL, inputs: Array) -> Array:
     return out
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiler", ["gcc", "clang"])
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("controller", ["rst", "pid"])

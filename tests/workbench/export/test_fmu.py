@@ -41,6 +41,7 @@ def test_it_is_valid(name: str, compensated: bool, tmp_path: Path) -> None:
     assert validate_fmu(str(packed(name, tmp_path, compensated=compensated))) == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", ["limited", "paper_table2", "emps"], indirect=True)
 @pytest.mark.parametrize("part", [1, 2])
 def test_it_gives_the_simulations_commands(

@@ -18,6 +18,7 @@ def blocks(name: str, precision: Precision = "double", controller: str = "rst") 
     return Blocks(source)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("controller", ["rst", "pid"])
 def test_the_block_gives_what_the_simulation_gave(name: str, controller: str) -> None:

@@ -96,6 +96,7 @@ def test_what_a_killed_run_had_noted_is_not_done_again(cluster: Cluster, tmp_pat
     assert len(verdicts(tmp_path)) == 6
 
 
+@pytest.mark.slow
 def test_a_log_that_kills_its_workers_fails_alone(cluster: Cluster, tmp_path: Path) -> None:
     logs = [*LOGS[:3], log_of(DEADLY), *LOGS[3:]]
     done = run(cluster, tmp_path, die_of_some, logs)
@@ -106,6 +107,7 @@ def test_a_log_that_kills_its_workers_fails_alone(cluster: Cluster, tmp_path: Pa
     assert verdicts(tmp_path)[DEADLY] == "failed"
 
 
+@pytest.mark.slow
 def test_a_lost_worker_costs_nothing(cluster: Cluster, tmp_path: Path) -> None:
     mark = tmp_path / "mark"
     done = run(cluster, tmp_path / "out", die_once, [log_of(DEADLY), *LOGS], card=str(mark))

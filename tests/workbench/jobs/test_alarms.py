@@ -108,6 +108,7 @@ def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: L
     assert send(judged, webhook(listener), later=2 * KEPT_FOR) == Delivery()
 
 
+@pytest.mark.slow
 def test_a_refused_alarm_delays_itself_alone(fleet: Registry, listener: Listener) -> None:
     listener.by_machine = {"m0": 422}
     told = Told()
@@ -122,6 +123,7 @@ def test_a_refused_alarm_delays_itself_alone(fleet: Registry, listener: Listener
         assert send(other, webhook(listener), later=1.1 * FIRST_DELAY) == Delivery(1)
 
 
+@pytest.mark.slow
 def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
     fleet: Registry, listener: Listener
 ) -> None:
@@ -148,6 +150,7 @@ def test_results_from_before_there_was_a_webhook_are_not_given_up(
     assert send(fleet, webhook(listener), later=2 * KEPT_FOR) == Delivery()
 
 
+@pytest.mark.slow
 def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
     fleet: Registry, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -167,6 +170,7 @@ def test_where_nobody_answers_the_others_are_left_and_come_first_next_time(
     assert send(fleet, dead(), later=KEPT_FOR + MINUTE, report=told).given_up == 10
 
 
+@pytest.mark.slow
 def test_a_pass_spends_so_much_time_on_alarms(fleet: Registry, listener: Listener) -> None:
     found = send(fleet, replace(webhook(listener), budget=0.0))
     assert found == Delivery(0, 10, 0, "too slow for all of them in one pass")
@@ -245,6 +249,7 @@ def test_keys_tell_alarms_apart_and_stay_as_they_are() -> None:
 SECRET = "http://me:geheim@127.0.0.1:{port}/services/geheim?token=geheim#geheim"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("status", [200, 302, 404, 500, None])
 def test_the_address_is_never_shown(
     judged: Registry, listener: Listener, caplog: pytest.LogCaptureFixture, status: int | None

@@ -149,6 +149,7 @@ def test_the_chart_goes_on_from_log_to_log(shop: Path, first: Judgement, tmp_pat
         drift_by_chart(model, sources, rng, {"logs": "many"})
 
 
+@pytest.mark.slow
 def test_a_drifted_machine_gets_a_new_version(shop: Path, first: Judgement) -> None:
     chain = Chain(says("drift"), Terms(loop=-10.0))
     found = chain(task(shop, "drifted", first))
@@ -178,6 +179,7 @@ def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
     assert rival.design != found.candidate.design and "at least 90 % less needed" in why
 
 
+@pytest.mark.slow
 def test_a_false_alarm_is_refused_with_its_reason(shop: Path, first: Judgement) -> None:
     found = Chain(says("drift"))(task(shop, "same", first))
     assert found.verdict == "refused"
@@ -194,6 +196,7 @@ def test_other_verdicts_are_passed_on_with_their_state(
     assert found.evidence["state"] == {"given": {"mean": 1.5}}
 
 
+@pytest.mark.slow
 def test_another_structure_is_traced_and_the_effect_put_in_force(
     shop: Path, first: Judgement
 ) -> None:

@@ -316,6 +316,7 @@ def test_a_machine_without_a_model_waits(run: Run, registry: Registry, root: Pat
     assert registry.in_force("a") is not None
 
 
+@pytest.mark.slow
 def test_many_workers_at_once_judge_every_log_once(registry: Registry, root: Path) -> None:
     names = [f"m{i}" for i in range(4)]
     in_force(registry, *names)

@@ -47,6 +47,7 @@ def stands(found: Study, name: str) -> float:
     return value
 
 
+@pytest.mark.slow
 def test_figure_6(found: Study) -> None:
     assert stands(found, "none") > 0.08
     assert stands(found, "no zero-velocity") > 0.05
@@ -111,6 +112,7 @@ def test_every_rival_beats_the_plain_pd(found: Study) -> None:
     assert found.competitors[3]["PID, integral reset"].case.figures.limit_cycle is None
 
 
+@pytest.mark.slow
 def test_what_is_written(found: Study) -> None:
     text = dumps(paper_document(found))
     assert '"schema": "paper/1"' in text

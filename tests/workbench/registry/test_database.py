@@ -126,6 +126,7 @@ def many(where: str, who: int) -> None:
             registry.promote("a", version.number, reason="r", by=str(who), now=NOW)
 
 
+@pytest.mark.slow
 def test_several_processes_make_it_and_write_it_at_once(where: str) -> None:
     context = multiprocessing.get_context("spawn")
     workers = [context.Process(target=many, args=(where, who)) for who in range(PROCESSES)]

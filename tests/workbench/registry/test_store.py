@@ -115,6 +115,7 @@ def filled(registry: Registry) -> None:
 KEY = {"machine": "name", "outcome": "log_id", "notice": "log_id"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("table", APPEND_ONLY)
 def test_the_database_itself_keeps_rows(registry: Registry, table: str) -> None:
     filled(registry)

@@ -92,6 +92,7 @@ def turned(found: Identified) -> Identified:
     return replace(found, model=turning)
 
 
+@pytest.mark.slow
 def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     model = turned(identified()).model
     found = designed(model)

@@ -87,6 +87,7 @@ def test_a_loop_is_remarked_only_where_y_follows_r() -> None:
     assert len(closed_loop_remarks([follows, not_so])) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(TABLES))
 def test_default_designs_of_the_paper_s_plants_pass_in_simulation(name: str) -> None:
     model = model_of(TABLES[name], ACTUATOR)
@@ -135,6 +136,7 @@ def test_asked_poles_and_period_are_taken() -> None:
     assert plain.pid is None and "integrator" in plain.refused["pid"]
 
 
+@pytest.mark.slow
 def test_goals_are_taken() -> None:
     model = model_of(TABLES["paper_table2"], ACTUATOR)
     easy, strict = (designed(model, goals=Goals(m, 2.0)).rst for m in (0.4, 0.6))
@@ -150,6 +152,7 @@ def without_mass(model: Model) -> Model:
     return replace(model, friction={**model.friction, "m": blank})
 
 
+@pytest.mark.slow
 def test_without_a_mass_the_arx_plant_carries_the_design() -> None:
     model = without_mass(identified().model)
     found = designed(model)
@@ -356,6 +359,7 @@ def test_both_runs_must_stay(monkeypatch: pytest.MonkeyPatch) -> None:
     assert result.figures["rst"]["model"].missed == ("the simulated loop runs away",)
 
 
+@pytest.mark.slow
 def test_margins_of_a_validation_are_those_of_its_plant() -> None:
     model = identified().model
     found = designed(model, source="arx")
@@ -375,6 +379,7 @@ def test_margins_of_a_validation_are_those_of_its_plant() -> None:
     assert margin.worst_modulus == pytest.approx(physical.rst.margins.worst_modulus)
 
 
+@pytest.mark.slow
 def test_a_physical_design_needs_a_mass_and_says_what_it_rests_on() -> None:
     model = identified().model
     with pytest.raises(NotIdentifiable, match=r"no physical plant.*no acceleration"):

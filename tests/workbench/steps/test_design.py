@@ -92,6 +92,7 @@ def test_the_run_has_the_reference_as_given() -> None:
     assert np.max(np.abs(free.F)) > 2.0 * np.max(np.abs(run.F))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "goals"),
     [(Asked((300.0, 0.7)), Goals()), (Asked(), Goals(modulus=0.99)), (Asked((15, 1)), Goals(0.97))],

@@ -56,6 +56,7 @@ def look(card: Card, table: Table) -> Examined:
     return examine(path, card)
 
 
+@pytest.mark.slow
 def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
     card, table = motor
     found = look(card, table)
@@ -151,6 +152,7 @@ def test_a_log_that_a_fit_refuses_is_refused_with_its_reason(
     assert doctor_document(found, card.name)["refused"] == found.refused
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rig", ["force", "motor"])
 def test_one_screen_and_a_picture(rig: str, tmp_path: Path, request: pytest.FixtureRequest) -> None:
     card, table = request.getfixturevalue(rig)

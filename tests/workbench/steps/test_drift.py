@@ -54,6 +54,7 @@ def run(shop: Path, out: Path, logs: str, *more: str) -> int:
     return main(["drift", model, *named, "--card", card, "--out", str(out), *more])
 
 
+@pytest.mark.slow
 def test_no_drift_is_status_0_and_a_report(shop: Path, tmp_path: Path) -> None:
     assert run(shop, tmp_path / "d", "b") == 0
     found = json.loads((tmp_path / "d/drift.json").read_text(encoding="utf-8"))
@@ -129,6 +130,7 @@ def test_drift_is_status_1_and_names_the_parameter(
     assert found["next"].startswith("workbench identify ") and "c.csv" in found["next"]
 
 
+@pytest.mark.slow
 def test_the_state_carries_the_test_and_counts_no_log_twice(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -147,6 +149,7 @@ def test_the_state_carries_the_test_and_counts_no_log_twice(
     assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
 
 
+@pytest.mark.slow
 def test_a_verdict_does_not_hang_on_the_command_it_came_in(shop: Path, tmp_path: Path) -> None:
     assert run(shop, tmp_path / "one", "b") == 0
     assert run(shop, tmp_path / "two", "ab") == 0

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.regression.row_fit import base_fits, first_stage
@@ -23,6 +24,7 @@ def test_values_to_begin_from_lie_within_bounds() -> None:
     assert grid(built_in()["spring"], plant(), [one]) == []
 
 
+@pytest.mark.slow
 def test_growth_is_tried_from_what_a_limit_that_falls_tells() -> None:
     effect = built_in()["rising_stiction"]
     one = seen(made(3, {"rising_stiction": {"F_r": 5.0, "tau": 0.4}}, n=30_000))

@@ -41,6 +41,7 @@ def test_an_exponent_stays_unless_the_log_calls_for_another(delta: float, held: 
     assert found.values["delta"] == pytest.approx(delta, rel=0.3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("harmonic", [0.0, 2.0])
 def test_a_period_is_the_shortest_that_will_do(harmonic: float) -> None:
     found = best("cogging", {"cogging": {"a": 3.0, "period": 0.01, "a_2": harmonic}})

@@ -63,6 +63,7 @@ def judged(one: Robust, machines: DrawnMachines, seed: int) -> dict[str, float]:
     }
 
 
+@pytest.mark.slow
 def test_what_it_promises_holds_on_machines_that_it_has_not_seen() -> None:
     one = found()
     assert one.passed and one.design.recommended in ("rst", "pid")
@@ -73,6 +74,7 @@ def test_what_it_promises_holds_on_machines_that_it_has_not_seen() -> None:
         assert share == pytest.approx(promised, abs=PATIENCE), name
 
 
+@pytest.mark.slow
 def test_machines_further_off_than_the_model_says_break_the_promise() -> None:
     """The judge above can fail: three times the spread is not what was promised."""
     one = robust_design(uncertain(), replace(WANTED, limits=Limits(force=1.0)), POLES)
@@ -82,12 +84,14 @@ def test_machines_further_off_than_the_model_says_break_the_promise() -> None:
     assert min(share - (promised[name].kept or 0.0) for name, share in shares.items()) < -PATIENCE
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_design() -> None:
     again = robust_design(uncertain(), WANTED, POLES)
     assert design_document(again.design) == design_document(found().design)
     assert robust_document(again) == robust_document(found())
 
 
+@pytest.mark.slow
 def test_a_limit_that_no_loop_keeps_is_said_and_nothing_recommended() -> None:
     one = robust_design(uncertain(), replace(WANTED, limits=Limits(tracking=1e-9)), POLES)
     assert not one.passed
@@ -97,6 +101,7 @@ def test_a_limit_that_no_loop_keeps_is_said_and_nothing_recommended() -> None:
     assert any("along the smooth reference" in line for line in one.design.remarks)
 
 
+@pytest.mark.slow
 def test_slow_motion_asked_for_is_smaller_than_the_pids() -> None:
     """The body sticks and leaps behind an integrator: the excess alone takes most of that away."""
     one = robust_design(uncertain(0.005), replace(WANTED, staircase=1e-6), POLES)
@@ -142,6 +147,7 @@ def test_the_report_shows_the_shares_and_the_design() -> None:
     assert any("drawn anew" in line for line in robust_lines(found(), rotary=False))
 
 
+@pytest.mark.slow
 def test_drift_so_far_is_told() -> None:
     one = robust_design(uncertain(0.005), replace(WANTED, drift={"F_cp": 0.1}), POLES)
     assert any("F_cp 10 %" in line for line in robust_lines(one, rotary=False))
@@ -155,6 +161,7 @@ def test_without_a_mass_there_is_nothing_to_draw_around() -> None:
         robust_design(replace(model, friction={**model.friction, "m": mass}), WANTED)
 
 
+@pytest.mark.slow
 def test_what_no_log_told_is_named() -> None:
     untold = Estimate(None, "N", reason="no breakaway", assumed=18.0)
     model = uncertain()
