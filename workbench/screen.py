@@ -218,8 +218,8 @@ def _lines(
     if head:
         rows = [one for one in entries if isinstance(one, tuple)]
         return _stripped(as_text(table(head, rows, right), width))
-    out = []
-    for one in entries:
+    out = list[str]()
+    for one in (text for text in entries if isinstance(text, str)):
         short = one.isascii() and "\n" not in one and len(one) <= (width or SCREEN_WIDTH)
         lines = [one.rstrip()] if short else _stripped(as_text(one, width))
         if tall is not None and len(lines) > tall:

@@ -187,7 +187,9 @@ def drift_view(found: Drifted, folder: Path | None) -> Screen:
         once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
         parts.append(tabled(SHIFT_HEAD, once, right=(1, 2), whole=rows))
     legend, seen = what_the_columns_say(found), seen_lines(found)
-    short = [line for line in told_once(seen, logs) if line not in drift_sentence(found)]
+    # What is not judged, and why, stands in the table too.
+    told = told_once((line.partition("; not judged: ")[0] for line in seen), logs)
+    short = [line for line in told if line not in drift_sentence(found)]
     parts.append(instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]))
     parts.append(
         instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True)

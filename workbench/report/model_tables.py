@@ -108,6 +108,8 @@ def _short(reason: str, logs: Iterable[str]) -> str:
     said = reason.removeprefix("not identified: ")
     for name in (*logs, *re.findall(r"^\d+ logs", said)):
         said = said.removeprefix(f"{name}: ")
+    if not said:
+        return "not told"
     return "not told: " + WIDE.sub(r"found \1, anywhere in \2", ADVICE.sub("", said))
 
 

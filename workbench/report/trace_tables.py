@@ -104,6 +104,8 @@ def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row
         own = [row for row in rows if row[0].startswith(f"{name} ")]
         short = [(row[0].removeprefix(f"{name} "), *row[1:]) for row in own]
         out.append((f"{name}:", "", "", "", ""))
+        if len(found.effects) > 1:  # their reasons would push other effects from the screen
+            short = [row if row[1] != "-" else (*row[:3], "", row[4]) for row in short]
         out += [(f"  {row[0]}", *row[1:]) for row in reasons_once(short, logs)]
     return out
 
