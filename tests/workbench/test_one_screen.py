@@ -156,9 +156,10 @@ def demo() -> Iterator[Screen]:
             "friction": {n: {"value": 1.2345} for n in NAMES},
             "effects": {"stribeck": {"F_s": {"value": 3.5}}},
         }
-        made = Demonstration(
-            found, designed(identified().model, SLOW), validation(passed), {}, truth
-        )
+        taken = Recommendation("rst", bool(keys), "RST: good")
+        chosen = designed(identified().model, SLOW)
+        chosen = replace(chosen, recommended="rst", recommendation=taken)
+        made = Demonstration(found, chosen, validation(passed), {}, truth)
         yield demo_view(made, OUT)
 
 
@@ -270,6 +271,14 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
         shown.text()
     )
     assert words_of(shown.text(verbose=True)).count("excite it more") == 2
+
+
+def test_the_demo_sets_the_controllers_side_by_side() -> None:
+    text = words_of(next(demo()).text())
+    assert "Recommended: RST with the friction compensator, which keeps all limits" in text
+    assert "before: present" in text and "after: RST+comp" in text
+    assert "stribeck F_s 3.50 N 3.43 to 3.57 3.5 " in text
+    assert "workbench init LOG" in text and "report.html" in text
 
 
 def test_effects_and_their_parameters_have_names_on_one_screen() -> None:

@@ -42,9 +42,8 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
         tabled(head, [errors[0], errors[2]], whole=errors),
         tabled(TRUTH_HEAD, [*_friction(found), *_effects(found)]),
         LETTERS,
-        f"Every parameter that is told lies within {number(100 * found.worst_error, 2)} % of the"
-        " truth." if found.named_rightly else
-        f"The worst parameter is {number(100 * found.worst_error, 2)} % off the truth.",
+        f"Of mass and plain friction the worst parameter is {number(100 * found.worst_error, 2)} %"
+        " off the truth.",
         controller_sentence(found),
         controller_table(found),
         more(validation_sentence(found.validation)),
@@ -64,8 +63,10 @@ def controller_sentence(found: Demonstration) -> str:
     name = taken(found.design)
     if found.design.recommended == "none":
         return "No controller keeps every goal; design.html says what each misses."
-    verdict = "keeps every limit in simulation" if found.validation.passed else "misses a limit"
-    return f"Recommended: {called(name)}, which {verdict}."
+    verdict = "keeps all limits in simulation" if found.validation.passed else "misses a limit"
+    return (
+        f"Recommended: {called(name)}, which {verdict}; % of the step, in motion of the amplitude:"
+    )
 
 
 def taken(design: Design) -> str:
@@ -85,8 +86,12 @@ def controller_table(found: Demonstration) -> Part:
     units, name = shown(found.traced.model.rotary), taken(found.design)
     head = ("controller", "off at rest", "overshoot", "settled in", "off in motion",
             f"peak force [{units.force}]", "modulus margin")  # fmt: skip
+    beside = "+comp" if name.endswith(COMPENSATED) else ""
     figures = {key: places["model"] for key, places in found.validation.figures.items()}
-    named = ((PRESENT, "before: present"), (name, f"after: {called(name)}"))
+    named = (
+        (PRESENT, "before: present"),
+        (name, f"after: {name.removesuffix(COMPENSATED).upper()}{beside}"),
+    )
     rows = [(said, *_figures(figures[key])) for key, said in named if key in figures]
     return tabled(head, rows, right=())
 
