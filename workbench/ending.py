@@ -11,7 +11,7 @@ import click
 from identification.errors import NotIdentifiable
 
 DONE = "done"
-REFUSAL = "done, and the answer is a refusal or an alarm; its last line is the next command"
+REFUSAL = "done, and the answer is a refusal or an alarm; it ends with the next command"
 BAD_INPUT = "bad input: one line says what was found, where, what is needed, what to do"
 FAULT = "a fault of ours; --debug shows where"
 
@@ -53,6 +53,31 @@ class Step(NamedTuple):
 
     def __str__(self) -> str:
         return f"next ({self.why}): {self.command}"
+
+    def lines(self, width: int, most: int | None = None) -> list[str]:
+        """The step in lines of so many columns, that a shell takes as they stand.
+
+        A word is never broken, so that a long path may stick out. most: lines that are told; of a
+        longer one, as of 40 logs, the middle is left out.
+        """
+        if len(str(self)) <= width:
+            return [str(self)]
+        out = [f"next ({self.why}):"]
+        for word in map(shlex.quote, shlex.split(self.command)):
+            if len(out) > 1 and len(out[-1]) + len(word) + 3 <= width:
+                out[-1] += f" {word}"
+            else:
+                out.append(f"    {word}")
+        left = 0 if most is None else len(out) - most
+        if most is not None and left > 0:
+            cut = f"    ... ({left + 1} lines of it: --verbose)"
+            return [*_continued(out[: most - 2]), cut, out[-1]]
+        return [out[0], *_continued(out[1:-1]), out[-1]]
+
+
+def _continued(lines: list[str]) -> list[str]:
+    """The lines, each but the first of a step going on in the next one."""
+    return [line if line.startswith("next (") else f"{line} \\" for line in lines]
 
 
 def step(why: str, *words: str | PathLike[str] | None) -> Step:

@@ -10,6 +10,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from workbench.files import shipped_cards
+from workbench.screen import verbose_option
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -119,11 +120,12 @@ def machines_option(command: Command) -> Command:
 
 
 def events_options(command: Command) -> Command:
-    """The options `--json`, as `as_json`, and `--debug` of commands that tell events as JSON."""
+    """The options `--json`, as `as_json`, `--verbose` and `--debug` of commands that tell events as
+    JSON."""
     debug = click.option("--debug", is_flag=True, expose_value=False, hidden=True)
     return click.option(
         "--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON."
-    )(debug(command))
+    )(verbose_option(debug(command)))
 
 
 def _the_only(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:

@@ -1,4 +1,4 @@
-"""What every command writes and shows: folders written whole, strict JSON, tables, progress."""
+"""What every command writes and shows: folders written whole, strict JSON, a screen, progress."""
 
 import errno
 import itertools
@@ -8,26 +8,27 @@ import os
 import secrets
 import shutil
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, Protocol, Self, TypeVar
+from typing import Any, Protocol, Self, TypeVar
 
 import click
 
 from identification.errors import UserError
 from workbench.ending import Step
-
-if TYPE_CHECKING:
-    from rich.padding import Padding
-
-Row = tuple[str, ...]
+from workbench.screen import SCREEN_LINES, SCREEN_WIDTH, Screen, listed, screen
+from workbench.screen import Row as Row
+from workbench.screen import as_text as as_text
+from workbench.screen import is_verbose as is_verbose
+from workbench.screen import table as table
+from workbench.screen import verbose_option as verbose_option
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-PIPED_WIDTH = 100
+MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
 
 
 class Bar(Protocol):
@@ -168,9 +169,11 @@ def write_whole(path: Path, text: str, option: str) -> None:
 
 
 def output_options(command: Command) -> Command:
-    """The options of every command: `as_json: bool` (--json) and `out: Path | None` (--out)."""
+    """The options of every command: `as_json: bool` (--json), `out: Path | None` (--out), and
+    --verbose."""
     options = (
         click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        verbose_option,
         click.option(
             "--out",
             type=click.Path(path_type=Path),
@@ -216,32 +219,30 @@ def dumps(result: object) -> str:
 
 
 def emit(
-    result: object, as_json: bool, table: Callable[[], object], then: Step | None = None
+    result: object, as_json: bool, view: Callable[[], Screen | str], then: Step | None = None
 ) -> None:
-    """Print `result` as JSON, or what `table()` returns: a text or anything rich can show.
+    """Print `result` as JSON, or what `view()` returns, on one screen unless --verbose is given.
 
-    then: the command to type next, as JSON the key `next`, else a last line that is not folded.
+    then: the command to type next, as JSON the key `next`, else what the screen ends with.
     """
     if as_json:
         next_one = {"next": then.command} if then and isinstance(result, Mapping) else {}
         click.echo(dumps({**result, **next_one} if isinstance(result, Mapping) else result))
         return
-    click.echo(as_text(table(), None if sys.stdout.isatty() else PIPED_WIDTH), nl=False)
-    if then:
-        click.echo(str(then))
+    verbose, shown = is_verbose(), view()
+    width = _width(verbose)
+    last = then.lines(SCREEN_WIDTH, None if verbose else MOST_OF_A_STEP) if then else []
+    found = screen(listed(shown.splitlines())) if isinstance(shown, str) else shown
+    click.echo(found.text(width, verbose=verbose, room=SCREEN_LINES - len(last)), nl=False)
+    for line in last:
+        click.echo(line)
 
 
-def as_text(shown: object, width: int | None = PIPED_WIDTH) -> str:
-    """A text, or anything rich can show, as a terminal of that width does; None: as this one."""
-    from rich.console import Console
-
-    # No markup: "[m/s]" is a unit here, not a style.
-    console = Console(
-        markup=False, highlight=False, emoji=False, width=width, force_jupyter=False
-    )  # fmt: skip
-    with console.capture() as captured:
-        console.print(shown)
-    return captured.get()
+def _width(verbose: bool) -> int | None:
+    """Columns: this terminal's, but one screen has at most 100; 100 without a terminal."""
+    if not sys.stdout.isatty():
+        return SCREEN_WIDTH
+    return None if verbose else min(shutil.get_terminal_size().columns, SCREEN_WIDTH)
 
 
 @contextmanager
@@ -278,17 +279,3 @@ def next_step(text: str) -> str:
 def written(folder: Path, *names: str) -> str:
     """Where the results lie."""
     return "written: " + ", ".join(str(folder / name) for name in names)
-
-
-def table(head: Sequence[str], rows: Iterable[Row], right: Sequence[int] = (1,)) -> "Padding":
-    """A plain table for a terminal, a blank line above it; right: the columns of numbers."""
-    from rich.box import SIMPLE_HEAD
-    from rich.padding import Padding
-    from rich.table import Table
-
-    out = Table(box=SIMPLE_HEAD, pad_edge=False, show_edge=False, collapse_padding=True)
-    for number, name in enumerate(head):
-        out.add_column(name, justify="right" if number in right else "left", overflow="fold")
-    for row in rows:
-        out.add_row(*row)
-    return Padding(out, (1, 0, 0, 0))

@@ -222,13 +222,13 @@ def finished(
     if (found.imposed or found.misfit > COMPLETE) and not search_is_hopeless(found, recorded):
         found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
-        said = _not_linear(recorded, found.misfit)
+        said = _not_linear(recorded)
         if said:
             forced = recorded_logs(recorded.plain, recorded.rig, "force", recorded.halt)
             again = finished(plain_structure(forced, other), forced, settle, report, by="force")
             return replace(again, remarks=(said, *again.remarks))
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
-        why = LOST_WHY if found.imposed else f"no free run follows (misfit {found.misfit:.3g})"
+        why = LOST_WHY if found.imposed else "no free run follows these logs"
         return fit_imposed(recorded, settle, why)
     try:
         fit = settled(found.plant, recorded, found.misfit, settle, report)
@@ -311,15 +311,15 @@ def _with_actuator(fit: KarnoppFit, recorded: RecordedLogs) -> KarnoppFit:
     return replace(fit, actuator=Actuator(found.k1, found.k2)) if found.plausible else fit
 
 
-def _not_linear(recorded: RecordedLogs, misfit: float) -> str:
+def _not_linear(recorded: RecordedLogs) -> str:
     """What to say where a linear actuator leaves much of the force; "" where it does not."""
     found = fit_actuator(recorded.plain)
     noise = [one.noise_F**2 + (found.k2 * one.noise_y) ** 2 for one in recorded.logs]
     if not leaves_much(found.relative, found.rms / float(np.sqrt(np.mean(noise)))):
         return ""
     return (
-        f"the linear actuator leaves {100 * found.relative:.1f} % of the force (misfit"
-        f" {misfit:.3g}), so the run was driven by the logged force"
+        f"a linear actuator leaves {100 * found.relative:.1f} % of the force, so the run was driven"
+        " by the logged force, not by the command"
     )
 
 

@@ -41,7 +41,7 @@ WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
     "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
     " add runs at other speeds",
-    "stick": "no free run was fitted (see the remarks), and the force equation does not hold it;"
+    "stick": "no free run was fitted (see the notes), and the force equation does not hold it;"
     " log the body driven by a force, from rest",
 }
 

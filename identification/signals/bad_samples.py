@@ -46,6 +46,8 @@ class BadSamples:
             when += f" to {self.last:.6g} s"
         size = "" if self.size is None else f", {self.size:.3g} at most"
         many = f" ({self.samples} samples{size})"
+        if self.kind == "saturated" and self.done == "kept":
+            return f"{self.log}: the command is at its limit in {self.samples} samples, {when}"
         return f"{self.log}: {self.signal!r} has {_SAID[self.kind]} at {when}{many}: {self.done}"
 
 

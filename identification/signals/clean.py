@@ -74,12 +74,13 @@ def prepare(log: Log, rig: Rig, first_row: int = 1) -> Prepared:
         return Prepared(runs, remarks, bad)
     runs = _moving(runs)
     lost = log.duration - sum(run.duration for run in runs)
-    text = f"{log.name}: uneven clock, resampled every {log.h:.6g} s"
+    text = f"{log.name}: uneven clock, resampled every {1e3 * log.h:.3g} ms"
     if any(one.done == "cut out" for one in bad) and all(_is_even(run["t"]) for run in runs):
         text = f"{log.name}: cut where samples are bad"
+    said = [text]
     if len(runs) > 1 or lost > LONGEST_GAP * log.h:
-        text += f", in {len(runs)} runs; {lost:.3g} s in gaps or short runs left out"
-    return Prepared(runs, (*remarks, text), bad)
+        said.append(f"{log.name}: in {len(runs)} runs; {lost:.3g} s in gaps or short runs left out")
+    return Prepared(runs, (*remarks, *said), bad)
 
 
 def _moving(runs: tuple[Log, ...]) -> tuple[Log, ...]:
@@ -230,9 +231,10 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     if not np.any(spiking):
         return Repaired(log, ())
     rows, height = np.flatnonzero(spiking), np.abs(raw - log[name])
+    factor, unit = _shown(name, rotary)
     found = (
-        f"{first_row + int(rows[0])}, the largest of {np.max(height):.3g}"
-        f" {_unit(name, rotary)} in row {first_row + int(np.argmax(height))}"
+        f"{first_row + int(rows[0])}, the largest of {factor * np.max(height):.3g}"
+        f" {unit} in row {first_row + int(np.argmax(height))}"
     )
     if np.mean(height > _LARGE * np.ptp(log[name])) > _MANY or spiking.mean() > _TAILS:
         raise BadLog(
@@ -250,9 +252,15 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
     )
 
 
-def _unit(name: str, rotary: bool) -> str:
-    units = {"y": "rad", "F": "N m"} if rotary else {"y": "m", "F": "N"}
-    return units.get(name, "Pa")
+def _shown(name: str, rotary: bool) -> tuple[float, str]:
+    """Factor and unit in which a signal is told."""
+    if name in ("y", "F"):
+        linear, turning = (
+            {"y": (1e3, "mm"), "F": (1.0, "N")},
+            {"y": (1.0, "rad"), "F": (1.0, "N m")},
+        )
+        return (turning if rotary else linear)[name]
+    return 1e-5, "bar"
 
 
 def _refuse_runs(what: str, missing: Mask, first_row: int, repaired: int) -> Mask:

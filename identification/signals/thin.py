@@ -11,6 +11,7 @@ from scipy.interpolate import make_interp_spline
 
 from identification.arrays import Array
 from identification.log import Log
+from identification.remarks import Aside
 from identification.signals.differentiate import resolution
 
 LONGEST_UNTHINNED = 200_000
@@ -51,10 +52,13 @@ def thinned(log: Log) -> Thinned:
     """
     if len(log) <= LONGEST_UNTHINNED:
         return Thinned(log, ())
-    remarks, step = [], _step(log)
+    remarks, step = list[str](), _step(log)
     if step > 1:
         remarks.append(
-            f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every {step * log.h:.4g} s"
+            Aside(
+                f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every"
+                f" {step * log.h:.4g} s"
+            )
         )
         log = _slower(log, step)
     if len(log) > LONGEST_THINNED:

@@ -8,6 +8,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
+from identification.remarks import Aside
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
@@ -161,9 +162,9 @@ def _remarks(
 ) -> Iterator[str]:
     """What whoever reads the trace has to know of it."""
     if after.imposed and after.stage.imposed:
-        yield "the motion is imposed (inertia is of no account): no free run is judged"
+        yield "the rig forces the motion, no inertia shows: errors are those of the force alone"
     elif after.imposed:
-        yield "inertia does not show beside what is left: no free run is judged"
+        yield "inertia does not show beside what is left, so errors are those of the force alone"
     elif choice.steps and after.misfit > ASTRAY:
         yield (
             f"the free run still leaves {np.sqrt(after.misfit):.0f} times the position's noise:"
@@ -185,4 +186,4 @@ def _remarks(
     if seen and not any(len(one.sliding.start) for one in seen):
         yield "the body does not slide in the test logs, so they say nothing of the force error"
     if not seen:
-        yield "no test log: the test errors are those of stretches left out in turn"
+        yield Aside("no test log: the test errors are those of stretches left out in turn")

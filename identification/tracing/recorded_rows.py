@@ -100,8 +100,8 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         left = min([left, *(left_share(one, rows.sd, rows.b) for one in fits if rows is not None)])
     if left > LINEAR_ACTUATOR:
         remarks.append(
-            f"a linear actuator leaves {100 * left:.0f} % of the force's rate: effects between"
-            " command and force are not judged"
+            f"the command tells little of the force (a linear actuator leaves {100 * left:.0f} % of"
+            " its rate), so effects between command and force were not looked for"
         )
         return False
     return True

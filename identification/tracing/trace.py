@@ -22,6 +22,7 @@ from identification.estimation.surroundings import surroundings
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
+from identification.remarks import Aside
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
@@ -196,7 +197,8 @@ def _told(
 
 def _left_out(not_tried: tuple[str, ...]) -> list[str]:
     """What is to be said of a trace that was halted."""
-    return [f"the trace ended early; not tried: {'; '.join(not_tried)}"] if not_tried else []
+    said = Aside(f"the trace ended early; not tried: {'; '.join(not_tried)}")
+    return [said] if not_tried else []  # the verdict's sentence says it too
 
 
 def _next(judged: Judgement, choice: Choice, not_tried: tuple[str, ...]) -> str:

@@ -14,9 +14,9 @@ import pytest
 from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
-from rich.table import Table
 
 from workbench.output import BadOutput, OutputFolder, dumps, emit, output_options, progress, strict
+from workbench.screen import screen, tabled
 
 NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 JSON_LIKE = st.recursive(
@@ -187,9 +187,8 @@ def test_emit_json_builds_no_table(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_emit_shows_units_as_they_are(capsys: pytest.CaptureFixture[str]) -> None:
-    table = Table("name", "value [m/s]")
-    table.add_row("dv_p", "0.001 [m/s] :m:")
-    emit({}, False, lambda: table)
+    rows = [("dv_p", "0.001 [m/s] :m:")]
+    emit({}, False, lambda: screen(tabled(("name", "value [m/s]"), rows)))
     shown = capsys.readouterr().out
     assert "value [m/s]" in shown
     assert "0.001 [m/s] :m:" in shown

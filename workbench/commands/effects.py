@@ -1,6 +1,6 @@
 """`workbench effects`: the library of effects, and a user's own file checked as they are."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -8,12 +8,11 @@ import click
 
 from workbench.ending import StatusGroup, step
 from workbench.options import effects_option
-from workbench.output import emit, progress
+from workbench.output import emit, progress, verbose_option
 
 if TYPE_CHECKING:
-    from rich.console import RenderableType
-
     from identification.effects._base import Effect
+    from workbench.screen import Screen
 
 
 @click.group(cls=StatusGroup, epilog="Example: workbench effects list")
@@ -28,18 +27,19 @@ def command() -> None:
 @click.argument("keys", nargs=-1, metavar="[KEY]...")
 @effects_option
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@verbose_option
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
 def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool) -> None:
-    """List the effects: equation, what it gives, parameters with units, source.
+    """List the effects, a line each; with --verbose equation, parameters with units, source.
 
-    KEY: those to be shown, by default all.
+    KEY: those to be shown, with all of this; by default every effect.
     """
     from workbench.cards.effect_values import known_effect
     from workbench.cards.own_effects import library
 
     known = library(effects)
     found = [known_effect(key, known) for key in keys] if keys else list(known.values())
-    emit([described(one) for one in found], as_json, lambda: _lines(found))
+    emit([described(one) for one in found], as_json, lambda: _listed(found, [*known.values()]))
 
 
 @command.command(
@@ -47,6 +47,7 @@ def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool
 )
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@verbose_option
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
 def check(folder: Path, as_json: bool) -> int:
     """Check your own effects by the rules that the shipped ones are held to.
@@ -101,23 +102,26 @@ def described(effect: "Effect") -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _lines(found: "list[Effect]") -> "RenderableType":
-    """Each effect as a paragraph."""
-    from rich.console import Group
-    from rich.padding import Padding
-    from rich.text import Text
+def _listed(found: "Sequence[Effect]", known: "Sequence[Effect]") -> "Screen":
+    """A line an effect; each one as a paragraph where it was asked for by name."""
+    from workbench.screen import instead, listed, screen
 
-    parts: list[RenderableType] = []
-    for one in found:
-        parts.append(Text(f"{one.key}: {one.meaning}"))
-        lines = [f"{one.equation}", f"gives the {one.place.gives}"]
-        for p in one.params:
-            usual = f"{p.typical:g}" if p.default is None else f"{p.default:g} unless given"
-            lines.append(f"{p.name} [{p.unit}]: {p.meaning} ({usual})")
-        lines.append(f"source: {one.source}")
-        parts += [Padding(Text(line), (0, 0, 0, 4)) for line in lines]
-        parts.append("")
-    return Group(*parts)
+    every = [line for one in found for line in (*paragraph(one), "")][:-1]
+    if len(found) < len(known):
+        return screen(listed(every))
+    short = [f"{one.key}: {one.meaning}" for one in found]
+    then = "next: workbench effects list KEY shows its equation, parameters and source"
+    return screen(instead(short, every), instead([then], []))
+
+
+def paragraph(one: "Effect") -> list[str]:
+    """An effect in lines: equation, what it gives, parameters with units, source."""
+    lines = [f"{one.equation}", f"gives the {one.place.gives}"]
+    for p in one.params:
+        usual = f"{p.typical:g}" if p.default is None else f"{p.default:g} unless given"
+        lines.append(f"{p.name} [{p.unit}]: {p.meaning} ({usual})")
+    lines.append(f"source: {one.source}")
+    return [f"{one.key}: {one.meaning}", *(f"    {line}" for line in lines)]
 
 
 def _checked(broken: Mapping[str, Mapping[str, str]], count: int) -> str:

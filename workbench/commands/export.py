@@ -12,6 +12,7 @@ from workbench.output import OutputFolder, emit, output_options
 
 if TYPE_CHECKING:
     from workbench.export.exported import Exported
+    from workbench.screen import Screen
 
 TARGETS = ("c", "st", "plcopen", "fmu", "json", "mat")
 SINGLE = ("c", "st", "plcopen")  # targets that have single precision too
@@ -117,18 +118,18 @@ def _document(what: "Exported", files: tuple[str, ...], folder: Path) -> dict[st
 
 def _view(
     what: "Exported", targets: Mapping[str, None], files: tuple[str, ...], folder: Path
-) -> str:
+) -> "Screen":
     """What was written and what to do with it, for a terminal."""
     from workbench.export.filled import title_of
     from workbench.output import written
+    from workbench.screen import listed, screen
 
     program = what.program
     given = ", ".join(f"{one.name} [{one.unit}]" for one in program.inputs)
-    lines = [
+    return screen(
         title_of(what),
         f"every {program.h:.6g} s: {given} -> {program.output.name} [{program.output.unit}]",
-        *(f"remark: {one}" for one in what.remarks),
+        listed(f"remark: {one}" for one in what.remarks),
         written(folder, *files),
-        *(f"{target}: {WHAT_NEXT[target].format(name=program.name)}" for target in targets),
-    ]
-    return "\n".join(lines)
+        listed(f"{target}: {WHAT_NEXT[target].format(name=program.name)}" for target in targets),
+    )

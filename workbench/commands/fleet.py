@@ -14,16 +14,15 @@ import click
 
 from workbench.ending import StatusCommand, Step, step
 from workbench.options import POSITIVE, registry_option
-from workbench.output import dumps, emit, progress
+from workbench.output import dumps, emit, progress, verbose_option
 
 if TYPE_CHECKING:
-    from rich.console import Group
-
     from workbench.fleet.recording import Recorder
     from workbench.fleet.run import Report
+    from workbench.screen import Screen
 
 Command = TypeVar("Command", bound=Callable[..., Any])
-SHOWN = 20  # results to look at that a terminal shows; --json has the first 1000
+MOST_BAD = 20  # results to look at on one screen; --verbose and --json have the first 1000
 
 
 def fleet_options(command: Command) -> Command:
@@ -47,6 +46,7 @@ def fleet_options(command: Command) -> Command:
                      default=Path("fleet"), show_default=True,
                      help="Folder of the results; the same again goes on there."),
         click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        verbose_option,
         click.option("--debug", is_flag=True, expose_value=False, hidden=True),
     )  # fmt: skip
     for option in reversed(options):
@@ -131,24 +131,20 @@ def after_fleet(
     return step("what the log can tell", "doctor", first.log.path, "--card", card or beside)
 
 
-def fleet_view(done: "Report", out: Path) -> "Group":
+def fleet_view(done: "Report", out: Path) -> "Screen":
     """What a run did, for a terminal."""
-    from rich.console import Group
-    from rich.table import Table
-
     from workbench.fleet.run import per_core
+    from workbench.screen import Part, screen, tabled
 
     counted = ", ".join(f"{count} {name}" for name, count in sorted(done.verdicts.items()))
-    parts: list[Any] = [f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before"]
+    parts: list[Part | str] = [
+        f"{done.logs} log(s): {counted or 'none new'}, {done.before} done before"
+    ]
     if done.later:
         parts.append(f"{done.later} log(s) left: their machines are in another worker's hands")
     if done.bad:
-        table = Table("machine", "verdict", "reason", box=None)
-        for one in done.bad[:SHOWN]:
-            table.add_row(one.log.machine, one.verdict, one.reason)
-        parts.append(table)
-        if len(done.bad) > SHOWN:
-            parts.append(f"and {len(done.bad) - SHOWN} more: --json")
+        rows = [(one.log.machine, one.verdict, one.reason) for one in done.bad]
+        parts.append(tabled(("machine", "verdict", "reason"), rows, (), most=MOST_BAD))
     each = per_core(done)
     if each is not None:
         parts.append(
@@ -156,7 +152,7 @@ def fleet_view(done: "Report", out: Path) -> "Group":
             f" at most {done.memory / 2**20:.0f} MiB a worker"
         )
     parts.append(f"results: {out / 'results'}")
-    return Group(*parts)
+    return screen(*parts)
 
 
 def _bad(one: Any) -> dict[str, Any]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench.ending import StatusCommand
-from workbench.output import emit, progress, write_whole
+from workbench.output import emit, progress, verbose_option, write_whole
 
 if TYPE_CHECKING:
     from workbench.steps.first_card.proposal import Proposal
@@ -27,6 +27,7 @@ CARD = "card.toml"
 @click.option("--force", is_flag=True, help="Replace a card that is there.")
 @click.option("--yes", is_flag=True, help="Ask nothing; take the guesses.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON; ask nothing.")
+@verbose_option
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
 def command(
     log: Path, out: Path | None, name: str | None, force: bool, yes: bool, as_json: bool

@@ -8,7 +8,7 @@ import click
 
 from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, card_option, complete_file, effects_option
-from workbench.output import OutputFolder, emit, next_step, output_options, progress, written
+from workbench.output import OutputFolder, emit, output_options, progress
 
 
 @click.command(
@@ -48,7 +48,7 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
-    from workbench.report.prediction import prediction_lines, then_of_prediction
+    from workbench.report.prediction import prediction_view
     from workbench.steps.predict import predict_sources, prediction_csv
 
     model = read_model(model_file, library(effects))
@@ -60,11 +60,5 @@ def command(
     emit(
         {**found.summary, "out": folder.final},
         as_json,
-        lambda: "\n".join(
-            [
-                *prediction_lines(found, model.rotary),
-                *map(next_step, then_of_prediction(log, card)),
-                written(folder.final, "prediction.csv"),
-            ]
-        ),
+        lambda: prediction_view(found, model.rotary, log, card, folder.final),
     )

@@ -12,7 +12,7 @@ import click
 
 from workbench.ending import StatusGroup
 from workbench.options import effects_option, registry_option
-from workbench.output import OutputFolder, emit
+from workbench.output import OutputFolder, emit, verbose_option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
@@ -27,6 +27,7 @@ def registry_options(command: Command) -> Command:
     options = (
         registry_option,
         click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
+        verbose_option,
         click.option("--debug", is_flag=True, expose_value=False, hidden=True),
     )
     for option in reversed(options):

@@ -7,13 +7,14 @@ import click
 
 from workbench.ending import StatusCommand, Step, step
 from workbench.jobs.options import JobOptions, job_options, worker
-from workbench.output import emit, next_step
+from workbench.output import emit, next_step, verbose_option
 
 if TYPE_CHECKING:
-    from rich.console import Group
-
     from workbench.jobs.alarms import Delivery
     from workbench.jobs.passes import PassReport
+    from workbench.screen import Screen
+
+MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 
 
 @click.command(
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
+@verbose_option
 @job_options
 def command(as_json: bool, **given: Any) -> int:
     """Judge each new log of each machine once; where friction has drifted, re-tune.
@@ -74,23 +76,24 @@ def undelivered(alarms: "Delivery") -> str:
     return f"--webhook: {', '.join(parts)}{why}; look after the receiver"
 
 
-def pass_view(done: "PassReport") -> "Group":
-    """What a pass did, for a terminal."""
-    from rich.console import Group, RenderableType
-
+def pass_view(done: "PassReport") -> "Screen":
+    """What a pass did, for a terminal: alarms first."""
     from workbench.registry.values import ALARMING
-    from workbench.registry.views import outcomes_view
+    from workbench.registry.views import outcomes_table
+    from workbench.screen import listed, screen
 
     judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"
-    parts: list[RenderableType] = [judged, *remarks(done)]
     alarming = dict.fromkeys(o.machine for o in done.outcomes if o.verdict in ALARMING)
-    parts.extend(
+    then = (
         next_step(f"`workbench registry show {machine}` says what has changed, and what was done")
         for machine in alarming
     )
-    if done.outcomes:
-        parts.append(outcomes_view(done.outcomes))
-    return Group(*parts)
+    return screen(
+        judged,
+        listed(remarks(done), MOST_LINES),
+        listed(then, MOST_LINES),
+        outcomes_table(done.outcomes, alarms_first=True),
+    )
 
 
 def remarks(done: "PassReport") -> Sequence[str]:

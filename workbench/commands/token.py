@@ -43,9 +43,9 @@ def add_token(name: str, role: str, by: str | None, where: str | None, as_json: 
 @registry_options
 def list_tokens(where: str | None, as_json: bool) -> None:
     """List the tokens by name, role and who made them; not the tokens themselves."""
-    from workbench.output import table
     from workbench.registry.access import Access
     from workbench.registry.views import moment
+    from workbench.screen import screen, tabled
 
     with _open(where) as found:
         tokens = Access(found.database).tokens()
@@ -56,7 +56,7 @@ def list_tokens(where: str | None, as_json: bool) -> None:
     ]  # fmt: skip
     head = ("token", "role", "made by", "at", "state")
     emit({"tokens": tokens}, as_json,
-         lambda: table(head, rows, ()) if rows else "no token yet")  # fmt: skip
+         lambda: screen(tabled(head, rows, ())) if rows else "no token yet")  # fmt: skip
 
 
 @command.command("revoke", epilog="Example: workbench token revoke anna")

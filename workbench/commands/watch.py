@@ -11,6 +11,7 @@ import click
 
 from workbench.ending import StatusCommand
 from workbench.jobs.options import JobOptions, clock, job_options, worker
+from workbench.output import verbose_option
 
 if TYPE_CHECKING:
     from workbench.jobs.options import Worker
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
               help="Serve Prometheus metrics by HTTP.")  # fmt: skip
 @click.option("--address", default="127.0.0.1", show_default=True, help="Where to serve them.")
 @click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
+@verbose_option
 @job_options
 def command(cron: str, port: int | None, address: str, as_json: bool, **given: Any) -> None:
     """Do what 'workbench reidentify' does on a schedule, and soon after a log file appears.

@@ -109,17 +109,20 @@ class DriftResult(Result):
         return drift_view(self.found, None)
 
     def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.remarks import told_once
         from workbench.report.drift_tables import (
             RUN_HEAD,
             SHIFT_HEAD,
+            drift_notes,
             drift_sentence,
-            notes,
+            logs_of_drift,
             run_rows,
             shift_rows,
         )
 
+        lines = told_once(drift_notes(self.found), logs_of_drift(self.found))
         last = Part(SHIFT_HEAD, shift_rows(self.found.tests[-1]))
-        parts = [Part(RUN_HEAD, run_rows(self.found), notes(self.found)), last]
+        parts = [Part(RUN_HEAD, run_rows(self.found), lines), last]
         return drift_sentence(self.found), parts
 
     def _files(self) -> Iterator[tuple[str, str]]:

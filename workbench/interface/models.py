@@ -123,10 +123,19 @@ class IdentifyResult(_OfModel):
         return model_view(self.model, self.found.remarks, None)
 
     def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.model_tables import MODEL_HEAD, fit_lines, parameter_rows, summary
+        from workbench.report.model_tables import (
+            MODEL_HEAD,
+            fit_lines,
+            logs_of,
+            parameter_rows,
+            plant_lines,
+            summary,
+        )
+        from workbench.report.notes import report_notes
 
         rows = [row[:4] for row in parameter_rows(self.model)]
-        lines = [*fit_lines(self.model), *(f"note: {line}" for line in self.remarks)]
+        said = (*fit_lines(self.model), *plant_lines(self.model), *self.remarks)
+        lines = [one.text for one in report_notes(said, logs_of(self.model))]
         return summary(self.model), [Part(MODEL_HEAD, rows, lines)]
 
     def _files(self) -> Iterator[tuple[str, str]]:
@@ -201,12 +210,14 @@ class TraceResult(_OfModel):
         return trace_view(self.found, None)
 
     def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.trace_tables import trace_parts
+        from workbench.report.notes import report_notes
+        from workbench.report.trace_tables import logs_of_trace, trace_parts
         from workbench.report.trace_words import then_of, trace_sentence
 
         found = self.found.trace
         parts = [Part(head, rows, lines) for head, rows, lines in trace_parts(self.found)]
-        notes = [f"note: {line}" for line in (*self.found.remarks, *found.remarks)]
+        said = (*self.found.remarks, *found.remarks)
+        notes = [f"note: {one.text}" for one in report_notes(said, logs_of_trace(self.found))]
         parts[-1] = parts[-1]._replace(lines=[*parts[-1].lines, *notes])
         then = " ".join(f"Next: {line}." for line in then_of(self.found))
         return f"{trace_sentence(self.found)} {then}".strip(), parts

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from workbench.interface.inputs import PathLike
 from workbench.output import OutputFolder, Row, as_text, dumps
+from workbench.screen import Screen
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -71,7 +72,9 @@ class Result(ABC):
         return target.final
 
     def __repr__(self) -> str:
-        return as_text(self._view()).rstrip()
+        view = self._view()
+        shown = view.text(rest="report()") if isinstance(view, Screen) else as_text(view)
+        return shown.rstrip()
 
     def _repr_html_(self) -> str:
         from workbench.report.templating import render

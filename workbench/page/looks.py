@@ -127,7 +127,7 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
         found = examine(path, load_card(card, with_recipe=False))
     except UserError as error:
         raise BadLook(without_path(str(error), [path, card])) from None
-    lines = without_path(doctor_view(found, None), [path, card]).splitlines()
+    lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
     told = tuple((one.name, one.can, one.why if one.can else one.add or one.why)
                  for one in found.told)  # fmt: skip
     return DoctorFound(found.verdict, tuple(lines), told)

@@ -23,13 +23,21 @@ from workbench.output import OutputFolder
 from workbench.page.dropped import CHARTS_FILE, REPORT_FILE, RESULT_FILE
 from workbench.registry.bench import TaskKind
 from workbench.report.fit import fit
-from workbench.report.model_tables import MODEL_HEAD, fit_lines, parameter_rows, summary
+from workbench.report.model_tables import (
+    MODEL_HEAD,
+    fit_lines,
+    logs_of,
+    parameter_rows,
+    plant_lines,
+    summary,
+)
+from workbench.report.notes import report_notes
 from workbench.report.page import Section
 from workbench.report.reports import identification_report
 from workbench.report.residual import residual
 from workbench.report.trace import trace_report
 from workbench.report.trace_pictures import against_signal, pictures
-from workbench.report.trace_tables import error_rows, errors_head
+from workbench.report.trace_tables import error_rows, errors_head, logs_of_trace
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
@@ -95,7 +103,7 @@ def _identified(sources: Sources, course: Course) -> Made:
     model = found.model
     result = {
         "summary": summary(model),
-        "notes": [*fit_lines(model), *found.remarks],
+        "notes": _told((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
         "errors": None,
         "report": identification_report(found),
     }
@@ -109,7 +117,7 @@ def _traced(sources: Sources, course: Course) -> Made:
     model, rotary = found.model, found.model.rotary
     result = {
         "summary": trace_sentence(found),
-        "notes": [*found.remarks, *found.trace.remarks],
+        "notes": _told((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
         "errors": {"head": errors_head(False), "rows": error_rows(found.trace, rotary)},
         "report": trace_report(found),
     }
@@ -117,6 +125,10 @@ def _traced(sources: Sources, course: Course) -> Made:
     command = model.rig.command_unit
     shown = pictures(found.trace)[:MOST_PICTURES]
     return model, documents, result, [against_signal(one, rotary, command) for one in shown]
+
+
+def _told(remarks: Sequence[str], logs: Sequence[str]) -> list[str]:
+    return [one.text for one in report_notes(remarks, logs)]
 
 
 def _with_design(

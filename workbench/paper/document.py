@@ -2,17 +2,15 @@
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from workbench.documents.versions import versions
-from workbench.output import Row, table, written
+from workbench.output import Row, written
 from workbench.paper.claims import claims
 from workbench.paper.measures import Case, Figures
 from workbench.paper.settings import PRINTED_SUMS
 from workbench.paper.study import Study
-
-if TYPE_CHECKING:
-    from rich.console import Group
+from workbench.screen import Screen, more, screen, tabled
 
 CLAIMS = ("where", "paper", "here", "")
 FIGURES = ("servo", "squared error [m²]", "standstill [mm]", "limit cycle", "energy [V² s]")
@@ -116,16 +114,14 @@ def rival_servo_rows(found: Study, number: int) -> list[Row]:
     ]
 
 
-def paper_view(found: Study, folder: Path) -> "Group":
-    """The study for a terminal: claims, the printed sums' runs, the rivals."""
-    from rich.console import Group
-
-    return Group(
+def paper_view(found: Study, folder: Path) -> Screen:
+    """The study for a terminal: the paper's claims; the rivals' figures with --verbose."""
+    return screen(
         f"seeds {', '.join(map(str, found.seeds))} judge; chosen on seed {found.tuning_seed}",
-        table(CLAIMS, claim_rows(found), ()),
-        "rivals on the plant of table 1, steps of 0.1 m:",
-        table(FIGURES, rival_servo_rows(found, 1), (1, 2, 4)),
-        "rivals on the plant of table 3:",
-        table(FIGURES, rival_servo_rows(found, 3), (1, 2, 4)),
+        tabled(CLAIMS, claim_rows(found), ()),
+        more("rivals on the plant of table 1, steps of 0.1 m:"),
+        more(tabled(FIGURES, rival_servo_rows(found, 1), (1, 2, 4))),
+        more("rivals on the plant of table 3:"),
+        more(tabled(FIGURES, rival_servo_rows(found, 3), (1, 2, 4))),
         written(folder, "report.html", "paper.json"),
     )

@@ -2,44 +2,36 @@
 
 from collections.abc import Sequence
 from datetime import datetime
-from typing import TYPE_CHECKING
 
-from workbench.output import table
 from workbench.registry.difference import Line, Number
-from workbench.registry.values import Decision, LogOutcome, MachineState
-
-if TYPE_CHECKING:
-    from rich.console import Group
-    from rich.padding import Padding
+from workbench.registry.values import ALARMING, Decision, LogOutcome, MachineState
+from workbench.screen import Part, Screen, screen, tabled
 
 SHORT = 12  # characters of a fingerprint that are shown
 
 
-def list_view(machines: Sequence[MachineState]) -> "Padding | str":
+def list_view(machines: Sequence[MachineState]) -> Screen | str:
     """A line a machine."""
     if not machines:
         return "no machine yet; 'workbench registry add MACHINE MODEL DESIGN' makes one"
     head = ("machine", "in force", "since", "versions", "logs", "waiting", "set aside")
-    return table(
-        head,
-        [
-            (
-                one.name,
-                "-" if one.in_force is None else str(one.in_force.number),
-                "-" if one.since is None else moment(one.since.at),
-                *(str(n) for n in (one.versions, one.logs, one.waiting, one.set_aside)),
-            )
-            for one in machines
-        ],
-    )
+    rows = [
+        (
+            one.name,
+            "-" if one.in_force is None else str(one.in_force.number),
+            "-" if one.since is None else moment(one.since.at),
+            *(str(n) for n in (one.versions, one.logs, one.waiting, one.set_aside)),
+        )
+        for one in machines
+    ]
+    return screen(tabled(head, rows))
 
 
 def machine_view(
     state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
-) -> "Group":
-    """A machine: what is in force and why, every decision, every log's result."""
-    from rich.console import Group, RenderableType
-
+) -> Screen:
+    """A machine: what is in force and why, the latest decisions and results of logs; with
+    --verbose all of them."""
     if state.in_force is None or state.since is None:
         first = f"{state.name}: nothing in force; 'workbench registry promote {state.name} N'"
     else:
@@ -47,52 +39,51 @@ def machine_view(
             f"{state.name}: version {state.in_force.number} in force since"
             f" {moment(state.since.at)}, by {state.since.made_by}: {state.since.reason}"
         )
-    parts: list[RenderableType] = [first]
-    parts.append(
-        table(
-            ("decision", "version", "at", "by", "log", "reason"),
-            [
-                (d.kind, str(d.number), moment(d.at), d.made_by, short(d.log), d.reason)
-                for d in decisions
-            ],
-        )
-    )
+    parts: list[Part | str] = [first]
+    head = ("decision", "version", "at", "by", "log", "reason")
+    rows = [
+        (d.kind, str(d.number), moment(d.at), d.made_by, short(d.log), d.reason) for d in decisions
+    ]
+    parts.append(tabled(head, rows, latest=True))
     if outcomes:
-        parts.append(outcomes_view(outcomes))
+        parts.append(outcomes_table(outcomes))
     if state.waiting:
         parts.append(f"{state.waiting} log(s) wait for a result")
-    return Group(*parts)
+    return screen(*parts)
 
 
-def outcomes_view(outcomes: Sequence[LogOutcome]) -> "Padding":
-    """A line a log."""
-    return table(
-        ("machine", "log", "verdict", "version", "reason"),
-        [
+def outcomes_table(outcomes: Sequence[LogOutcome], *, alarms_first: bool = False) -> Part:
+    """A line a log, the latest last; alarms_first: those to be looked at, on one screen."""
+
+    def rows(of: Sequence[LogOutcome]) -> list[tuple[str, ...]]:
+        return [
             (o.machine, o.log.file, o.verdict, "-" if o.number is None else str(o.number), o.reason)
-            for o in outcomes
-        ],
-    )
+            for o in of
+        ]
+
+    head = ("machine", "log", "verdict", "version", "reason")
+    if not alarms_first:
+        return tabled(head, rows(outcomes), latest=True)
+    first = sorted(outcomes, key=lambda one: one.verdict not in ALARMING)
+    return tabled(head, rows(first), whole=rows(outcomes))
 
 
-def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> "Padding":
+def difference_view(lines: Sequence[Line], names: tuple[str, str]) -> Screen:
     """Two versions side by side."""
     head = ("parameter", names[0], "unit", "95 %", names[1], "95 %", "change")
-    return table(
-        head,
-        [
-            (
-                line.name,
-                _value(line.before),
-                line.unit,
-                _interval(line.before),
-                _value(line.after),
-                _interval(line.after),
-                _change(line),
-            )
-            for line in lines
-        ],
-    )
+    rows = [
+        (
+            line.name,
+            _value(line.before),
+            line.unit,
+            _interval(line.before),
+            _value(line.after),
+            _interval(line.after),
+            _change(line),
+        )
+        for line in lines
+    ]
+    return screen(tabled(head, rows))
 
 
 def moment(at: datetime) -> str:

@@ -1,73 +1,144 @@
-"""The demo for a terminal: truth beside estimate, then design and verdict."""
+"""The demo for a terminal: truth beside estimate, before beside after, and where to go next."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+from identification.model.estimates import Estimate
+from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, number, shown_unit
-from workbench.output import Row, next_step, table, written
+from workbench.documents.design import Design
+from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
-from workbench.report.trace_tables import effect_rows, error_rows, errors_head
-from workbench.report.trace_words import trace_sentence
+from workbench.report.notes import notes
+from workbench.report.trace_tables import error_rows, errors_head, logs_of_trace
+from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation_tables import (
     validation_lines,
     validation_sentence,
     validation_table,
 )
+from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.demo import Demonstration
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
+from workbench.steps.recommend import percent, settled
+from workbench.steps.trace import effect_estimates
 
-if TYPE_CHECKING:
-    from rich.console import Group
+SIMULATED = (
+    "Simulated: two logs of a pneumatic positioning rig, one to learn from and one held out. Its"
+    " friction hides an effect of which no model here was told; only the logs were used."
+)
+LETTERS = (
+    "m: mass; F_c: Coulomb friction, F_v: viscous, F_s: breakaway, dv: stick band; p, n: direction"
+)
+TRUTH_HEAD = ("parameter", "estimate", "unit", "95 % interval", "truth")
 
 
-def demo_view(found: Demonstration, folder: Path) -> "Group":
-    """The demo for a terminal: truth beside estimate, then design and verdict."""
-    from rich.console import Group
-
-    rotary = found.traced.model.rotary
-    traced = found.traced
-    return Group(
-        "Two logs of the paper's rig (table 2) were simulated, with an effect that no model here"
-        " declares; only the logs were used. What came out:",
+def demo_view(found: Demonstration, folder: Path) -> Screen:
+    """The demo for a terminal; with --verbose also what `design` and `validate` say of it."""
+    traced, rotary = found.traced, found.traced.model.rotary
+    errors, head = error_rows(traced.trace, rotary), errors_head(True)
+    parts: list[Part | str] = [
+        SIMULATED,
         trace_sentence(traced),
-        f"Against the truth, the worst parameter is {number(100 * found.worst_error, 2)} % off.",
-        validation_sentence(found.validation),
-        next_step(f"open {folder / 'report.html'}; then the same with your own log:"),
-        "      workbench init LOG, workbench identify LOG --card card.toml",
-        table(errors_head(True), error_rows(traced.trace, rotary)),
-        table(("effect", "estimate", "unit", "95 % interval", "truth"), _effects(found)),
-        table(("parameter", "estimate", "unit", "95 % interval", "truth"), _rows(found)),
-        validation_table(found.validation, rotary),
-        *validation_lines(found.validation, rotary),
-        "",
-        *design_lines(found.design, rotary),
+        tabled(head, [errors[0], errors[2]], whole=errors),
+        tabled(TRUTH_HEAD, [*_friction(found), *_effects(found)]),
+        LETTERS,
+        f"Of mass and plain friction the worst parameter is {number(100 * found.worst_error, 2)} %"
+        " off the truth.",
+        controller_sentence(found),
+        controller_table(found),
+        more(validation_sentence(found.validation)),
+        more(validation_table(found.validation, rotary)),
+        more(listed(validation_lines(found.validation, rotary))),
+        more(listed(design_lines(found.design, rotary))),
+        more(notes((*traced.remarks, *traced.trace.remarks), logs_of_trace(traced))),
         written(folder, "report.html", "design.html", "validation.html"),
+        next_step("your own log: `workbench init LOG`, then `workbench identify LOG --card"
+                  " card.toml`"),
+    ]  # fmt: skip
+    return screen(*parts)
+
+
+def controller_sentence(found: Demonstration) -> str:
+    """The controller that is recommended, and whether it keeps its limits in simulation."""
+    name = taken(found.design)
+    if found.design.recommended == "none":
+        return "No controller keeps every goal; design.html says what each misses."
+    verdict = "keeps all limits in simulation" if found.validation.passed else "misses a limit"
+    return (
+        f"Recommended: {called(name)}, which {verdict}; % of the step, in motion of the amplitude:"
     )
 
 
-def _rows(found: Demonstration) -> list[Row]:
-    rows: list[Row] = []
-    for name, e in found.traced.model.friction.items():
-        true = _true(found.truth["friction"][name]["value"], e.unit)
-        e = as_shown(e)
-        if e.value is None or e.low is None or e.high is None:
-            rows.append((name, "-", e.unit, f"not identified: {e.reason}", true))
-            continue
-        value, low, high = in_digits((e.value, e.low, e.high), e.value, e.sd)
-        rows.append((name, value, e.unit, f"{low} to {high}", true))
-    return rows
+def taken(design: Design) -> str:
+    """The loop that a design recommends, by its name in a validation."""
+    told = design.recommendation
+    return design.recommended + (COMPENSATED if told is not None and told.compensator else "")
+
+
+def called(name: str) -> str:
+    """A loop's name in a sentence."""
+    alone = name.removesuffix(COMPENSATED)
+    return alone.upper() + (" with the friction compensator" if alone != name else "")
+
+
+def controller_table(found: Demonstration) -> Part:
+    """The present controller and the recommended one, side by side."""
+    units, name = shown(found.traced.model.rotary), taken(found.design)
+    head = ("controller", "off at rest", "overshoot", "settled in", "off in motion",
+            f"peak force [{units.force}]", "modulus margin")  # fmt: skip
+    beside = "+comp" if name.endswith(COMPENSATED) else ""
+    figures = {key: places["model"] for key, places in found.validation.figures.items()}
+    named = (
+        (PRESENT, "before: present"),
+        (name, f"after: {name.removesuffix(COMPENSATED).upper()}{beside}"),
+    )
+    rows = [(said, *_figures(figures[key])) for key, said in named if key in figures]
+    return tabled(head, rows, right=())
+
+
+def _figures(one: LoopFigures) -> Row:
+    if not one.stable:
+        return ("runs away", "-", "-", "-", "-", "-")
+    margin = "-" if one.margins is None else f"{one.margins.modulus:.2f}"
+    return (
+        percent(one.standstill_relative),
+        percent(max(one.overshoot, 0.0)),
+        settled(one),
+        percent(one.smooth_relative),
+        f"{one.force_peak:.3g}",
+        margin,
+    )
+
+
+def _friction(found: Demonstration) -> list[Row]:
+    truth = found.truth["friction"]
+    return [
+        (name, *_beside(e, _true(truth[name]["value"], e.unit)))
+        for name, e in found.traced.model.friction.items()
+    ]
 
 
 def _effects(found: Demonstration) -> list[Row]:
     """Parameters of the effects found, and what they are in truth."""
-    traced = found.traced
-    rows = iter(effect_rows(traced.trace, traced.model.rig))
     out: list[Row] = []
-    for e in traced.trace.effects:
+    for e in found.traced.trace.effects:
+        estimates = effect_estimates(e, found.traced.model.rig)
         for p in e.effect.params:
             true = found.truth["effects"].get(e.effect.key, {}).get(p.name)
             said = _true(true["value"], p.unit) if true else "absent"
-            out.append((*next(rows)[:4], said))
+            out.append((f"{words(e.effect.key)} {p.name}", *_beside(estimates[p.name], said)))
     return out
+
+
+def _beside(e: Estimate, true: str) -> Row:
+    """Value, unit and interval of an estimate, and the truth."""
+    e = as_shown(e)
+    unit = "" if e.unit == "1" else e.unit
+    if e.value is None or e.low is None or e.high is None:
+        why = (e.reason or "no interval").partition(";")[0].partition(":")[0]
+        return ("-", unit, f"not told: {why}", true)
+    value, low, high = in_digits((e.value, e.low, e.high), e.value, e.sd)
+    return (value, unit, f"{low} to {high}", true)
 
 
 def _true(value: float, unit: str) -> str:

@@ -1,17 +1,15 @@
 """A design as tables and lines, for a terminal and a report."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import DriveUnits, equation_lines, force_lines
-from workbench.output import Row, next_step, table, written
+from workbench.output import Row, next_step, written
+from workbench.report.notes import notes
+from workbench.screen import Part, Screen, instead, listed, more, screen, tabled
 from workbench.steps.recommend import other_figures, own_figures
-
-if TYPE_CHECKING:
-    from rich.console import Group
 
 DESIGN_HEAD = (
     "loop",
@@ -56,12 +54,24 @@ def _margins(one: Controller) -> Row:
 
 def design_lines(found: Design, rotary: bool = False) -> list[str]:
     """What the design rests on and what to know of it, in words."""
+    p = found.plant
+    others = other_lines(found)
+    lines = [*others, MARGINS_SAID, f"plant: {p.source}, {p.why}", *loop_lines(found, rotary)]
+    lines += [*refused_lines(found), *missed_lines(found), *set_point_lines(found)]
+    return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def other_lines(found: Design) -> list[str]:
+    """The figures of the other controllers, and of the present one, beside the recommended."""
+    why = found.recommendation.why if found.recommendation else ""
+    return [other_figures(why)] if found.recommended != "none" and other_figures(why) else []
+
+
+def loop_lines(found: Design, rotary: bool = False) -> list[str]:
+    """Periods, gains and the compensator of the loops."""
     p, c = found.plant, found.compensator
     units = shown(rotary, found.command.unit if found.command else "V")
-    why = found.recommendation.why if found.recommendation else ""
-    lines = [other_figures(why)] if found.recommended != "none" and other_figures(why) else []
-    lines += [MARGINS_SAID, f"plant: {p.source}, {p.why}"]
-    lines.append(f"position loop every {1e3 * p.h:.4g} ms{_output(found, units)}")
+    lines = [f"position loop every {1e3 * p.h:.4g} ms{_output(found, units)}"]
     if found.force:
         f = found.force
         lines.append(
@@ -75,16 +85,30 @@ def design_lines(found: Design, rotary: bool = False) -> list[str]:
             f" eps = {g.eps:.4g} s"
         )
     pushed = "what breakaway needs beyond sliding" if c.excess else "the whole breakaway force"
-    lines.append(
+    return [
+        *lines,
         f"compensator: pushes with {pushed} at a position error of"
-        f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)"
-    )
-    lines.extend(f"no {name.upper()}: {why}" for name, why in found.refused.items())
-    for name, one in found.controllers.items():
-        lines.extend(f"{name.upper()} misses: {missed}" for missed in one.missed)
-        if one.note:
-            lines.append(f"{name.upper()}: {one.note}")
-    return [*lines, *(f"note: {line}" for line in found.remarks)]
+        f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)",
+    ]
+
+
+def refused_lines(found: Design) -> list[str]:
+    """Controllers that there are not, and why."""
+    return [f"no {name.upper()}: {why}" for name, why in found.refused.items()]
+
+
+def missed_lines(found: Design) -> list[str]:
+    """The goals that each controller misses."""
+    return [
+        f"{name.upper()} misses: {missed}"
+        for name, one in found.controllers.items()
+        for missed in one.missed
+    ]
+
+
+def set_point_lines(found: Design) -> list[str]:
+    """How each controller follows a reference, and how fast that may move."""
+    return [f"{name.upper()}: {one.note}" for name, one in found.controllers.items() if one.note]
 
 
 def design_sentence(found: Design) -> str:
@@ -152,17 +176,30 @@ def polynomial_lines(found: Design) -> list[str]:
     ]
 
 
-def design_view(found: Design, folder: Path | None, rotary: bool = False) -> "Group":
-    """The design for a terminal."""
-    from rich.console import Group
+def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Screen:
+    """The design for a terminal.
 
+    Behind --verbose: the plant, the other controllers' ramps, and the equations that a drive runs,
+    which `export` writes as code.
+    """
     chosen = None if found.recommended == "none" else found.recommended
-    lines = (*design_lines(found, rotary), *drive_lines(found, chosen))
     said_by_command = folder is not None and chosen is None  # with the names of its files
-    return Group(
-        design_sentence(found),
-        *([] if said_by_command else map(next_step, then_of_design(found, folder))),
-        table(DESIGN_HEAD, margin_rows(found)),
-        *lines,
-        *([] if folder is None else [written(folder, "design.json", "report.html")]),
-    )
+    parts: list[Part | str] = [design_sentence(found)]
+    if not said_by_command:
+        parts.extend(map(next_step, then_of_design(found, folder)))
+    ramps = set_point_lines(found)
+    parts += [
+        tabled(DESIGN_HEAD, margin_rows(found)),
+        MARGINS_SAID,
+        listed(other_lines(found)),
+        more(f"plant: {found.plant.source}, {found.plant.why}"),
+        listed(loop_lines(found, rotary)),
+        listed(refused_lines(found)),
+        listed(missed_lines(found)),
+        instead([one for one in ramps if chosen and one.startswith(chosen.upper())], ramps),
+        notes(found.remarks),
+        *map(more, drive_lines(found, chosen)),
+    ]
+    if folder is not None:
+        parts.append(written(folder, "design.json", "report.html"))
+    return screen(*parts)

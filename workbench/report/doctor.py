@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from identification.model.karnopp import NAMES
+from identification.remarks import Aside
 from workbench.cards.readable import number
 from workbench.cards.units import si_unit
 from workbench.documents.model import Told
+from workbench.remarks import told_once
 from workbench.report.figures import (
     BAND,
     MEASURED,
@@ -23,24 +25,36 @@ from workbench.report.figures import (
     line,
     style,
 )
+from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
 from workbench.steps.told_by_log import Way
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-SCREEN_WIDTH, LABEL_WIDTH = 100, 9
+LABEL_WIDTH = 9
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 
 
-def doctor_view(found: Examined, out: Path | None) -> str:
-    """What the log shows, in at most 40 lines of 100 columns."""
+def doctor_view(found: Examined, out: Path | None) -> Screen:
+    """What the log shows; of each kind a few lines, all of them with --verbose."""
+    return screen(instead(_lines(found, out, MOST_OF_A_KIND), _lines(found, out, None)))
+
+
+def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
+    """The lines, of which each kind has at most so many."""
+
+    def _labelled(name: str, texts: Sequence[str], few: int = 1) -> list[str]:
+        return labelled(name, texts, None if most is None else max(most, few))
+
     lines = [f"{found.file}: {_verdict(found)}", *_labelled("next", [_then(found)])]
     lines += _labelled("clock", [_clock(found.clock)])
     lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
-    lines += _labelled("samples", [_plain(found, one.line) for one in found.bad])
+    bad = [one.line for one in found.bad]
+    told = bad if most is None else told_once(bad, [found.file])
+    lines += _labelled("samples", [_plain(found, one) for one in told])
     lines += _labelled("delay", [_delay(one) for one in found.delays])
     if found.ways is not None:
         ways = found.ways
@@ -58,12 +72,14 @@ def doctor_view(found: Examined, out: Path | None) -> str:
         lines += _labelled("effects", [f"would show: {', '.join(shown) or 'none'}",
                                        f"would not: {', '.join(hidden) or 'none'}"])  # fmt: skip
     lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
-    lines += _labelled("note", [_plain(found, one) for one in found.remarks])
+    said = [one for one in found.remarks if most is None or not isinstance(one, Aside)]
+    said = said if most is None else told_once(said, [found.file])
+    lines += _labelled("note", [_plain(found, one) for one in said])
     if found.refused:
         lines += _labelled("refused", [_plain(found, found.refused)])
     if out is not None:
         lines.append(f"written: {out / 'doctor.json'}, {out / 'doctor.png'}")
-    return "\n".join(lines)
+    return lines
 
 
 def _within(one: Told) -> str:
@@ -92,20 +108,22 @@ def _then(found: Examined) -> str:
     return f"{first}; for the rest, log what 'add' names" if found.add else first
 
 
-def _labelled(name: str, texts: Sequence[str], most: int = MOST_OF_A_KIND) -> list[str]:
-    """The first texts behind a label, each on one or two lines, and how many more there are."""
+def labelled(name: str, texts: Sequence[str], most: int | None) -> list[str]:
+    """The first texts behind a label, each on one or two lines, and how many more there are; most:
+    None for all of them, whole."""
     out = []
+    room = 2 * (SCREEN_WIDTH - LABEL_WIDTH) - 12
     for text in texts[:most]:
-        short = textwrap.shorten(text, 2 * (SCREEN_WIDTH - LABEL_WIDTH) - 12, placeholder=" ...")
+        short = text if most is None else textwrap.shorten(text, room, placeholder=" ...")
         first, *rest = textwrap.wrap(short, SCREEN_WIDTH - LABEL_WIDTH) or [""]
         out += [f"{name:{LABEL_WIDTH}}{first}", *(f"{'':{LABEL_WIDTH}}{one}" for one in rest)]
-    if len(texts) > most:
-        out.append(f"{'':{LABEL_WIDTH}}and {len(texts) - most} more (--json)")
+    if most is not None and len(texts) > most:
+        out.append(f"{'':{LABEL_WIDTH}}... and {len(texts) - most} more: {VERBOSE}")
     return out
 
 
 def _plain(found: Examined, text: str) -> str:
-    return text.replace(f"{found.file}: ", "")
+    return text.replace(f"{found.file}: ", "").replace(f"{found.file}, ", "")
 
 
 def _clock(clock: Clock) -> str:

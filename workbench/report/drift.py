@@ -7,13 +7,15 @@ import numpy as np
 from workbench.report.drift_tables import (
     RUN_HEAD,
     SHIFT_HEAD,
+    drift_notes,
     drift_sentence,
-    notes,
+    logs_of_drift,
     run_rows,
     shift_rows,
     then_of_drift,
 )
 from workbench.report.figures import BAND, MEASURED, MODEL, REFERENCE, figure, inline, label, style
+from workbench.report.notes import report_notes
 from workbench.report.page import Section, page
 from workbench.report.templating import render
 from workbench.steps.drift import Drifted, Tested
@@ -37,7 +39,8 @@ def drift_report(found: Drifted) -> str:
         )
     else:
         sections.append(logs)
-    sections.append(Section("Notes", render("lines", lines=notes(found))))
+    told = report_notes(drift_notes(found), logs_of_drift(found))
+    sections.append(Section("Notes", render("lines", lines=told)))
     then = then_of_drift(found)
     return page(f"Drift test of {found.model.card}", drift_sentence(found), sections, then)
 

@@ -1,16 +1,16 @@
 """A drift test in words and tables, for a terminal and for its report."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
 from workbench.cards.readable import number, shown_unit
-from workbench.output import Row, next_step, table, written
+from workbench.output import Row, next_step, written
+from workbench.remarks import told_once
+from workbench.report.model_tables import reasons_once
+from workbench.report.notes import notes
+from workbench.screen import Part, Screen, instead, screen, tabled
 from workbench.steps.drift import Drifted, Tested
-
-if TYPE_CHECKING:
-    from rich.console import Group
 
 RUN_HEAD = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
 SHIFT_HEAD = ("parameter", "before", "after", "unit", "change", "95 % interval")
@@ -138,10 +138,10 @@ def then_of_drift(found: Drifted) -> list[str]:
                     " slow changes too"]  # fmt: skip
 
 
-def notes(found: Drifted) -> list[str]:
-    """What to know of the tests: thresholds, runs not judged, remarks."""
+def what_the_columns_say(found: Drifted) -> list[str]:
+    """Legend of the tables, and what counts as a change."""
     setting = found.settings
-    out = [
+    return [
         "this log, mean of logs: how far the parameters have moved, of how far it takes to be"
         " drift; chi-square: what the model leaves, of what it may",
         f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
@@ -149,29 +149,58 @@ def notes(found: Drifted) -> list[str]:
         "the intervals hold the errors of the model and of the log, and how much the machine varies"
         f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
     ]
+
+
+def seen_lines(found: Drifted) -> list[str]:
+    """What each test could have seen, and why a log was not judged."""
+    out = []
     for one in found.tests:
-        said = seen_sentence(one.test, setting.to_be_seen)
+        said = seen_sentence(one.test, found.settings.to_be_seen)
         if said:
             out.append(f"{one.source.file}: {said}")
         if one.test.reason:
             out.append(one.test.reason)
         if one.test.found_by == "mean":
             out.append(f"{one.source.file}: found by the mean over the logs, not by this log alone")
-    return [*out, *found.remarks]
+    return out
 
 
-def drift_view(found: Drifted, folder: Path | None) -> "Group":
+def drift_notes(found: Drifted) -> list[str]:
+    """What to know of the tests: thresholds, runs not judged, remarks."""
+    return [*what_the_columns_say(found), *seen_lines(found), *found.remarks]
+
+
+def logs_of_drift(found: Drifted) -> tuple[str, ...]:
+    """Names of the logs, as remarks begin with them."""
+    names = ((one.source.file, one.source.log.name) for one in found.tests)
+    return tuple(dict.fromkeys(name for both in names for name in both))
+
+
+def drift_view(found: Drifted, folder: Path | None) -> Screen:
     """The verdict, every run, the parameters of the last one, for a terminal."""
-    from rich.console import Group, RenderableType
-
-    parts: list[RenderableType] = [drift_sentence(found)]
+    parts: list[Part | str] = [drift_sentence(found)]
     if folder is None or found.verdict in ("none", "not_judged"):  # else the command says it
         parts.extend(map(next_step, then_of_drift(found)))
-    parts.append(table(RUN_HEAD, run_rows(found), right=()))
-    rows = shift_rows(found.tests[-1])
+    parts.append(tabled(RUN_HEAD, run_rows(found), right=(), latest=True))
+    rows, logs = shift_rows(found.tests[-1]), logs_of_drift(found)
     if rows:
-        parts.append(table(SHIFT_HEAD, rows, right=(1, 2)))
-    parts.extend(f"note: {line}" for line in notes(found))
+        once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
+        parts.append(tabled(SHIFT_HEAD, once, right=(1, 2), whole=rows))
+    legend, seen = what_the_columns_say(found), seen_lines(found)
+    # What is not judged, and why, stands in the table too.
+    told = told_once((line.partition("; not judged: ")[0] for line in seen), logs)
+    short = [line for line in told if line not in drift_sentence(found)]
+    parts.append(instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]))
+    parts.append(
+        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True)
+    )
+    parts.append(notes(found.remarks, logs))
     if folder is not None:
         parts.append(written(folder, "drift.json", "report.html"))
-    return Group(*parts)
+    return screen(*parts)
+
+
+def _swapped(row: Row) -> Row:
+    """A row of `SHIFT_HEAD` with the unit after the change, as `reasons_once` has it; or back."""
+    first, second = row[3:5]
+    return (*row[:3], second, first, *row[5:])

@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
-from workbench.output import Row, table, written
+from workbench.output import Row, written
 from workbench.report.figures import (
     BAND,
     GREY,
@@ -21,14 +21,15 @@ from workbench.report.figures import (
     style,
     thinned,
 )
+from workbench.report.notes import notes
 from workbench.report.page import Section, page
 from workbench.report.templating import render
+from workbench.screen import Screen, listed, more, screen, tabled
 from workbench.steps.experiment.planned import Experiment, Promised
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.console import Group
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
 PIECE_NAMES = {
@@ -97,34 +98,44 @@ def _safe(found: Experiment) -> str:
 
 def experiment_lines(found: Experiment) -> list[str]:
     """Limits and what the run uses of them, how it is put together, remarks."""
+    return [*limit_lines(found), *search_lines(found), *found.remarks]
+
+
+def limit_lines(found: Experiment) -> list[str]:
+    """How to run it, and what it uses of the limits."""
     units, limits, used = shown(found.motion == "rotary"), found.limits, found.safety.peaks
-    r_0, tried = float(found.r[0]), found.tried
-    out = [
+    r_0 = float(found.r[0])
+    return [
         f"begin with the machine at rest at {r_0:.4g} {units.position} ({found.controller} moves"
         f" it); log every {1e3 * found.h:.4g} ms or faster, then identify the log alone",
         f"position {used.low:.3g} to {used.high:.3g} of {limits.stroke[0]:.3g} to"
         f" {limits.stroke[1]:.3g} {units.position}, speed {used.speed:.3g} of {limits.speed:.3g}"
         f" {units.velocity}, force {used.force:.3g} of {limits.force:.3g} {units.force}, command"
         f" {used.command:.3g} {found.command_unit}",
-        f"{len(found.segments)} pieces out of {tried[0]}, {tried[1]} whole runs tried",
     ]
+
+
+def search_lines(found: Experiment) -> list[str]:
+    """How the run is put together."""
+    tried = found.tried
+    out = [f"{len(found.segments)} pieces out of {tried[0]}, {tried[1]} whole runs tried"]
     if found.efficiency is not None:
         out.append(
             f"whole pieces tell {found.efficiency:.0%} of what the best shares of the time would,"
             " a parameter"
         )
-    return [*out, *found.remarks]
+    return out
 
 
-def experiment_view(found: Experiment, folder: Path | None) -> "Group":
-    """The experiment for a terminal."""
-    from rich.console import Group
-
+def experiment_view(found: Experiment, folder: Path | None) -> Screen:
+    """The experiment for a terminal; how it was searched with --verbose."""
     names = ("reference.csv", "experiment.json", "report.html")
-    return Group(
+    return screen(
         experiment_lead(found),
-        table(PROMISE_HEAD, promise_rows(found), right=(1, 3, 4, 5)),
-        *experiment_lines(found),
+        tabled(PROMISE_HEAD, promise_rows(found), right=(1, 3, 4, 5)),
+        listed(limit_lines(found)),
+        more(listed(search_lines(found))),
+        notes(found.remarks),
         *([] if folder is None else [written(folder, *names)]),
     )
 

@@ -2,31 +2,34 @@
 
 from pathlib import Path
 
-from workbench.output import Row, next_step, table
+from workbench.output import Row, next_step
+from workbench.screen import Part, Screen, listed, screen, tabled
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
+MOST_LEFT_OUT = 5  # columns that one screen names
 NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
-def proposal_view(of: Proposal, card: Path, refused: str) -> object:
+def proposal_view(of: Proposal, card: Path, refused: str) -> Screen:
     """What the card says, what is left out of it, and what to do next.
 
     refused: why the log cannot be read by the card yet, empty where it can.
     """
-    from rich.console import Group
-
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
     guesses = [row[0] for row in rows if row[3] == "guess"]
     looked = f"look at the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
-    parts: list[object] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
+    parts: list[Part | str] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
     parts.append(next_step(NEXT_COMMAND.format(log=of.path, card=card)))
     if refused:
         parts.append(f"With this card the log cannot be read yet: {refused}")
-    parts.append(table(("", "column or value", "unit", "", "why"), rows, right=()))
-    parts += [f"note: {line}" for line in of.remarks]
-    parts += [f"left out: {shown} ({why})" for shown, why in of.unused.items()]
-    parts.append(f"written: {card}")
-    return Group(*[one for one in parts])  # type: ignore[arg-type]
+    left_out = (f"left out: {shown} ({why})" for shown, why in of.unused.items())
+    parts += [
+        tabled(("", "column or value", "unit", "", "why"), rows, right=()),
+        listed(f"note: {line}" for line in of.remarks),
+        listed(left_out, MOST_LEFT_OUT),
+        f"written: {card}",
+    ]
+    return screen(*parts)
 
 
 def _signal_row(one: SignalGuess) -> Row:

@@ -3,12 +3,13 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from workbench.screen import Screen, screen
 from workbench.steps.installation import OPTIONAL, Installation
 
 
 def installation_view(
     found: Installation, registry: Mapping[str, Any] | None, wrong: Sequence[str]
-) -> str:
+) -> Screen:
     """Versions, kernels, data and registry, a line each, and what is wrong."""
     packages = ", ".join(f"{name} {number}" for name, number in found.packages.items())
     cache, data = found.cache, found.data
@@ -34,7 +35,7 @@ def installation_view(
     else:
         says = f"answers, {registry['machines']} machines" if registry["answers"] else "no answer"
         lines.append(f"registry  {registry['where']}: {says}")
-    return "\n".join([*lines, *(f"wrong     {one}" for one in wrong)])
+    return screen(*lines, *(f"wrong     {one}" for one in wrong))
 
 
 def _texts(value: object) -> list[str]:

@@ -1,17 +1,17 @@
 """Results as tables for a terminal and as rows for a report."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
-from workbench.documents.model import Model
-from workbench.output import Row, next_step, table, written
-
-if TYPE_CHECKING:
-    from rich.console import Group
+from workbench.documents.model import Model, used
+from workbench.output import Row, next_step, written
+from workbench.remarks import told_once
+from workbench.report.notes import notes
+from workbench.screen import Part, Screen, instead, more, screen, tabled
 
 MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")
 MEANING = {
@@ -40,7 +40,17 @@ def parameter_rows(model: Model) -> list[Row]:
     """Parameter, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
     found = {**model.friction, **(model.actuator or {})}
     meaning = ROTARY_MEANING if model.rotary else MEANING
-    return [(name, *_cells(value), meaning.get(name, "")) for name, value in found.items()]
+    rows = [(name, *_cells(value), meaning.get(name, "")) for name, value in found.items()]
+    for key, own in model.effects.items():
+        params = {p.name: p for p in model.library[key].params}
+        rows += [
+            (f"{key.replace('_', ' ')} {name}", *_cells(value), params[name].meaning)
+            for name, value in own.items()
+            if not params[name].held(used(value))
+        ]
+    if model.lag is not None:
+        rows.append(("lag", *_cells(model.lag), "of the position behind the force of its row"))
+    return rows
 
 
 def _cells(estimate: Estimate) -> tuple[str, str, str]:
@@ -54,20 +64,63 @@ def _cells(estimate: Estimate) -> tuple[str, str, str]:
     return value, estimate.unit, f"{low} to {high}"
 
 
-def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> "Group":
+def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> Screen:
     """The parameters, what the fit leaves, and remarks, for a terminal."""
-    from rich.console import Group, RenderableType
-
     rows = [row[:4] for row in parameter_rows(model)]
-    parts: list[RenderableType] = [summary(model)]
+    logs = logs_of(model)
+    parts: list[Part | str] = [summary(model)]
     if folder is None:  # the command says it itself, with the names of its files
         parts.append(next_step(next_of_model(model)))
-    parts.append(table(MODEL_HEAD, rows))
-    parts.extend(fit_lines(model))
-    parts.extend(f"note: {line}" for line in (*remarks, *model.fit.remarks))
+    parts.append(tabled(MODEL_HEAD, reasons_once(rows, logs), whole=rows))
+    lines = fit_lines(model)
+    parts.append(instead(told_once(lines, logs), lines))
+    parts.extend(map(more, plant_lines(model)))
+    parts.append(notes((*remarks, *model.fit.remarks), logs))
     if folder is not None:
         parts.append(written(folder, "model.json", "report.html"))
-    return Group(*parts)
+    return screen(*parts)
+
+
+def logs_of(model: Model) -> tuple[str, ...]:
+    """Names of the model's logs, as remarks begin with them."""
+    return tuple(dict.fromkeys(entry.file for entry in model.log))
+
+
+WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
+ADVICE = re.compile(r"(: the logs do not tell it)?; .*")  # at the end of a reason
+
+
+def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
+    """Rows of parameters for one screen: those that are not told for the same reason in one row,
+    without the reason's advice.
+
+    value: column of the value, before those of the unit and of the interval or reason.
+    """
+    out: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        told = row[value] != "-"
+        out.setdefault((row[0],) if told else ("", _short(row[value + 2], logs)), []).append(row)
+    return [
+        alike[0] if name else _together(alike, reason, value)
+        for (name, *reason), alike in out.items()
+    ]
+
+
+def _together(alike: Sequence[Row], reason: Sequence[str], value: int) -> Row:
+    """Rows of parameters that are not told for the same reason as one."""
+    names, units = ", ".join(row[0] for row in alike), {row[value + 1] for row in alike}
+    unit, rest = units.pop() if len(units) == 1 else "", len(alike[0]) - value - 3
+    return (names, *alike[0][1:value], "-", unit, *reason, *[""] * rest)
+
+
+def _short(reason: str, logs: Iterable[str]) -> str:
+    """A reason without the name of the log and its advice."""
+    said = reason.removeprefix("not identified: ")
+    for name in (*logs, *re.findall(r"^\d+ logs", said)):
+        said = said.removeprefix(f"{name}: ")
+    if not said:
+        return "not told"
+    return "not told: " + WIDE.sub(r"found \1, anywhere in \2", ADVICE.sub("", said))
 
 
 def summary(model: Model) -> str:
@@ -101,7 +154,7 @@ def next_of_model(model: Model) -> str:
 
 
 def fit_lines(model: Model) -> list[str]:
-    """What the fit leaves, in words."""
+    """What the fit leaves, and what would tell the rest, in words."""
     by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
         f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
@@ -110,7 +163,7 @@ def fit_lines(model: Model) -> list[str]:
         if e.position_rms is not None
     ]
     if model.imposed:
-        lines.append("the motion was imposed: the equation of motion was fitted, not a free run")
+        lines.append("the equation of motion was fitted, not a free run")
     if model.fit.force_relative is not None:
         share = 100 * model.fit.force_relative
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
@@ -119,16 +172,19 @@ def fit_lines(model: Model) -> list[str]:
         lines.append(f"to tell the rest: {'; '.join(runs)}")
     if model.posterior is not None:
         lines.append(f"posterior: {model.posterior['verdict']}")
-    if model.plant is None:
-        lines.append(f"no ARX plant: {model.plant_reason}")
-    else:
-        p = model.plant
-        lines.append(
-            f"linear plant (ARX) from {p.input} to y, every {1e3 * p.h:.4g} ms: na={p.na},"
-            f" nb={p.nb}, nk={p.nk}; one step ahead within"
-            f" {length(p.one_step_rms, model.rotary)} rms on held-out samples"
-        )
     return lines
+
+
+def plant_lines(model: Model) -> list[str]:
+    """The linear plant, or why there is none, in words."""
+    if model.plant is None:
+        return [f"no ARX plant: {model.plant_reason}"]
+    p = model.plant
+    return [
+        f"linear plant (ARX) from {p.input} to y, every {1e3 * p.h:.4g} ms: na={p.na},"
+        f" nb={p.nb}, nk={p.nk}; one step ahead within"
+        f" {length(p.one_step_rms, model.rotary)} rms on held-out samples"
+    ]
 
 
 def runs_to_add(model: Model) -> tuple[str, ...]:

@@ -1,10 +1,15 @@
 """A prediction in words and as a picture."""
 
+from pathlib import Path
+
 import numpy as np
 
 from workbench.cards.readable import force, length, units_of
+from workbench.output import next_step, written
 from workbench.report.chart import Chart, Colour, Line, Look, Panel, chart_html
+from workbench.report.notes import notes
 from workbench.report.page import Section
+from workbench.screen import Screen, screen
 from workbench.steps.predict import Predicted
 
 Columns = tuple[tuple[str, Colour, str], ...]
@@ -26,6 +31,12 @@ def then_of_prediction(log: str, card: str) -> list[str]:
 
 def prediction_lines(found: Predicted, rotary: bool) -> list[str]:
     """How far the model lies from the log, and what to know of it, a line each."""
+    remarks = (f"note: {remark}" for remark in found.summary["remarks"])
+    return [*error_lines(found, rotary), *remarks]
+
+
+def error_lines(found: Predicted, rotary: bool) -> list[str]:
+    """How far the model lies from the log, a line each."""
     summary = found.summary
     by = "the command" if summary["drive"] == "command" else "the applied force"
     window = summary["window"]
@@ -44,7 +55,17 @@ def prediction_lines(found: Predicted, rotary: bool) -> list[str]:
     if summary["force_simulated_rms"] is not None:
         rms = force(summary["force_simulated_rms"], rotary)
         lines.append(f"force, simulated: off by {rms} rms")
-    return [*lines, *(f"note: {remark}" for remark in summary["remarks"])]
+    return lines
+
+
+def prediction_view(found: Predicted, rotary: bool, log: str, card: str, folder: Path) -> Screen:
+    """The prediction of a log for a terminal."""
+    return screen(
+        *error_lines(found, rotary),
+        *map(next_step, then_of_prediction(log, card)),
+        notes(found.summary["remarks"], (Path(log).name,)),
+        written(folder, "prediction.csv"),
+    )
 
 
 def prediction_section(found: Predicted, rotary: bool) -> Section:

@@ -14,7 +14,14 @@ from workbench.report.design_tables import design_sentence, then_of_design
 from workbench.report.fit import fit
 from workbench.report.friction import friction_curve
 from workbench.report.loop import judged, loop
-from workbench.report.model_tables import fit_lines, next_of_model, summary
+from workbench.report.model_tables import (
+    fit_lines,
+    logs_of,
+    next_of_model,
+    plant_lines,
+    summary,
+)
+from workbench.report.notes import report_notes
 from workbench.report.page import Section, page
 from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
@@ -30,13 +37,13 @@ def identification_report(found: Identified) -> str:
     """HTML: what was identified, how well it follows the log, what it leaves."""
     model, sources = found.model, found.sources
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
-    notes = [*fit_lines(model), *found.remarks, *model.fit.remarks]
+    told = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
     sections = (
         residual(model, sources, runs),
         parameters_section(model),
         friction_curve(model, found.fit, sources),
         fit(model, sources, runs),
-        Section("In words", render("lines", lines=notes)),
+        Section("In words", render("lines", lines=report_notes(told, logs_of(model)))),
     )
     then = [next_of_model(model)]
     return page(f"Identification of {model.card}", summary(model), sections, then)

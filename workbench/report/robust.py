@@ -9,7 +9,7 @@ import numpy as np
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
-from workbench.output import Row, table, written
+from workbench.output import Row, written
 from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
 from workbench.report.figures import (
@@ -23,8 +23,10 @@ from workbench.report.figures import (
     line,
     style,
 )
+from workbench.report.notes import notes
 from workbench.report.page import Section, page
 from workbench.report.templating import render
+from workbench.screen import Screen, listed, screen, tabled
 from workbench.steps.loop_figures import PRESENT
 from workbench.steps.robust.outcomes import MEASURES, Measure
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
@@ -32,7 +34,6 @@ from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spre
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from rich.console import Group
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "kept", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that keeps the limit", "robust", "nominal", "present")
@@ -121,6 +122,16 @@ def _said(one: Measure, value: float, rotary: bool) -> str:
 
 def robust_lines(found: Robust, rotary: bool) -> list[str]:
     """How it was chosen, and what to know of it."""
+    return [*choice_lines(found, rotary), *(f"note: {one}" for one in robust_remarks(found))]
+
+
+def robust_remarks(found: Robust) -> tuple[str, ...]:
+    """What it misses, and its remarks."""
+    return (*found.missed, *found.remarks)
+
+
+def choice_lines(found: Robust, rotary: bool) -> list[str]:
+    """How it was chosen."""
     speed, (unit, factor) = found.speed, shown_unit(shown(rotary).velocity)
     drift = ", ".join(f"{n} {100 * s:.2g} %" for n, s in (found.asked.drift or {}).items())
     return [
@@ -128,20 +139,18 @@ def robust_lines(found: Robust, rotary: bool) -> list[str]:
         f" counted on as many drawn anew (seed {found.asked.seed})",
         *([f"drawn with the drift seen so far: {drift}"] if drift else []),
         f"slow ramp: {number(factor * speed)} {unit}, half the narrowest stick band",
-        *(f"note: {line}" for line in (*found.missed, *found.remarks)),
     ]
 
 
-def robust_view(found: Robust, folder: Path | None, rotary: bool) -> "Group":
+def robust_view(found: Robust, folder: Path | None, rotary: bool) -> Screen:
     """The robust design for a terminal."""
-    from rich.console import Group
-
     names = ("design.json", "robust.json", "report.html")
-    return Group(
+    return screen(
         robust_sentence(found),
-        table(ROBUST_HEAD, promise_rows(found, rotary), right=(2, 3, 4, 5)),
-        table(BESIDE_HEAD, beside_rows(found, rotary), right=(1, 2, 3)),
-        *robust_lines(found, rotary),
+        tabled(ROBUST_HEAD, promise_rows(found, rotary), right=(2, 3, 4, 5)),
+        tabled(BESIDE_HEAD, beside_rows(found, rotary), right=(1, 2, 3)),
+        listed(choice_lines(found, rotary)),
+        notes(robust_remarks(found)),
         *([] if folder is None else [written(folder, *names)]),
     )
 

@@ -2,6 +2,7 @@
 
 from workbench.output import Row
 from workbench.report.free_curves import free_curves
+from workbench.report.notes import report_notes
 from workbench.report.page import Section, page
 from workbench.report.templating import render
 from workbench.report.trace_friction import friction_before_after
@@ -23,6 +24,7 @@ from workbench.report.trace_tables import (
     effect_rows,
     error_rows,
     errors_head,
+    logs_of_trace,
     rival_rows,
 )
 from workbench.report.trace_words import then_of, trace_sentence, words
@@ -64,7 +66,7 @@ def trace_report(traced: Traced) -> str:
     ):
         if rows:
             sections.append(_table(title, head, rows))
-    notes = [*traced.remarks, *found.remarks]
+    notes = report_notes((*traced.remarks, *found.remarks), logs_of_trace(traced))
     if notes:
         sections.append(Section("Notes", render("lines", lines=notes)))
     return page(f"Trace of {model.card}", trace_sentence(traced), sections, then_of(traced))

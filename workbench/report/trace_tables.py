@@ -2,8 +2,8 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.log import Rig
 from identification.model.estimates import Estimate
@@ -22,12 +22,12 @@ from workbench.cards.readable import (
     small,
     units_of,
 )
-from workbench.output import Row, next_step, table, written
+from workbench.output import Row, next_step, written
+from workbench.report.model_tables import reasons_once
+from workbench.report.notes import notes
 from workbench.report.trace_words import percent, then_of, trace_sentence, words
+from workbench.screen import Part, Screen, more, screen, tabled
 from workbench.steps.trace import Traced, effect_estimates
-
-if TYPE_CHECKING:
-    from rich.console import Group
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
 RIVAL_HEAD = ("rival", "force left", "why not")
@@ -93,6 +93,30 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
     numbers = (estimate.value, estimate.low, estimate.high)
     value, low, high = in_digits(numbers, estimate.value, estimate.sd)
     return value, f"{low} to {high}"
+
+
+def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row]:
+    """The rows of `effect_rows` for one screen: a row names the effect, those of its parameters
+    follow."""
+    out: list[Row] = []
+    for e in found.effects:
+        name = words(e.effect.key)
+        own = [row for row in rows if row[0].startswith(f"{name} ")]
+        short = [(row[0].removeprefix(f"{name} "), *row[1:]) for row in own]
+        out.append((f"{name}:", "", "", "", ""))
+        if len(found.effects) > 1:  # their reasons would push other effects from the screen
+            short = [row if row[1] != "-" else (*row[:3], "", row[4]) for row in short]
+        out += [(f"  {row[0]}", *row[1:]) for row in reasons_once(short, logs)]
+    return out
+
+
+def _effects(found: Trace, rows: list[Row], logs: Sequence[str]) -> Part:
+    """The table of the effects; of one effect alone there is room for what its parameters mean."""
+    once = effects_once(rows, found, logs)
+    if len(found.effects) == 1:
+        return tabled(EFFECT_HEAD, once, whole=rows)
+    short = tabled(EFFECT_HEAD[:-1], [row[:-1] for row in once])
+    return replace(short, whole=tuple(rows), whole_head=EFFECT_HEAD)
 
 
 def effect_lines(found: Trace) -> list[str]:
@@ -171,20 +195,41 @@ def drift_rows(found: Trace) -> list[Row]:
     ]
 
 
-def trace_view(traced: Traced, folder: Path | None) -> "Group":
-    """The verdict, errors before and after, effects, rivals and drift, for a terminal."""
-    from rich.console import Group, RenderableType
+def trace_view(traced: Traced, folder: Path | None) -> Screen:
+    """The verdict, errors before and after, effects, parameters and drift, for a terminal.
 
-    found = traced.trace
-    parts: list[RenderableType] = [trace_sentence(traced)]
+    Behind --verbose: the effects' equations and sources, and the rivals.
+    """
+    found, rotary = traced.trace, traced.model.rotary
+    plain, logs = change_rows(found), logs_of_trace(traced)
+    parts: list[Part | str] = [trace_sentence(traced)]
     parts.extend(next_step(line) for line in then_of(traced, folder))
-    for head, rows, lines in trace_parts(traced):
-        parts.append(table(head, rows))
-        parts.extend(lines)
-    parts.extend(f"note: {line}" for line in (*traced.remarks, *found.remarks))
+    errors = error_rows(found, rotary)
+    parts.append(tabled(errors_head(bool(traced.test)), _telling(errors), whole=errors))
+    if found.effects:
+        rows = effect_rows(found, traced.model.rig)
+        parts.append(_effects(found, rows, logs))
+        parts += map(more, effect_lines(found))
+    parts.append(more(tabled(RIVAL_HEAD, rival_rows(found, rotary))))
+    told = reasons_once(plain, logs, 2 if found.effects else 1)
+    parts.append(tabled(change_head(found), told, whole=plain))
+    if found.drift:
+        parts.append(tabled(DRIFT_HEAD, drift_rows(found)))
+    parts.append(notes((*traced.remarks, *found.remarks), logs))
     if folder is not None:
         parts.append(written(folder, "trace.json", "model.json", "report.html"))
-    return Group(*parts)
+    return screen(*parts)
+
+
+def logs_of_trace(traced: Traced) -> tuple[str, ...]:
+    """Names of its logs, as remarks begin with them."""
+    return tuple(dict.fromkeys(source.log.name for source in (*traced.train, *traced.test)))
+
+
+def _telling(errors: list[Row]) -> list[Row]:
+    """The errors in newtons and millimetres that are known; those that fell, where any did."""
+    known = [row for row in errors if set(row[1:5]) != {"-"} and "%" not in row[0]]
+    return [row for row in known if row[1] != row[2] or row[3] != row[4]] or known
 
 
 def trace_parts(traced: Traced) -> list[tuple[Sequence[str], list[Row], list[str]]]:

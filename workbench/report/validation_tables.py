@@ -1,18 +1,15 @@
 """A validation as tables and lines, for a terminal and a report."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length
-from workbench.output import Row, next_step, table, written
+from workbench.output import Row, next_step, written
+from workbench.report.notes import notes
+from workbench.screen import Part, Screen, listed, more, screen, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
 from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
 from workbench.steps.validate import Validation
-
-if TYPE_CHECKING:
-    from rich.console import Group
-    from rich.padding import Padding
 
 
 def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
@@ -46,9 +43,9 @@ def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
     ]
 
 
-def validation_table(found: Validation, rotary: bool = False) -> "Padding":
+def validation_table(found: Validation, rotary: bool = False) -> Part:
     """The table for a terminal."""
-    return table(validation_head(found, rotary), validation_rows(found, rotary), right=())
+    return tabled(validation_head(found, rotary), validation_rows(found, rotary), right=())
 
 
 def _any(found: Validation) -> LoopFigures:
@@ -103,17 +100,22 @@ def validation_lines(found: Validation, rotary: bool = False) -> list[str]:
     others = other_figures(found.why)
     lines = [others] if others else []
     lines += [line for name in alone for line in _missed(found, name)]
+    lines.append(columns_line(found, rotary))
+    return [*lines, *(f"note: {line}" for line in found.remarks)]
+
+
+def columns_line(found: Validation, rotary: bool = False) -> str:
+    """What the columns of the table mean, and the limits of command and force."""
     one, units = _any(found), shown(rotary)
     limit = (
         "" if one.command_limit is None else f"; limit {one.command_limit:.4g} {one.command_unit}"
     )
     limit += "" if one.force_limit is None else f", {one.force_limit:.4g} {units.force}"
-    lines.append(
+    return (
         f"steps of {length(one.step, rotary)}; at rest, over (overshoot): error relative to the"
         " step; smooth: to the amplitude of the smooth reference; margin: modulus margin; delay:"
         f" delay margin in sampling periods; +comp: with the compensator{limit}"
     )
-    return [*lines, *(f"note: {line}" for line in found.remarks)]
 
 
 def missed(found: Validation) -> str | None:
@@ -150,15 +152,21 @@ def then_of_validation(found: Validation) -> list[str]:
     return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"]
 
 
-def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> "Group":
-    """The validation for a terminal."""
-    from rich.console import Group
-
+def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> Screen:
+    """The validation for a terminal; what controllers miss that are not judged, with --verbose."""
     said_by_command = folder is not None and not found.passed  # with the names of its files
-    return Group(
-        validation_sentence(found),
-        *([] if said_by_command else map(next_step, then_of_validation(found))),
+    others = other_figures(found.why)
+    alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
+    parts: list[Part | str] = [validation_sentence(found)]
+    if not said_by_command:
+        parts.extend(map(next_step, then_of_validation(found)))
+    parts += [
         validation_table(found, rotary),
-        *validation_lines(found, rotary),
-        *([] if folder is None else [written(folder, "validation.json", "report.html")]),
-    )
+        *([more(others)] if others else []),
+        *(more(listed(_missed(found, name))) for name in alone),
+        columns_line(found, rotary),
+        notes(found.remarks),
+    ]
+    if folder is not None:
+        parts.append(written(folder, "validation.json", "report.html"))
+    return screen(*parts)

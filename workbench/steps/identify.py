@@ -27,6 +27,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, actuator_units
 from identification.model.surroundings import Surroundings
 from identification.progress import KeepGoing, without_end
+from identification.remarks import Aside
 from identification.signals.differentiate import differentiate
 from workbench.cards.effect_values import relabelled
 from workbench.cards.parameter_units import friction_units
@@ -216,14 +217,17 @@ def _force_error(log: Log, fit: KarnoppFit, rig: Rig) -> ForceError | None:
 
 def closed_loop_remarks(logs: Sequence[Log]) -> list[str]:
     """A line for each log that was taken in a position loop."""
-    out = []
+    out = list[str]()
     for log in logs:
         if "r" in log and np.ptp(log["r"]) > 0:
             together = float(np.corrcoef(log["r"], log["y"])[0, 1])
             if together > TRACKS:
                 out.append(
-                    f"{log.name}: logged in a closed loop (r and y correlate by {together:.2f});"
-                    " the ARX plant is fitted directly, so noise fed back may bias it"
+                    Aside(
+                        f"{log.name}: logged in a closed loop (r and y correlate by"
+                        f" {together:.2f}); the ARX plant is fitted directly, so noise fed back may"
+                        " bias it"
+                    )
                 )
     return out
 

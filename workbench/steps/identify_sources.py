@@ -85,13 +85,13 @@ def broken_promises(model: Model) -> tuple[str, ...]:
             continue
         half = NORMAL_95 * found.sd / abs(found.value)
         if half > BROKEN * one.within:
-            wider.append(f"{one.name} {half:.1%} ({one.within:.1%})")
+            wider.append(f"{one.name} {100 * half:.2g} % ({100 * one.within:.2g} %)")
     if not wider:
         return ()
     why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
     return (
-        f"known within {', '.join(wider)}; in brackets what the logs promised before the fit:"
-        f" {why}, or their noise is no sensor's",
+        f"intervals are wider than the logs promised (in brackets): {', '.join(wider)}; {why}, or"
+        " their noise is not the sensors' alone",
     )
 
 

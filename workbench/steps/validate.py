@@ -7,6 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.errors import BadModel
+from identification.remarks import Aside
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
 from workbench.documents.model import Model
@@ -118,12 +119,14 @@ def _remarks(
     found: Design,
     machines: Sequence[Model | None],
 ) -> list[str]:
-    out = [
-        f"with the compensator, on the {place}: error at standstill"
-        f" {100 * figures[judged][place].standstill_relative:.3g} ->"
-        f" {100 * one.standstill_relative:.3g} %, along the smooth reference"
-        f" {100 * figures[judged][place].smooth_relative:.3g} -> {100 * one.smooth_relative:.3g} %"
-        f"{'' if one.stable else ', unstable'}"
+    out: list[str] = [
+        Aside(
+            f"with the compensator, on the {place}: error at standstill"
+            f" {100 * figures[judged][place].standstill_relative:.3g} ->"
+            f" {100 * one.standstill_relative:.3g} %, along the smooth reference"
+            f" {100 * figures[judged][place].smooth_relative:.3g} ->"
+            f" {100 * one.smooth_relative:.3g} %{'' if one.stable else ', unstable'}"
+        )
         for place, one in figures[judged + COMPENSATED].items()
     ]
     if found.recommended == "none":
@@ -133,11 +136,15 @@ def _remarks(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )
     unit = shown(found.motion == "rotary")
+    with_it = found.recommendation is not None and found.recommendation.compensator
+    taken = judged + (COMPENSATED if with_it else "")
     for name, places in figures.items():
         for place, one in places.items():
             called = name if name == PRESENT else name.replace(name[:3], name[:3].upper(), 1)
             seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
-            out += (f"{called} on the {place}: {line}" for line in seen)
+            told = (f"{called} on the {place}: {line}" for line in seen)
+            # What the table of the loops shows of those that nobody takes is an aside.
+            out += told if name in (judged, taken) else map(Aside, told)
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")
     return out

@@ -96,7 +96,7 @@ def test_gap_and_jitter_are_remarked() -> None:
     prepared = prepare(sliding_log(t=t), RIG)
     assert len(prepared.runs) == 2
     assert "uneven clock" in prepared.remarks[0]
-    assert "2 runs" in prepared.remarks[0]
+    assert "2 runs" in prepared.remarks[1]
 
 
 def test_isolated_nan_is_filled_and_remarked() -> None:

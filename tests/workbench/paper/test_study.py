@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, replace
 from html import unescape
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,9 +13,10 @@ from design.servo import Compensation
 from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from identification.simulation.karnopp_step import F_CN, F_CP, F_SN, F_SP
+from tests.screens import one_screen
 from workbench.output import dumps
 from workbench.paper.claims import claims
-from workbench.paper.document import paper_document
+from workbench.paper.document import paper_document, paper_view
 from workbench.paper.figures_rig import RigFigures
 from workbench.paper.measures import figures_of, measure, standing
 from workbench.paper.report import paper_report
@@ -90,6 +92,12 @@ def test_beyond(found: Study) -> None:
     assert margin.delay_s >= 2.0 * margin.h
     assert found.ours.ratio < found.ours.bare_ratio
     assert found.ours.ours.figures.energy < 1.05 * found.ours.paper.figures.energy
+
+
+def test_the_claims_are_one_screen(found: Study) -> None:
+    shown = paper_view(found, Path("paper"))
+    assert "written: paper/report.html" in one_screen(shown)
+    assert "rivals on the plant of table 3" in shown.text(verbose=True)
 
 
 def test_the_remarks_on_e_T(found: Study) -> None:

@@ -19,7 +19,7 @@ def test_versions_kernels_and_cards_are_told(
     cards = found.data["cards"]
     assert isinstance(cards, dict) and cards["emps"] == {"there": 1, "of": 2}
     assert found.wrong == ()
-    shown = installation_view(found, None, found.wrong)
+    shown = installation_view(found, None, found.wrong).text()
     assert "emps: 1 of 2 files" in shown
     assert "none named" in shown
 

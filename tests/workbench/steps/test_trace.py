@@ -275,18 +275,14 @@ def test_changes_in_percent(before: float, after: float, said: str) -> None:
 
 
 def test_the_view_for_a_terminal() -> None:
-    from rich.console import Console
-
-    console = Console(width=120, markup=False)
-    with console.capture() as shown:
-        console.print(trace_view(traced(trace_of("unknown")), Path("out")))
-    text = " ".join(shown.get().split())
+    view = trace_view(traced(trace_of("unknown")), Path("out"))
+    first, whole = (" ".join(view.text(verbose=one).split()) for one in (False, True))
     for part in ("Found in part: stribeck", "What is left depends on y", "held out before",
-                 "stribeck F_s", "why not",
-                 "F_s*(1 + asymmetry*d)*exp(-(Abs(v)/v_s)**delta)",
-                 "next: record more, the same stroke at several", "note: a remark of the trace",
-                 "written: out/trace.json"):  # fmt: skip
-        assert part in text
+                 "stribeck", "F_s 3.50 N", "next: record more, the same stroke at several",
+                 "note: a remark of the trace", "written: out/trace.json"):  # fmt: skip
+        assert part in first and part in whole, part
+    for part in ("stribeck F_s", "why not", "F_s*(1 + asymmetry*d)*exp(-(Abs(v)/v_s)**delta)"):
+        assert part not in first and part in whole, part
 
 
 @pytest.mark.parametrize(

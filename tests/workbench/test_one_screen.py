@@ -1,0 +1,355 @@
+"""Every command prints one screen, 40 lines of 100 columns, on the fullest of its results."""
+
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from datetime import UTC, datetime
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from design.tune import Asked
+from identification.drift.drift_result import DriftTest, Shift, Statistic
+from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
+from identification.remarks import Aside
+from identification.tracing.result import Change
+from tests.chain import designed, identified
+from tests.screens import one_screen, words_of
+from tests.workbench.trace_values import trace_of, traced
+from workbench import cli
+from workbench.commands.fleet import fleet_view
+from workbench.commands.reidentify import pass_view
+from workbench.documents.design import Recommendation
+from workbench.documents.model import Model
+from workbench.registry.store import Registry
+from workbench.registry.values import Candidate, LogOutcome, SeenLog
+from workbench.report.demo_tables import demo_view
+from workbench.report.design_tables import design_view
+from workbench.report.drift_tables import drift_view
+from workbench.report.experiment import experiment_view
+from workbench.report.first_card import proposal_view
+from workbench.report.installation import installation_view
+from workbench.report.model_tables import model_view
+from workbench.report.prediction import prediction_view
+from workbench.report.robust import robust_view
+from workbench.report.trace_tables import trace_view
+from workbench.report.trace_words import words
+from workbench.report.validation_tables import validation_view
+from workbench.screen import Screen
+from workbench.steps.demo import Demonstration
+from workbench.steps.drift import Drifted
+from workbench.steps.drift import Tested as OneTested
+from workbench.steps.experiment.planned import Experiment, Promised, Safety
+from workbench.steps.first_card.proposal import proposed
+from workbench.steps.installation import look_over
+from workbench.steps.limit_cycle import LimitCycle
+from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures
+from workbench.steps.predict import Predicted
+from workbench.steps.robust.outcomes import MEASURES, Outcomes
+from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, RobustAsked, Spread
+from workbench.steps.validate import Validation
+
+LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
+OUT = Path("results") / ("a folder with a long name " * 4)
+NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
+SLOW = Asked((20.0, 0.9))  # nothing to be searched
+WHY = "the interval is wider than the value: the logs do not tell it; excite it more, or log longer"
+REMARKS = (
+    *(f"{log}: uneven clock, resampled every {n % 3 + 5:.3g} ms" for n, log in enumerate(LOGS)),
+    *(f"{log}: isolated spikes of 'y' in {n} samples interpolated" for n, log in enumerate(LOGS)),
+    *(Aside(f"{log}: its clock jitters by {n} us") for n, log in enumerate(LOGS)),
+    *(f"signals.{n}: its unit is of no machine's size; check the unit in the card" for n in LOGS),
+)
+
+
+def lost(e: Estimate, why: str) -> Estimate:
+    """An estimate that the logs do not tell."""
+    return Estimate(None, e.unit, reason=why, assumed=e.value)
+
+
+def many_logs(model: Model, told: int = 9) -> Model:
+    """The model of forty logs, of whose nine parameters only the first are told."""
+    friction = {
+        name: e if n < told else lost(e, f"{name}: {WHY}")
+        for n, (name, e) in enumerate(model.friction.items())
+    }
+    entries = tuple(replace(model.log[0], file=log, position_rms=1e-5 * n) for n, log in
+                    enumerate(LOGS))  # fmt: skip
+    return replace(model, log=entries, friction=friction)
+
+
+def identify() -> Iterator[Screen]:
+    for told in (9, 2):
+        for adequate in (True, False):
+            model = many_logs(identified().model, told)
+            model = replace(model, fit=replace(model.fit, adequate=adequate))
+            yield model_view(model, REMARKS, OUT)
+
+
+def trace() -> Iterator[Screen]:
+    every = ("stribeck", "spring", "valve_dead_zone", "rising_stiction")
+    drift = tuple(Change(name, "N", 12.0, 14.4, 0.1) for name in (*NAMES, "k1", "k2"))
+    for verdict, keys in (("effect", every), ("unknown", every[:1]), ("none", ()), ("drift", ()),
+                          ("inseparable", every[:2])):  # fmt: skip
+        found = replace(trace_of(verdict, keys), remarks=REMARKS)  # type: ignore[arg-type]
+        found = replace(found, drift=drift if verdict == "drift" else found.drift)
+        yield trace_view(replace(traced(found), remarks=REMARKS), OUT)
+
+
+def figures(n: int, *missed: str) -> LoopFigures:
+    """Figures of a loop with a limit cycle."""
+    design = designed(identified().model, SLOW)
+    margins = next(iter(design.controllers.values())).margins
+    x = 1e-3 * n
+    return LoopFigures(
+        stable=True, margins=margins, step=x, standstill=x, standstill_relative=x, overshoot=x,
+        settling=x, step_rms=x, smooth_rms=x, smooth_relative=x, force_rms=x, force_peak=x,
+        force_seen=x, command_peak=4.7, command_limit=5.0, command_noise=0.1, missed=missed,
+        limit_cycle=LimitCycle(2e-3, 0.97), limited=0.02, force_limit=150.0,
+    )  # fmt: skip
+
+
+def validation(passed: bool) -> Validation:
+    """Every loop on two plants, with all that can be remarked of them."""
+    loops = (PRESENT, "rst", "pid", f"rst{COMPENSATED}", f"pid{COMPENSATED}")
+    missed = () if passed else tuple(f"limit {n} is exceeded on this plant" for n in range(6))
+    found = {
+        name: {place: figures(n + 1, *missed) for place in ("model", "plant")}
+        for n, name in enumerate(loops)
+    }
+    notes = tuple(f"{name} on the {place}: it swings" for name in loops for place in LOGS)
+    return Validation("a", "rst", passed, Limits(), found, notes, {}, "RST: good (PID: worse): so")
+
+
+def validate() -> Iterator[Screen]:
+    yield from (validation_view(validation(passed), OUT) for passed in (True, False))
+
+
+def design() -> Iterator[Screen]:
+    found = designed(identified().model, SLOW)
+    goals = tuple(f"goal {n}" for n in range(30))
+    rst = found.rst and replace(found.rst, missed=goals, note="slow " * 30)
+    pid = found.pid and replace(found.pid, missed=goals, note="slow " * 30)
+    worst = replace(found, remarks=REMARKS, refused={"pid": "no gains " * 30}, rst=rst, pid=pid)
+    none = Recommendation("none", False, "; ".join(LOGS))
+    yield design_view(replace(found, remarks=REMARKS), OUT)
+    yield design_view(worst, OUT)
+    yield design_view(replace(worst, recommended="none", recommendation=none), OUT)
+    measures = {one.name: Spread(0.1, 0.2, 0.3, 0.25, 0.9) for one in MEASURES}
+    promise = Promise("rst", True, measures, 0.8, Outcomes({}))
+    promises = dict.fromkeys((ROBUST, NOMINAL, PRESENT), promise)
+    for missed in ((), tuple(f"limit {n} is kept by too few" for n in range(9))):
+        robust = Robust(found, RobustAsked(), promises, 40, 1e-3, missed, REMARKS)
+        yield robust_view(robust, OUT, False)
+
+
+def demo() -> Iterator[Screen]:
+    for passed, keys in ((True, ("stribeck",)), (False, ("stribeck", "spring")), (False, ())):
+        found = traced(trace_of("effect" if keys else "none", keys))
+        truth = {
+            "friction": {n: {"value": 1.2345} for n in NAMES},
+            "effects": {"stribeck": {"F_s": {"value": 3.5}}},
+        }
+        taken = Recommendation("rst", bool(keys), "RST: good")
+        chosen = designed(identified().model, SLOW)
+        chosen = replace(chosen, recommended="rst", recommendation=taken)
+        made = Demonstration(found, chosen, validation(passed), {}, truth)
+        yield demo_view(made, OUT)
+
+
+def drift() -> Iterator[Screen]:
+    source = traced(trace_of()).train[0]
+    shift = {n: Shift(n, "N", 12.0, 0.1, 14.4, 0.1, 0.2, 0.01, 0.18, 0.22) for n in NAMES[:4]}
+    told, none = dict.fromkeys(NAMES[4:], WHY), Statistic(3.0, 12.0, 0.5, 9)
+    state: Any = None
+    for verdict in ("none", "drift", "structure", "not_judged"):
+        test = DriftTest("a", verdict, tuple(shift.values()), shift, told, none, none, "mean",
+                         1.0, 2.0, f"{WHY} {WHY}", state, none, NAMES[4:])  # fmt: skip
+        tests = tuple(
+            OneTested(replace(source, file=log, log=replace(source.log, name=log)),
+                   replace(test, log=log, reason=f"{log}: {WHY}"), False)
+            for log in LOGS
+        )  # fmt: skip
+        settings: Any = SimpleNamespace(margin=0.02, run_length=1e3, variation=0.01, to_be_seen=1.0)
+        yield drift_view(Drifted(identified().model, "", settings, tests, state, REMARKS), OUT)
+
+
+def experiment() -> Iterator[Screen]:
+    promise = tuple(Promised(f"parameter_{n}", "N s/m", 1.0, 0.1, 0.01, 0.9) for n in range(45))
+    peaks: Any = SimpleNamespace(low=-0.1, high=0.1, speed=0.3, force=90.0, command=4.0)
+    limits: Any = SimpleNamespace(stroke=(-0.2, 0.2), speed=0.4, force=100.0, command=5.0)
+    found: Any = SimpleNamespace(
+        h=1e-3, r=np.zeros(20_001), promise=promise, separation=(), motion="linear", limits=limits,
+        safety=Safety(20, peaks, 3, 0.7), tried=(40, 9), controller="the present controller",
+        segments=(1, 2), efficiency=0.9, remarks=REMARKS, command_unit="V",
+    )  # fmt: skip
+    assert set(vars(found)) <= set(Experiment.__dataclass_fields__)
+    yield experiment_view(found, OUT)
+
+
+def predict() -> Iterator[Screen]:
+    summary = {
+        "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
+        "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
+    }  # fmt: skip
+    yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml", OUT)
+
+
+def reidentify() -> Iterator[Screen]:
+    outcomes = tuple(
+        LogOutcome(f"machine-{n}", SeenLog("0" * 64, log, 1, 1), "set_aside", WHY, 1, {}, NOW)
+        for n, log in enumerate(LOGS)
+    )
+    done: Any = SimpleNamespace(machines=40, outcomes=outcomes, growing=3, busy=LOGS,
+                                without_model=LOGS)  # fmt: skip
+    yield pass_view(done)
+
+
+def fleet() -> Iterator[Screen]:
+    bad = [SimpleNamespace(log=SimpleNamespace(machine=log), verdict="refused", reason=WHY)
+           for log in LOGS * 25]  # fmt: skip
+    done: Any = SimpleNamespace(logs=1000, verdicts={"refused": 1000}, before=3, later=4, bad=bad,
+                                seconds=9.0, busy=9.0, memory=1)  # fmt: skip
+    yield fleet_view(done, OUT)
+
+
+def doctor() -> Iterator[Screen]:
+    """Alone; of a log: tests/workbench/steps/test_doctor.py."""
+    yield installation_view(look_over(), {"where": "x" * 150, "answers": False}, LOGS)
+
+
+BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
+    identify, trace, validate, design, demo, drift, experiment, predict, reidentify, fleet, doctor,
+)  # fmt: skip
+BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # run below
+ELSEWHERE = {"paper": "tests/workbench/paper/test_study.py"}  # as it takes long to make
+NO_SCREEN = ("serve", "work", "watch")  # events as JSON lines, until they are stopped
+
+
+def test_every_command_is_held() -> None:
+    held = {view.__name__ for view in BY_VIEW} | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
+    assert held == set(cli.COMMANDS)
+    for path in ELSEWHERE.values():
+        assert "one_screen(" in (Path(__file__).parents[2] / path).read_text("utf-8")
+    tests = inspect.getsource(inspect.getmodule(held_by_command))  # type: ignore[arg-type]
+    assert all(f'held_by_command("{name}"' in tests for name in BY_COMMAND)
+
+
+@pytest.mark.parametrize("view", BY_VIEW)
+def test_the_fullest_result_is_one_screen(view: Callable[[], Iterator[Screen]]) -> None:
+    for shown in view():
+        text = one_screen(shown)
+        whole = shown.text(verbose=True)
+        assert len(whole.splitlines()) >= len(text.splitlines())
+        # The answer, and where the results are, survive every cut.
+        assert text.splitlines()[0] == whole.splitlines()[0]
+        assert ("written: " in text) == ("written: " in whole)
+
+
+def test_remarks_on_many_logs_are_told_once() -> None:
+    shown = next(identify())
+    text, whole = (words_of(shown.text(verbose=one)) for one in (False, True))
+    assert "note: 40 logs: uneven clock, resampled every 5 to 7 ms" in text
+    assert re.search(r"note: 40 logs: isolated spikes of 'y' in 0 to 39 samples", text)
+    assert re.search(r"\d+ logs: simulated position within 10 to 90 µm rms", text)
+    assert "jitters" not in text and whole.count("jitters") == len(LOGS)
+    assert whole.count("uneven clock") == len(LOGS)
+
+
+def test_parameters_not_told_for_one_reason_are_told_together() -> None:
+    model = many_logs(identified().model)
+    for name in ("dv_p", "dv_n"):
+        model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
+    shown = model_view(model, (), None)
+    assert "dv_p, dv_n - m/s not told: the interval is wider than the value" in words_of(
+        shown.text()
+    )
+    assert words_of(shown.text(verbose=True)).count("excite it more") == 2
+
+
+def test_the_demo_sets_the_controllers_side_by_side() -> None:
+    text = words_of(next(demo()).text())
+    assert "Recommended: RST with the friction compensator, which keeps all limits" in text
+    assert "before: present" in text and "after: RST+comp" in text
+    assert "stribeck F_s 3.50 N 3.43 to 3.57 3.5 " in text
+    assert "workbench init LOG" in text and "report.html" in text
+
+
+def test_effects_and_their_parameters_have_names_on_one_screen() -> None:
+    for shown, keys in zip(trace(), (("stribeck", "spring"), ("stribeck",)), strict=False):
+        text = one_screen(shown)
+        assert all(f"{words(key)}" in text for key in keys)
+
+
+def held_by_command(*arguments: str, status: int = 0) -> str:
+    """What a command prints by default, which is one screen; with --verbose no less."""
+    done = CliRunner().invoke(cli.cli, arguments, standalone_mode=False)
+    assert done.return_value in (status, None) and done.exception is None, done.output
+    return one_screen(done.output)
+
+
+def test_the_list_of_effects() -> None:
+    text = held_by_command("effects", "list")
+    assert "stribeck: friction falls with speed" in text and "source:" not in text
+    assert "source:" in held_by_command("effects", "list", "stribeck")
+    whole = CliRunner().invoke(cli.cli, ["effects", "list", "--verbose"]).output
+    assert whole.count("source:") == text.count(": ") - 1
+
+
+def test_a_card_for_a_log_of_a_hundred_columns(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = traced(trace_of()).train[0].log
+    columns = np.column_stack([log["t"], log["y"], log["F"]])[:800]
+    np.savetxt("run.csv", columns, delimiter=",", header="time [s],position [m],force [N]",
+               comments="", fmt="%.6g")  # fmt: skip
+    assert "written: card.toml" in held_by_command("init", "run.csv")
+    found = proposed(Path("run.csv"), None)
+    unused = {f"channel {n}": "no signal that a card needs" for n in range(100)}
+    text = one_screen(proposal_view(replace(found, unused=unused), OUT / "card.toml", WHY))
+    assert "... and 95 more: --verbose" in text and text.splitlines()[-1].endswith("card.toml")
+
+
+def test_a_registry_of_many_machines_and_versions(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    who: Any = {"reason": "why it was done, at some length " * 3, "by": "tester", "now": NOW}
+    friction = {f"F_{n}": {"value": n, "unit": "N"} for n in range(60)}
+    with Registry("registry.db") as found:
+        for n in range(45):
+            found.add("a", Candidate({"friction": friction, "m": n}), **who)
+            found.add(f"machine-{n}", Candidate({"m": n}), **who)
+        found.promote("a", 45, **who)
+    assert "more: --verbose" in held_by_command("registry", "list")
+    shown = held_by_command("registry", "show", "a")
+    assert "promoted" in shown and "earlier: --verbose" in shown
+    held_by_command("registry", "diff", "a", "1", "2")
+    held_by_command("registry", "promote", "a", "3", "--reason", "why " * 50)
+    held_by_command("registry", "rollback", "a", "--reason", "why " * 50)
+    held_by_command("registry", "retry", "a", "--reason", "why")
+    held_by_command("token", "add", "anna")
+    held_by_command("token", "list")
+
+
+def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.chain import CARD
+    from workbench.documents.design_file import design_document
+    from workbench.output import dumps
+
+    monkeypatch.chdir(tmp_path)
+    Path("card.toml").write_text(CARD, "utf-8")
+    held_by_command("simulate", "card.toml", "--out", "made")
+    Path("design.json").write_text(
+        dumps(design_document(designed(identified().model, SLOW))), "utf-8"
+    )
+    chosen = ["--controller", "rst", "--compensator"]
+    chosen += [word for name in ("c", "st", "plcopen", "json") for word in ("--to", name)]
+    assert "written: " in held_by_command("export", "design.json", *chosen, "--out", "code")

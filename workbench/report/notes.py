@@ -1,0 +1,28 @@
+"""Remarks for a screen and a report: told once for all logs that they hold for."""
+
+from collections.abc import Collection, Iterable
+
+from identification.remarks import Aside
+from workbench.remarks import Merged, merged, told_once
+from workbench.screen import Part, instead
+
+MOST_NOTES = 6
+
+
+def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_NOTES) -> Part:
+    """The remarks for a terminal: merged and without asides; with --verbose each as it is.
+
+    logs: names with which a remark on one log begins.
+    """
+    every = tuple(remarks)
+    told = told_once((one for one in every if not isinstance(one, Aside)), logs)
+    return instead(_noted(told), _noted(every), most, yields=True)
+
+
+def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:
+    """All remarks for a report, asides after the others; those merged with what each said."""
+    return merged(sorted(remarks, key=lambda one: isinstance(one, Aside)), logs)
+
+
+def _noted(lines: Iterable[str]) -> list[str]:
+    return [f"note: {line}" for line in lines]
