@@ -8,6 +8,8 @@ import pytest
 
 from tools.check_wheel import ROOT, build_wheel
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:

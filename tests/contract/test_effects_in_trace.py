@@ -15,6 +15,7 @@ from identification.log import Log, Rig
 from identification.model.plant import Plant
 from identification.simulation.free_run import free_run
 from identification.tracing.trace import trace
+from tests.identification.estimation.test_surroundings import TURNING, pendulum
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, table
 
 H, SECONDS = 2e-3, 12.0
@@ -22,10 +23,10 @@ H, SECONDS = 2e-3, 12.0
 SIZES: Mapping[str, Mapping[str, float]] = {
     "backlash": {"width": 1e-3},
     "cogging": {"a": 4.0, "period": 0.03},
-    "compliance": {"flexibility": 1e-4},
+    "compliance": {"flexibility": 3e-5},
     "end_cushion": {"k_p": 400.0, "k_n": 400.0, "y_p": 0.03, "y_n": -0.03},
     "frictional_lag": {"tau": 0.02},
-    "input_delay": {"tau": 0.006},
+    "input_delay": {"tau": 0.02},
     "leakage": {"leak": 1.0},
     "nonlinear_viscous": {"k": 150.0, "n": 2.0},
     "position_dependent_friction": {"c1": 100.0, "a": 3.0, "period": 0.05},
@@ -39,23 +40,22 @@ SIZES: Mapping[str, Mapping[str, float]] = {
     "valve_dead_zone": {"u_d": 0.01},
     "warmup": {"a": -0.3, "tau": 4.0},
 }
-# Taken up by the plain model: as unequal levels of friction, as gravity of a rotary machine; or,
-# without hard braking, as a scale of all friction.
+# Taken up by the plain model: as unequal levels of friction or, without hard braking, as a scale
+# of all friction. Gravity of a rotary machine is part of it too.
 TAKEN_UP: Mapping[str, Mapping[str, float]] = {
     "constant_force": {"F_0": 4.0},
-    "gravity": {"a": 5.0, "turn": 1.0},
     "load_dependent_friction": {"mu": 0.15},
 }
 SEEN_IN_PART = ("presliding",)  # a bristle leaves more than noise at this rate
 
 
 def command(t: Array, seed: int) -> Array:
-    """Three sines with rests in between, and small steps [V]."""
+    """Three sines with rests in between, and a small dither [V]."""
     rng = np.random.default_rng(seed)
     swings = ((0.3, 0.05), (0.9, 0.06), (2.1, 0.06))
     u = sum(size * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f, size in swings)
-    steps = np.repeat(rng.uniform(-0.02, 0.02, len(t) // 50 + 1), 50)[: len(t)]
-    return np.asarray(u * (np.sin(2 * np.pi * 0.4 * t) > -0.3) + steps)
+    dither = 0.002 * rng.standard_normal(len(t))
+    return np.asarray(u * (np.sin(2 * np.pi * 0.4 * t) > -0.3) + dither)
 
 
 def recorded(key: str, sizes: Mapping[str, float], seed: int) -> Log:
@@ -91,10 +91,17 @@ def test_it_is_named_with_its_size(key: str) -> None:
 @pytest.mark.parametrize("key", sorted(TAKEN_UP))
 def test_what_the_plain_model_takes_up_is_no_discovery(key: str) -> None:
     train, test = (recorded(key, TAKEN_UP[key], seed) for seed in (1, 2))
-    rig = Rig("force", motion="rotary" if key == "gravity" else "linear")
-    found = trace([train], [test], rig, {key: built_in()[key]}, np.random.default_rng(0))
+    found = trace([train], [test], Rig("force"), {key: built_in()[key]}, np.random.default_rng(0))
     assert found.verdict == "none" and found.effects == ()
 
 
+def test_gravity_is_told_beside_friction_and_is_no_discovery() -> None:
+    logs = [pendulum(1, 3.0, seconds=12.0)], [pendulum(2, 3.0, seconds=12.0)]
+    found = trace(*logs, TURNING, built_in(), np.random.default_rng(0))
+    assert found.effects == ()
+    assert found.surroundings.sine.value == pytest.approx(3.0, rel=0.02)
+    assert found.plant.effects[-1].key == "gravity"
+
+
 def test_no_effect_is_left_out() -> None:
-    assert {*SIZES, *TAKEN_UP} == set(built_in())
+    assert {*SIZES, *TAKEN_UP, "gravity"} == set(built_in())

@@ -10,6 +10,8 @@ from workbench.cards.card import load_card
 from workbench.cli import main
 from workbench.logs.fetch import card_path
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def data(workbench_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -8,6 +8,8 @@ import pytest
 from workbench.cli import main
 from workbench.logs.fetch import card_path
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def data(workbench_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:

@@ -18,6 +18,8 @@ from workbench.logs.fetch import card_path
 from workbench.logs.sources import read_sources
 from workbench.steps.simulate import record
 
+pytestmark = pytest.mark.slow
+
 RECIPES = ("paper_table1", "paper_table1_rich", "paper_table2", "paper_table3", "demo")
 SETS = ("emps", "friction_backlash", "pneumatic_seals", "xl330_servo")
 SEED, SECONDS = 3, 10.0

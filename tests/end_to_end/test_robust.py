@@ -13,6 +13,8 @@ from workbench.documents.design_file import design_document
 from workbench.documents.model_file import model_document
 from workbench.output import dumps
 
+pytestmark = pytest.mark.slow
+
 FRICTION = TABLES["paper_table2"]
 QUICK = ("--draws", "20", "--poles", "12,1")
 

@@ -10,6 +10,8 @@ import pytest
 from benchmarks.scenario import SPRING, Told, days, picture, story
 from workbench.registry.store import Registry
 
+pytestmark = pytest.mark.slow
+
 LOGGED = (0, 1, 2, 4, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22)  # one a week, and both unreadable ones
 DAYS = [day for day in days() if day.number in LOGGED]
 

@@ -50,6 +50,7 @@ def walk(draws: int = 30) -> Posterior:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_plant_and_the_loop_in_python_control() -> None:
     model = result()
     designed = wb.design(model)

@@ -26,6 +26,8 @@ from tests.workbench.jobs.worker import LEASE, clock, one_pass, work
 from workbench.registry.queue import Queue
 from workbench.registry.store import Registry
 
+pytestmark = pytest.mark.slow
+
 MACHINES = ("a", "b", "c")
 KILLS = int(os.environ.get("KILLS", "30"))
 IN_HAND = KILLS // 6  # kills, at least, that hit a worker with a log in hand

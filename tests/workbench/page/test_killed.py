@@ -21,6 +21,8 @@ from workbench.registry.access import Access
 from workbench.registry.bench import Bench, Upload
 from workbench.registry.store import Registry
 
+pytestmark = pytest.mark.slow
+
 SPAWN = multiprocessing.get_context("spawn")
 TASKS, WORKERS, KILLS = 12, 2, 5
 ROWS = "t,y\n" + "".join(f"{k * 1e-3:.3f},{k % 7}\n" for k in range(300))

@@ -35,6 +35,8 @@ from workbench.paper.settings import (
 )
 from workbench.paper.study import Study, study
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def found() -> Study:

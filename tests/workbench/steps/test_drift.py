@@ -200,6 +200,7 @@ def test_wrong_options_are_one_line_and_status_2(
     assert len(shown.err.splitlines()) == 1 and said in shown.err
 
 
+@pytest.mark.slow
 def test_a_state_of_another_model_is_said_and_left_aside(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

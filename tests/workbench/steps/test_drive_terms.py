@@ -121,6 +121,7 @@ def programmed(
     return np.array(out)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compensator", [False, True])
 @pytest.mark.parametrize("name", ["rst", "pid"])
 @pytest.mark.parametrize("machine", [motor, cylinder])

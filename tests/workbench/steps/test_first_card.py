@@ -61,6 +61,7 @@ def alike(found: Array, true: Array) -> bool:
     return bool(np.allclose(found, true, rtol=1e-6, atol=1e-6 * float(np.ptp(true))))
 
 
+@pytest.mark.slow
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     order=st.permutations(["t", "r", "y", "F", "u"]),

@@ -175,6 +175,7 @@ def test_periods_come_from_the_card_and_the_log() -> None:
     assert force_period(cylinder) == 1e-3
 
 
+@pytest.mark.slow
 def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
     model = model_of(EMPS, k_a=35.15)
     noisy = replace(model, fit=replace(model.fit, noise_y=3e-4))

@@ -44,6 +44,7 @@ def both_ways(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Identifie
     return folder, identified(folder, {name: np.array(log[name]) for name in "tyu"})
 
 
+@pytest.mark.slow
 def test_identify_and_doctor_promise_the_same(both_ways: tuple[Path, Identified]) -> None:
     folder, found = both_ways
     card = read_sources([str(folder / "run.csv")], str(folder / "card.toml")).card
@@ -78,6 +79,7 @@ def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
     assert broken_promises(promised(model, 1.1 / BROKEN)) == ()
 
 
+@pytest.mark.slow
 def test_runs_to_add_are_those_of_what_is_not_told(tmp_path: Path) -> None:
     log = made(3)
     step = np.diff(log["y"], prepend=log["y"][0])
