@@ -4,7 +4,7 @@ import re
 from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
-NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
+FIGURE = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
 # When and where in its log: told of one remark, left out where several differ in it.
 PLACE = re.compile(
     r",? (?:(?:at|from) )?t = \S+ s(?: to \S+ s)?"
@@ -41,7 +41,7 @@ def told_once(remarks: Iterable[str], logs: Collection[str] = ()) -> list[str]:
 def _alike(remark: str, logs: Collection[str]) -> tuple[str, ...]:
     """What remarks have in common that are told together."""
     log, said = _of_log(remark, logs)
-    return (remark,) if log is None else ("", NUMBER.sub(HOLE, PLACE.sub("", said)))
+    return (remark,) if log is None else ("", FIGURE.sub(HOLE, PLACE.sub("", said)))
 
 
 def _of_log(remark: str, logs: Collection[str]) -> tuple[str | None, str]:
@@ -69,9 +69,9 @@ def _together(remarks: Sequence[str], logs: Collection[str]) -> str:
 
 def _ranges(texts: Sequence[str]) -> str:
     """The texts, alike but for their numbers, as one: a range where a number differs."""
-    columns = zip(*(NUMBER.findall(text) for text in texts), strict=True)
+    columns = zip(*(FIGURE.findall(text) for text in texts), strict=True)
     told = iter([_range(column) for column in columns])
-    return NUMBER.sub(lambda _: next(told), texts[0])
+    return FIGURE.sub(lambda _: next(told), texts[0])
 
 
 def _range(numbers: Sequence[str]) -> str:

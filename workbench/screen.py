@@ -15,7 +15,7 @@ Command = TypeVar("Command", bound=Callable[..., Any])
 
 SCREEN_LINES, SCREEN_WIDTH = 40, 100
 VERBOSE = "--verbose"
-WHOLE = "workbench.verbose"  # in the context of a command, that --verbose is given
+VERBOSE_GIVEN = "workbench.verbose"  # in the context of a command, that --verbose is given
 # How a screen that is too full is made to fit, step by step: the lines that a text may have, the
 # entries to which a list is cut at most, and whether only lists that yield are cut.
 TIGHTER = ((8, 1, True), (8, 3, False), (4, 2, False), (2, 1, False), (1, 0, False))
@@ -31,13 +31,13 @@ def verbose_option(command: Command) -> Command:
 
 def _whole(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
     if value:
-        ctx.meta[WHOLE] = True
+        ctx.meta[VERBOSE_GIVEN] = True
 
 
 def is_verbose() -> bool:
     """Whether the command that runs has --verbose."""
     context = click.get_current_context(silent=True)
-    return context is not None and bool(context.meta.get(WHOLE))
+    return context is not None and bool(context.meta.get(VERBOSE_GIVEN))
 
 
 @dataclass(frozen=True)

@@ -60,7 +60,7 @@ def folder(tmp_path: Path) -> Path:
 def test_the_library_is_listed_with_units_and_sources(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["effects", "list", "--effects", str(folder)]) == 0
+    assert main(["effects", "list", "--verbose", "--effects", str(folder)]) == 0
     shown = capsys.readouterr().out
     for effect in built_in().values():
         assert f"{effect.key}: " in shown

@@ -87,7 +87,7 @@ def logs_of(model: Model) -> tuple[str, ...]:
 
 
 WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
-ADVICE = re.compile(r"(: the logs do not tell it)?; .*")  # at the end of a reason
+WHAT_TO_DO = re.compile(r"(: the logs do not tell it)?; .*")  # at the end of a reason
 
 
 def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
@@ -120,7 +120,7 @@ def _short(reason: str, logs: Iterable[str]) -> str:
         said = said.removeprefix(f"{name}: ")
     if not said:
         return "not told"
-    return "not told: " + WIDE.sub(r"found \1, anywhere in \2", ADVICE.sub("", said))
+    return "not told: " + WIDE.sub(r"found \1, anywhere in \2", WHAT_TO_DO.sub("", said))
 
 
 def summary(model: Model) -> str:
