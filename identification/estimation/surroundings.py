@@ -89,8 +89,8 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     used = GRAVITY if turns and _has_gravity(found) else PLAIN
     lag, sampled = _lag(found, used), False
     if held and lag.value:
-        current = _squares(moved, turns, held=False)
-        other = _lag(current, used) if current else NOT_SHOWN
+        current = _squares(moved, turns, held=False) or found
+        other = _lag(current, used)
         sampled = bool(other.value) and current.least(used) < found.least(used)
         lag, found = (other, current) if sampled else (lag, found)
     theta, sd = _with_spread(found, used, lag.value)
@@ -215,7 +215,7 @@ def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Arra
 
 def _but(every: BoolArray, k: int) -> BoolArray:
     """All blocks but one."""
-    return every & (np.arange(len(every)) != k)
+    return np.asarray(every & (np.arange(len(every)) != k))
 
 
 def _spread(each: Array) -> Array:

@@ -5,7 +5,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.estimation.regressed_plant import OVERLAP
 from identification.estimation.regression.effect_rows import EffectRows
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -15,7 +14,7 @@ from identification.estimation.regression.equation_rows import (
     column_noise,
 )
 from identification.estimation.regression.row_fit import RowFit
-from identification.estimation.regression.weighted_rows import Rows, stacked
+from identification.estimation.regression.weighted_rows import OVERLAP, Rows, stacked
 from identification.estimation.structure_fit import FittedStructure, band
 from identification.log import Rig
 from identification.model.plant import units_of

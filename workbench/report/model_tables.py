@@ -40,7 +40,9 @@ def parameter_rows(model: Model) -> list[Row]:
     """Parameter, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
     found = {**model.friction, **(model.actuator or {})}
     meaning = ROTARY_MEANING if model.rotary else MEANING
-    rows = [(name, *_cells(value), meaning.get(name, "")) for name, value in found.items()]
+    rows: list[Row] = [
+        (name, *_cells(value), meaning.get(name, "")) for name, value in found.items()
+    ]
     for key, own in model.effects.items():
         params = {p.name: p for p in model.library[key].params}
         rows += [

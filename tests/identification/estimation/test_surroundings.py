@@ -25,8 +25,9 @@ def pendulum(seed: int, a: float, b: float = 0.0, seconds: float = 20.0) -> Log:
     t = h * np.arange(round(seconds / h), dtype=np.float64)
     rng = np.random.default_rng(seed)
     pulls = ((0.25, 1.6), (0.6, 1.2), (1.3, 0.8))
-    F = sum(size * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f, size in pulls)
-    blank = Log("rod", {"t": t, "y": np.zeros(len(t)), "F": np.asarray(F)})
+    waves = [size * np.sin(2 * np.pi * f * t + rng.uniform(0, 2 * np.pi)) for f, size in pulls]
+    F = np.sum(waves, axis=0)
+    blank = Log("rod", {"t": t, "y": np.zeros(len(t)), "F": F})
     weight = built_in()["gravity"].acting({"a": a, "b": b})
     run = free_run(Plant(ROD, None, (weight,)), blank, (0.0, 0.0, float(F[0])), "force")
     noise = rng.standard_normal((2, len(t)))

@@ -8,7 +8,7 @@ from identification.log import Log
 from identification.signals.renewal import held_for, renewed
 
 H = 2e-3
-T = H * np.arange(6000)
+T = H * np.arange(6000, dtype=np.float64)
 
 
 def motion(seed: int) -> Array:
