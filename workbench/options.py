@@ -46,6 +46,21 @@ def complete_card(_ctx: click.Context, _param: click.Parameter, begun: str) -> l
     return names or [CompletionItem(begun, type="file")]
 
 
+BUDGET = 120.0  # s, after which a fit or a trace ends with the best so far
+
+
+def budget_option(command: Command) -> Command:
+    """The option `--budget` of a fit or a trace [s]."""
+    return click.option(
+        "--budget",
+        type=SECONDS_ABOVE_0,
+        default=BUDGET,
+        show_default=True,
+        metavar="SECONDS",
+        help="End after so long with the best so far; the first Ctrl-C does the same.",
+    )(command)
+
+
 def card_option(command: Command) -> Command:
     """The option `--card`, the card of all logs; given twice it is a usage error."""
     return click.option(

@@ -17,7 +17,7 @@ IN_STEP = 0.85  # of the times between new values, that are the usual one (or ne
 FEWEST_NEW = 40  # new values, which tell the step
 MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
-HELD = "u"
+COMMAND_COLUMN = "u"
 
 
 class Renewed(NamedTuple):
@@ -81,7 +81,7 @@ def _mean(key: str, x: Array, at: IntArray) -> Array:
     """Means of a signal from each new position to the next, or around each."""
     whole = np.concatenate([[0.0], np.cumsum(x - x[0])])
     length = np.append(np.diff(at), len(x) - at[-1])
-    if key == HELD:
+    if key == COMMAND_COLUMN:
         return np.asarray(x[0] + (whole[at + length] - whole[at]) / length)
     half = np.maximum(length // 2, 1)
     low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, len(x))

@@ -7,9 +7,9 @@ from typing import Literal
 
 import click
 
-from workbench.course import Course, moving
+from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
-from workbench.options import POSITIVE, card_option, complete_file
+from workbench.options import POSITIVE, budget_option, card_option, complete_file
 from workbench.output import OutputFolder, emit, output_options, progress
 from workbench.steps.stages import IDENTIFY_STAGES
 
@@ -33,6 +33,7 @@ from workbench.steps.stages import IDENTIFY_STAGES
     metavar="S",
     help="Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
 )
+@budget_option
 @click.option("--posterior", is_flag=True, help="Sample the posterior of the parameters too.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @output_options
@@ -42,6 +43,7 @@ def command(
     drive: Literal["force", "command"] | None,
     orders: str | None,
     design_period: float | None,
+    budget: float,
     posterior: bool,
     seed: int,
     as_json: bool,
@@ -52,6 +54,7 @@ def command(
     Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
     report.html. LOG is a path, or a file name of the card's set.
     """
+    begun = time.monotonic()
     from workbench.documents.model_file import model_document
     from workbench.logs.sources import read_sources
     from workbench.options import parse_orders
@@ -72,10 +75,16 @@ def command(
                     "--drive force: the rig is a motor, whose force is its command times a"
                     " constant; leave --drive out."
                 )
-            course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
-            with moving(course):
+            left = budget - (time.monotonic() - begun)
+            course = Course(bar, IDENTIFY_STAGES, time.monotonic, left, bar.told)
+            with watched(course):
                 found = identify_sources(
-                    sources, options, seed, posterior=posterior, on_progress=course.report
+                    sources,
+                    options,
+                    seed,
+                    posterior=posterior,
+                    on_progress=course.report,
+                    keep_going=course.keep_going,
                 )
         folder.write_json("model.json", model_document(found.model))
         folder.write_text("report.html", identification_report(found))

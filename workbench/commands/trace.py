@@ -1,6 +1,5 @@
 """`workbench trace`: logs and held-out logs -> trace.json, model.json and report.html."""
 
-import math
 import time
 from datetime import datetime
 from pathlib import Path
@@ -9,7 +8,7 @@ import click
 
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
-from workbench.options import SECONDS_ABOVE_0, card_option, complete_file, effects_option
+from workbench.options import budget_option, card_option, complete_file, effects_option
 from workbench.output import OutputFolder, emit, output_options, progress
 from workbench.steps.stages import TRACE_STAGES
 
@@ -31,12 +30,7 @@ from workbench.steps.stages import TRACE_STAGES
 )
 @card_option
 @effects_option
-@click.option(
-    "--budget",
-    type=SECONDS_ABOVE_0,
-    metavar="SECONDS",
-    help="End after so long with the best so far; the first Ctrl-C does the same.",
-)
+@budget_option
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @output_options
 def command(
@@ -44,7 +38,7 @@ def command(
     tests: tuple[str, ...],
     card: str,
     effects: tuple[Path, ...],
-    budget: float | None,
+    budget: float,
     seed: int,
     as_json: bool,
     out: Path | None,
@@ -74,7 +68,7 @@ def command(
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
             test = read_sources(held_out, card) if held_out else None
-            left = math.inf if budget is None else budget - (time.monotonic() - begun)
+            left = budget - (time.monotonic() - begun)
             course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
             with watched(course):
                 found = trace_sources(

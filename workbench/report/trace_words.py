@@ -222,7 +222,7 @@ def then_of(traced: Traced, folder: Path | None = None) -> list[str]:
     design = f"`workbench design {model}` makes a controller"
     out = []
     if found.not_tried:
-        out.append("trace again without `--budget`, to try what was left out")
+        out.append("trace again with a larger `--budget`, to try what was left out")
     if found.next_experiment:
         out.append(f"record more, {found.next_experiment.rstrip('.')}; then trace with it too")
     if found.verdict == "drift":
