@@ -77,7 +77,8 @@ def entries(path: Path = TABLE) -> dict[str, Entry]:
 
 def _entry(name: str, raw: Tables, machines: Tables) -> Entry:
     own = {key: value for key, value in raw.items() if key not in ("machine", "right")}
-    whole = merged(machines[raw["machine"]] if "machine" in raw else {}, own)
+    beneath: Tables = machines[raw["machine"]] if "machine" in raw else {}
+    whole = merged(beneath, own)
     return Entry(name, whole, right_answer(name, raw["right"], whole.get("recipe", {})))
 
 

@@ -56,7 +56,7 @@ def columns(one: Rough, seed: int) -> dict[str, Array]:
     shown = y[at] + one.noise_y * rng.standard_normal(len(y[at]))
     if one.count > 0.0:
         shown = one.count * np.round(shown / one.count)
-    return {"t": STEP * np.arange(len(y))[at], "r": r[at], "y": shown, "u": u[at]}
+    return {"t": STEP * np.arange(len(y), dtype=np.float64)[at], "r": r[at], "y": shown, "u": u[at]}
 
 
 def moves(one: Rough, rng: np.random.Generator) -> Array:
