@@ -87,8 +87,10 @@ def merged(base: Tables, over: Tables) -> dict[str, Any]:
     out = dict(base)
     for key, value in over.items():
         below = out.get(key)
-        both = isinstance(value, Mapping) and isinstance(below, Mapping)
-        out[key] = merged(below, value) if both and "kind" not in value else value
+        if isinstance(value, Mapping) and isinstance(below, Mapping) and "kind" not in value:
+            out[key] = merged(below, value)
+        else:
+            out[key] = value
     return out
 
 
