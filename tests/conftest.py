@@ -8,6 +8,7 @@ from hypothesis import settings
 
 from workbench.threads import one_thread_by_default
 
+pytest_plugins = ["tests.verdicts.plugin"]  # here, as it prints where no worker collects
 ROOT = Path(__file__).resolve().parent.parent
 LONG_FIRST = (  # files and folders whose tests take longest, so that no worker ends alone with one
     "end_to_end/test_scenario.py",

@@ -1,0 +1,111 @@
+"""What the workbench says of an entry, and where that is not right."""
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from identification.errors import UserError
+from tests.verdicts.entries import Entry, Right, Within, with_amplitudes
+from tests.verdicts.logs import sources
+from workbench.cards.own_effects import library
+from workbench.steps.trace import Traced, trace_sources
+
+NOT_NAMED, IN_VAIN, NOT_TOLD = "not named", "named in vain", "not told"
+DIGITS = 4
+Found = str | float | bool
+Sizes = Mapping[str, float | None]
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An answer in the table's words; looks: how often the trace asked whether it is to go on, a
+    measure of its work that is the same everywhere; seconds: of the processor, by its clock."""
+
+    verdict: str
+    effects: Mapping[str, Sizes]
+    parameters: Sizes
+    depends_on: tuple[str, ...]
+    complete: bool
+    halted: bool
+    looks: int
+    seconds: float
+    refusal: str = ""
+
+
+class Looks:
+    """Whether a trace is to go on: up to so many looks."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.count = most, 0
+
+    def __call__(self) -> bool:
+        self.count += 1
+        return self.count <= self.most
+
+
+def answer(entry: Entry, data: Path | None, folder: Path) -> Answer:
+    """The entry's log traced as the command does it; a refusal is an answer too.
+
+    Raises Absent where its data are not there.
+    """
+    looks, begun = Looks(entry.looks), time.process_time()
+    try:
+        train, test = sources(entry, data, folder)
+        traced = trace_sources(train, test, library(), keep_going=looks)
+    except UserError as error:
+        seconds = time.process_time() - begun
+        return Answer("refused", {}, {}, (), False, False, looks.count, seconds, str(error))
+    return _said(traced, looks.count, time.process_time() - begun)
+
+
+def _said(traced: Traced, looks: int, seconds: float) -> Answer:
+    found = traced.trace
+    return Answer(
+        verdict=found.verdict,
+        effects={
+            one.effect.key: with_amplitudes({n: e.value for n, e in one.params.items()})
+            for one in found.effects
+        },
+        parameters={name: e.value for name, e in found.parameters_after.items()},
+        depends_on=tuple(dict.fromkeys((*found.unknown.depends_on, *found.left.depends_on))),
+        complete=found.complete,
+        halted=bool(found.not_tried),
+        looks=looks,
+        seconds=seconds,
+    )
+
+
+def shortfalls(said: Answer, right: Right) -> dict[str, Found]:
+    """By what is wrong (`verdict`, `effect KEY`, `KEY.size`, ...) what was found in its place."""
+    out: dict[str, Found] = {}
+    if said.verdict not in right.verdict:
+        out["verdict"] = said.verdict
+    for key, sizes in right.effects.items():
+        if key not in said.effects:
+            out[f"effect {key}"] = NOT_NAMED
+        else:
+            out |= _off(f"{key}.", said.effects[key], sizes)
+    for key in said.effects:
+        if key not in right.effects and key not in right.may:
+            out[f"effect {key}"] = IN_VAIN
+    if right.complete is not None and said.complete is not right.complete:
+        out["complete"] = said.complete
+    if right.depends_on and not set(right.depends_on) & set(said.depends_on):
+        out["depends_on"] = ", ".join(said.depends_on) or "nothing"
+    if said.verdict != "refused":
+        out |= _off("", said.parameters, right.parameters)
+    return out
+
+
+def _off(prefix: str, said: Sizes, right: Mapping[str, Within]) -> dict[str, Found]:
+    return {
+        f"{prefix}{name}": NOT_TOLD if said.get(name) is None else rounded(said[name])
+        for name, one in right.items()
+        if not one.holds(said.get(name))
+    }
+
+
+def rounded(value: float | None) -> float:
+    """A number with the digits that the table keeps."""
+    return float(f"{value:.{DIGITS}g}")
