@@ -18,6 +18,7 @@ import numpy as np
 from identification.errors import NotIdentifiable
 from identification.estimation.contradicted import Corrected, corrected, told_of
 from identification.estimation.imposed_motion import fit_imposed, left_by
+from identification.estimation.late_position import what_acts_beside
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
     RecordedLogs,
@@ -33,7 +34,7 @@ from identification.estimation.structure_fit import (
     search_is_hopeless,
     searched,
 )
-from identification.estimation.surroundings import surrounding_estimates, surroundings
+from identification.estimation.surroundings import surrounding_estimates
 from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
 from identification.log import Log, Rig
@@ -88,15 +89,15 @@ def fit_plant(
         return _fit(logs, rng, rig, drive, prior, on_progress, halt)
     for log in logs:
         check_driven(log)
-    around = surroundings(logs, rig)
-    fit = _fit([around.taken_out(log) for log in logs], rng, rig, drive, None, on_progress, halt)
+    beside = what_acts_beside(logs, rig, halt)
+    fit = _fit([beside.taken_out(log) for log in logs], rng, rig, drive, None, on_progress, halt)
     if halt.reached():
         fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
-    if around.none:
+    if beside.none:
         return fit
     return replace(
-        fit, surroundings=around, effects=around.effects,
-        estimates={**fit.estimates, **surrounding_estimates(around)},
+        fit, surroundings=beside, effects=beside.effects,
+        estimates={**fit.estimates, **surrounding_estimates(beside)},
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.effects._library import Library
+from identification.estimation.late_position import what_acts_beside
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
@@ -18,7 +19,6 @@ from identification.estimation.regression.equation_rows import (
     motion_log,
 )
 from identification.estimation.structure_fit import FittedStructure
-from identification.estimation.surroundings import surroundings
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
@@ -75,15 +75,15 @@ def trace(
     for log in (*train, *test):
         check_driven(log)
     report = on_progress or quiet
-    around = surroundings(train, rig)
+    halt = Halt(keep_going)
+    beside = what_acts_beside(train, rig, halt)
     recorded_as = train, test
-    train, test = ([around.taken_out(log) for log in logs] for logs in (train, test))
+    train, test = ([beside.taken_out(log) for log in logs] for logs in (train, test))
     library = {key: effect for key, effect in library.items() if key not in ALWAYS_THERE}
     still = bool(test) and not any(_slides(log, rig) for log in test)
     if still:  # nothing could be proved of an effect
         library = {}
     begin, settle, choose = rng.spawn(3)
-    halt = Halt(keep_going)
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
     report("refitting", 0.0)
     found = refinement(chosen, report)
@@ -99,7 +99,7 @@ def trace(
         told = replace(told, remarks=(*told.remarks, doubt))
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
-    return told if around.none else with_surroundings(told, around, *recorded_as, rig)
+    return told if beside.none else with_surroundings(told, beside, *recorded_as, rig)
 
 
 def _slides(log: Log, rig: Rig) -> bool:

@@ -18,6 +18,7 @@ from workbench.documents.model import Model, used
 FOLLOWS = 0.5  # free-run error of an ARX plant, relative to y, up to which it may carry a design
 IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has then done 80 %
 LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
+WHOLE_SAMPLE = 1e-3  # of a sample, up to which a delay counts as whole
 MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
 
 
@@ -116,11 +117,31 @@ def _physical(
 ) -> tuple[Array, Array]:
     actuator = model.simulated.actuator
     if not isinstance(actuator, Actuator):
-        return linear_plant(m, f, h)
+        a, b = linear_plant(m, f, h)
+        return a, delayed(b, dead_time(model) / h)
     if force is None:
         return commanded_plant(m, f, h, actuator)
     gains = ForceGains(force.k_i, force.T_i)
     return linear_plant(m, f, h, actuator, gains, max(1, round(h / force.h)))
+
+
+def dead_time(model: Model) -> float:
+    """By how much the position, as measured, follows a motor's command or a force [s]."""
+    late = model.effects.get("input_delay")
+    if late is not None:
+        return used(late["tau"])
+    return max(used(model.lag), 0.0) if model.lag is not None else 0.0
+
+
+def delayed(b: Array, samples: float) -> Array:
+    """The numerator B(z^-1) of a plant whose input acts so many samples later.
+
+    A part of a sample is shared between its two ends, as the mean of a held command is.
+    """
+    whole = math.floor(samples + WHOLE_SAMPLE)
+    part = max(samples - whole, 0.0)
+    share = np.array([1.0 - part, part]) if part > WHOLE_SAMPLE else np.array([1.0])
+    return np.concatenate([np.zeros(whole), np.convolve(b, share)])
 
 
 def _force_loop(model: Model, h: float) -> ForceLoop | None:

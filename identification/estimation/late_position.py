@@ -1,0 +1,74 @@
+"""A position that is read late by a slow drive, whose equation of motion in weak form tells no lag.
+
+Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
+in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
+command acts as late as it does, and nowhere else.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.errors import UserError
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.structure_fit import plain_structure
+from identification.estimation.surroundings import surroundings
+from identification.log import Log, Rig
+from identification.model.surroundings import Size, Surroundings
+from identification.progress import Halt
+from identification.thresholds import FOLLOWED, SURROUNDINGS_LEAVE
+
+SLOW_LOG = 6e-3  # s between samples, from which the equation's windows are too long to tell a lag
+DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
+NEARER = (2.0, 1.0, 0.5)  # samples, to either side of the best so far
+LITTLE_WORSE = 1.1  # times the misfit of the best so far, beyond which no longer lag is tried
+LAG_SD = 0.25  # samples, within which the best of halves is known
+SEED = 0  # the lags are compared on the same draws
+
+
+def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) -> Surroundings:
+    """What acts beside the applied force, as `surroundings` has it; of a slow motor's logs with the
+    lag that lets a run follow them, where none else does."""
+    found = surroundings(logs, rig)
+    slow = rig.kind == "motor" and logs[0].h >= SLOW_LOG
+    if not slow or found.lag.value or not rig.force_per_command:
+        return found
+    tried: dict[float, float] = {}
+
+    def left(samples: float) -> float:
+        """Misfit of the plain plant on the logs with that lag taken out."""
+        if samples not in tried:
+            late = replace(found, lag=Size(samples * logs[0].h), gives=rig.force_per_command)
+            tried[samples] = _misfit([late.taken_out(log) for log in logs], rig, halt)
+        return tried[samples]
+
+    best = _best_lag(left, halt or Halt())
+    if best == 0.0 or left(best) - 1.0 > SURROUNDINGS_LEAVE * (left(0.0) - 1.0):
+        return found
+    h = logs[0].h
+    return replace(found, lag=Size(best * h, LAG_SD * h), gives=rig.force_per_command)
+
+
+def _best_lag(left: Callable[[float], float], halt: Halt) -> float:
+    """The lag in samples, by halves, that leaves least; 0 where the run is followed without one."""
+    best = 0.0
+    if left(best) <= FOLLOWED:
+        return best
+    for samples in DOUBLED:
+        if halt.reached() or left(samples) > LITTLE_WORSE * left(best):
+            break
+        best = min(best, samples, key=left)
+    for step in NEARER:
+        for samples in (best - step, best + step):
+            if samples > 0.0 and not halt.reached():
+                best = min(best, samples, key=left)
+    return best
+
+
+def _misfit(logs: Sequence[Log], rig: Rig, halt: Halt | None) -> float:
+    try:
+        recorded = recorded_logs(logs, rig, None, halt)
+        return plain_structure(recorded, np.random.default_rng(SEED)).misfit
+    except UserError:
+        return np.inf
