@@ -2,7 +2,7 @@
 squares.
 
     python benchmarks/real.py --out real.jsonl [--only NAME ...] [--limit 300]
-        [--part identify|trace|both]
+        [--part look|identify|trace|both]
     python benchmarks/real.py --report real.jsonl
 
 Rigs are the folders of WORKBENCH_DATA, cases the folder `cases` beside it; what is absent is
@@ -28,7 +28,7 @@ from benchmarks.real_report import line, print_report
 from workbench.logs.fetch import DATA_VARIABLE
 
 ROOT = Path(__file__).resolve().parent.parent
-PARTS = ("identify", "trace", "both")
+PARTS = ("look", "identify", "trace", "both")
 
 
 def answered(case: Case, limit: float, part: str) -> dict[str, Any]:
@@ -47,7 +47,7 @@ def answered(case: Case, limit: float, part: str) -> dict[str, Any]:
         return found
     over = done.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
     why = f"over {limit:g} s" if over else done.stderr.strip()[-400:]
-    wanted = {"identify": ("identify",), "trace": ("trace",)}.get(part, ("identify", "trace"))
+    wanted = {"look": (), "both": ("identify", "trace")}.get(part, (part,))
     for what in wanted:
         found.setdefault(what, {"over" if over else "fault": why})
     return found
@@ -103,7 +103,8 @@ def main() -> int:
     if not cases_folder().is_dir():
         print(f"no folder {cases_folder().name!r} beside {DATA_VARIABLE}: its cases are skipped")
         cases = tuple(one for one in cases if one.group == "rig")
-    todo = [one for one in cases if not given.only or one.name in given.only]
+    named = {one.name: one for one in cases}
+    todo = [named[name] for name in given.only or named if name in named]
     found = run(todo, given)
     print_report(cases, read(given.out) if given.out else found)
     return 0

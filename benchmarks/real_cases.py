@@ -113,7 +113,8 @@ def every_case(table: Path = TABLE) -> tuple[Case, ...]:
 
 def _case(entry: Mapping[str, Any]) -> Case:
     terms = dict(entry.get("terms", {}))
-    terms["counts"] = tuple(terms.get("counts", ()))
+    every = range(1, terms.pop("counts_to", 0) + 1)
+    terms["counts"] = tuple(float(n) for n in (*terms.get("counts", ()), *every))
     names = ("verdicts", "must", "must_not")
     truths = tuple(Truth.of(one) for one in entry.get("truth", ()))
     verdicts, must, must_not = (tuple(entry.get(name, ())) for name in names)

@@ -1,10 +1,10 @@
 """The process that runs one case of `real`: lines of JSON, each of which holds the one before.
 
-    python -m benchmarks.real_child NAME LIMIT identify|trace|both
+    python -m benchmarks.real_child NAME LIMIT look|identify|trace|both
 
-identify: all but the trace; trace: the yardstick and the trace. LIMIT: processor time [s], after
-which the system ends the process; a trace is told to end a little before, as by `--budget`.
-Everything is asked through the functions behind the commands.
+look: init, doctor and yardstick; identify: these and the fit; trace: the yardstick and the trace.
+LIMIT: processor time [s], after which the system ends the process; a trace is told to end a little
+before, as by `--budget`. Everything is asked through the functions behind the commands.
 """
 
 import json
@@ -173,9 +173,9 @@ def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
             **judged_model(case, found.model, test, fit),
         }
 
-    if part != "trace":
+    if part in ("identify", "both"):
         answers.ask("identify", identified)
-    if part != "identify":
+    if part in ("trace", "both"):
         answers.ask("trace", traced)
 
 

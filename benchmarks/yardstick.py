@@ -19,7 +19,9 @@ Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 WIDTHS = (4, 8, 16, 32, 64)  # samples, half of the bump
-NEARLY = 1.1  # times the least share up to which the narrowest bump is taken
+NEARLY, AS_WELL = 1.1, 0.01  # times the least share, or more than it: the narrowest bump is taken
+FINER = 4  # times narrower: the bump that shows direction and speed
+ONE_WAY = 0.02  # of the rows: fewer of a direction are noise
 LAG_STEP, LAGS = 0.25, 5.0  # samples
 GAP = 3.5  # periods without a row
 UNSURE = 0.1  # share of a bump in which the direction may be unsure
@@ -50,7 +52,7 @@ class Terms:
 
     gravity: bool = False
     counts: tuple[float, ...] = ()
-    longest_lag: float = 0.0  # s, beyond LAGS samples
+    longest_lag: float = 0.0  # s, where it is more than LAGS samples
 
 
 @dataclass(frozen=True)
@@ -127,9 +129,11 @@ def sensor_noise(y: Array) -> float:
 
 @dataclass(frozen=True)
 class Sliding:
-    """Speed, acceleration in weak form, and the samples at which the body surely slides, (n,)."""
+    """Speed, its finer reading, acceleration in weak form, and the samples at which the body surely
+    slides, (n,)."""
 
     v: Array
+    fine: Array
     a: Array
     keep: BoolArray
     slowest: float
@@ -146,7 +150,8 @@ class Sliding:
         gap = weighed((~log.good).astype(np.float64), bump.mean)
         keep = (np.abs(v) > slowest) & (unsure < UNSURE) & (gap < FLOOR)
         keep[: 2 * width] = keep[len(keep) - 2 * width :] = False
-        return cls(v, weighed(log.y, bump.second), keep, slowest, bump)
+        fine = weighed(log.y, Bump.of(max(2, width // FINER), log.h).first)
+        return cls(v, fine, weighed(log.y, bump.second), keep, slowest, bump)
 
 
 def force_terms(log: Record, v: Array, terms: Terms) -> dict[str, Array]:
@@ -178,19 +183,23 @@ def fitted(logs: Sequence[Record], terms: Terms) -> Fit | None:
     if not found:
         return None
     least = min(one.share for one in found)
-    return next(one for one in found if one.share <= NEARLY * least)
+    return next(one for one in found if one.share <= max(NEARLY * least, least + AS_WELL))
 
 
 def _at_width(logs: Sequence[Record], terms: Terms, width: int) -> Fit | None:
     columns, moves, names = list[Array](), list[Sliding](), list[str]()
     for log in logs:
         move = Sliding.of(log, width)
-        parts = force_terms(log, move.v, terms)
+        parts = force_terms(log, move.fine, terms)
         names = ["m", *parts]
         rows = [move.a, *(weighed(x, move.bump.mean) for x in parts.values())]
         columns.append(np.column_stack(rows)[move.keep])
         moves.append(move)
     X = np.concatenate(columns)
+    up = X[:, names.index("F_cp")] > -X[:, names.index("F_cn")]
+    rare = min(float(np.mean(up)), float(np.mean(~up))) if len(up) else 0.0
+    both = up == (np.mean(up) > 0.5) if rare < ONE_WAY else np.ones(len(X), dtype=np.bool_)
+    X = X[both]
     if len(X) < LEAST:
         return None
     size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), FLOOR)
@@ -199,7 +208,9 @@ def _at_width(logs: Sequence[Record], terms: Terms, width: int) -> Fit | None:
     best = (np.inf, 0.0, np.zeros(0))
     for lag in lags(logs[0].h, terms.longest_lag):
         pairs = zip(logs, moves, strict=True)
-        s = np.concatenate([weighed(shifted(log, lag), m.bump.mean)[m.keep] for log, m in pairs])
+        s = np.concatenate([weighed(shifted(log, lag), m.bump.mean)[m.keep] for log, m in pairs])[
+            both
+        ]
         left = norm(s - base @ (base.T @ s)) / max(norm(s), FLOOR)
         if left < best[0]:
             best = (left, float(lag), s)
@@ -211,7 +222,7 @@ def _at_width(logs: Sequence[Record], terms: Terms, width: int) -> Fit | None:
 def lags(h: float, longest: float) -> Array:
     """The lags tried [s]."""
     most = max(LAGS, longest / h)
-    return np.arange(-LAGS, most + LAG_STEP / 2, LAG_STEP) * h
+    return np.asarray(np.arange(-most, most + LAG_STEP / 2, LAG_STEP) * h)
 
 
 def share_left(
@@ -245,7 +256,7 @@ def own_share(logs: Sequence[Record], fit: Fit) -> float | None:
     """What the fit leaves of the signal on logs that it may not have seen."""
     needs = []
     for log in logs:
-        parts = force_terms(log, Sliding.of(log, fit.width).v, fit.terms)
+        parts = force_terms(log, Sliding.of(log, fit.width).fine, fit.terms)
         force = np.sum([fit.values[name] * x for name, x in parts.items()], axis=0)
         needs.append((force, fit.values["m"]))
     return share_left(logs, fit.width, fit.lag, needs)
