@@ -45,7 +45,8 @@ def final_model(found: Mapping[str, Any]) -> Mapping[str, Any] | None:
     """The last answer with parameters; an answer without any where none has; None: not asked."""
     asked = [found[key] for key in ("trace", "identify") if key in found]
     told = [one for one in asked if "parameters" in one]
-    return (told or asked or [None])[0]
+    best: list[Mapping[str, Any]] = told or asked
+    return best[0] if best else None
 
 
 def _failed(answer: Mapping[str, Any]) -> str:

@@ -4,9 +4,10 @@ signal(t - lag) = m a + F_cp [v > 0] - F_cn [v < 0] + F_vp v+ + F_vn v- + c
                   + g1 sin y + g2 cos y + sum_n (a_n sin n y + b_n cos n y),
 
 in weak form: both sides are weighted with a bump of a few samples, whose second derivative takes
-that of the position. `signal` is the measured force, or the command where no force is measured, in
-the unit of the log: nothing that a fit makes stands on the left. Width of the bump and lag are
-chosen on the training logs. Knows numpy alone, none of the packages that it judges.
+that of the position; direction and speed are read by a finer one first. `signal` is the measured
+force, or the command where no force is measured, in the unit of the log: nothing that a fit makes
+stands on the left. Width of the bump and lag are chosen on the training logs. Knows numpy alone,
+none of the packages that it judges.
 """
 
 from collections.abc import Mapping, Sequence
@@ -19,7 +20,7 @@ Array = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 WIDTHS = (4, 8, 16, 32, 64)  # samples, half of the bump
-NEARLY, AS_WELL = 1.1, 0.01  # times the least share, or more than it: the narrowest bump is taken
+NEARLY, AS_WELL = 1.1, 0.005  # times the least share, or more than it: the narrowest bump is taken
 FINER = 4  # times narrower: the bump that shows direction and speed
 ONE_WAY = 0.02  # of the rows: fewer of a direction are noise
 LAG_STEP, LAGS = 0.25, 5.0  # samples
@@ -158,8 +159,8 @@ def force_terms(log: Record, v: Array, terms: Terms) -> dict[str, Array]:
     """Every term but the inertia at every sample, by the name of its factor."""
     up, down = v > 0, v < 0
     out: dict[str, Array] = {
-        "F_cp": 1.0 * up,
-        "F_cn": -1.0 * down,
+        "F_cp": up.astype(np.float64),
+        "F_cn": -down.astype(np.float64),
         "F_vp": v * up,
         "F_vn": v * down,
     }

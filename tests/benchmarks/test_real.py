@@ -29,7 +29,7 @@ H = 2e-3  # s
 def machine(late: float, seed: int = 0) -> Record:
     """A log whose position is read `late` [s], of a motion that needs exactly the force logged."""
     rng = np.random.default_rng(seed)
-    t = H * np.arange(4000)
+    t = H * np.arange(4000, dtype=np.float64)
     parts = [(0.05, 3.1), (0.02, 7.3), (0.1, 1.0 + 0.1 * seed)]
 
     def moved(at: Array) -> tuple[Array, Array, Array]:
@@ -62,7 +62,7 @@ def test_least_squares_find_parameters_and_lag(late: float) -> None:
 
 
 def test_a_log_that_rests_has_no_yardstick() -> None:
-    t = H * np.arange(3000)
+    t = H * np.arange(3000, dtype=np.float64)
     noise = 1e-4 * np.random.default_rng(0).standard_normal(len(t))
     assert fitted([record(t, noise, np.zeros(len(t)))], Terms()) is None
 
