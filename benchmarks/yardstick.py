@@ -197,12 +197,12 @@ def _at_width(logs: Sequence[Record], terms: Terms, width: int) -> Fit | None:
         columns.append(np.column_stack(rows)[move.keep])
         moves.append(move)
     X = np.concatenate(columns)
-    up = X[:, names.index("F_cp")] > -X[:, names.index("F_cn")]
-    rare = min(float(np.mean(up)), float(np.mean(~up))) if len(up) else 0.0
-    both = up == (np.mean(up) > 0.5) if rare < ONE_WAY else np.ones(len(X), dtype=np.bool_)
-    X = X[both]
     if len(X) < LEAST:
         return None
+    up = X[:, names.index("F_cp")] > -X[:, names.index("F_cn")]
+    rare = min(float(np.mean(up)), float(np.mean(~up)))
+    both = up == (np.mean(up) > 0.5) if rare < ONE_WAY else np.ones(len(X), dtype=np.bool_)
+    X = X[both]
     size = np.maximum(np.sqrt(np.mean(X**2, axis=0)), FLOOR)
     base, spread, _ = np.linalg.svd(X / size, full_matrices=False)
     base = base[:, spread > 1e-6 * spread[0]]
