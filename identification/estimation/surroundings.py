@@ -61,7 +61,8 @@ class _Squares:
         """Square left at every lag (l,) and coefficients (c, l), of these blocks and columns."""
         at = np.asarray(used)
         G = np.sum(self.columns[kept], axis=0)[np.ix_(at, at)]
-        size = np.sqrt(np.maximum(np.diag(G), 1e-300))
+        size = np.sqrt(np.diag(G))
+        size = np.where(size > 0.0, size, 1.0)  # of nothing, whose coefficient is then 0
         c = np.sum(self.with_force[kept], axis=0)[at] / size[:, np.newaxis]
         theta = np.linalg.pinv(G / np.outer(size, size), rcond=1e-10, hermitian=True) @ c
         square = np.sum(self.force[kept], axis=0) - np.sum(c * theta, axis=0)
@@ -98,7 +99,9 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     if used is GRAVITY:
         sine, cosine = (Size(float(theta[i]), float(sd[i])) for i in (-2, -1))
     up, down = float(theta[1]), float(theta[2])
-    if larger_than_friction(up, down):
+    ways = np.concatenate([one.up for one in moved])
+    both = bool(np.any(ways) and not np.all(ways))
+    if both and larger_than_friction(up, down):
         force = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
     h = logs[0].h
     gives = rig.force_per_command if held else None

@@ -82,6 +82,13 @@ def test_nothing_is_found_where_there_is_nothing(seed: int) -> None:
     assert surroundings([made_log(table(1), seed, seconds=8.0)], Rig("force")).none
 
 
+def test_motion_one_way_tells_no_constant_force() -> None:
+    log = made(3)
+    t = np.asarray(log["t"])
+    one_way = log.with_signals(y=0.05 * t + 0.01 * np.sin(5.0 * t), F=3.0 + np.sin(5.0 * t))
+    assert surroundings([one_way], MOTOR).force == Size()
+
+
 def test_what_is_not_there_changes_no_log() -> None:
     log = made(1)
     assert NO_SURROUNDINGS.taken_out(log) is log
