@@ -50,7 +50,8 @@ def final_model(found: Mapping[str, Any]) -> Mapping[str, Any] | None:
 
 
 def _failed(answer: Mapping[str, Any]) -> str:
-    return next((f"{key}: {answer[key]}" for key in NEVER_RIGHT if key in answer), "")
+    said = {key: str(answer[key]).strip().splitlines() for key in NEVER_RIGHT if key in answer}
+    return next((f"{key}: {lines[-1] if lines else ''}" for key, lines in said.items()), "")
 
 
 def _init(right: Mapping[str, Any], answer: Mapping[str, Any]) -> str:
@@ -139,11 +140,14 @@ def intervals(case: Case, found: Mapping[str, Any]) -> list[bool]:
 
 
 def false_proof(found: Mapping[str, Any], force_is_measured: bool) -> str:
-    """The held-out prediction of a measured signal that a headlined effect makes worse; else
-    empty."""
+    """The held-out prediction of a measured signal that a headlined effect makes worse, or that it
+    was headlined on a log at rest; else empty."""
     plain, after = found.get("identify", {}), found.get("trace", {})
     if after.get("verdict") != "effect":
         return ""
+    least = found.get("yardstick", {})
+    if "values" in least and least.get("share") is None:
+        return "nothing slides on the held-out log"
     for key in (*RUNS, "share") if force_is_measured else RUNS:
         before, now = plain.get(key), after.get(key)
         if before is not None and (now is None or now > WORSE * before):

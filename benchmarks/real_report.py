@@ -61,7 +61,9 @@ def _cell(answer: Answers, key: str, times: float = 1.0) -> str:
     value = answer.get(key)
     if value is not None:
         return f"{times * value:.3g}"
-    return next((word for word in ("refused", "over", "fault") if word in answer), "-")
+    if "over" in answer:
+        return str(answer["over"])
+    return next((word for word in ("refused", "fault") if word in answer), "-")
 
 
 def _mark(asked: Sequence[Question], about: str) -> str:
