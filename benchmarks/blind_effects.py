@@ -40,7 +40,7 @@ from identification.effects._library import Library, built_in
 from identification.simulation.effect_along_motion import contribution
 
 REFERENCE_STIFFNESS = 1e4  # N/m
-ABSORBED = frozenset({"constant_force"})
+ABSORBED = frozenset({"constant_force", "gravity"})
 # Effects that a log of this kind of machine cannot show: no command, no pressures, no leak.
 HIDDEN: Mapping[str, frozenset[str]] = {
     "force": frozenset(

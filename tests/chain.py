@@ -1,7 +1,6 @@
 """A short simulated machine and a model of it, made once a process."""
 
 from dataclasses import replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, UNITS, Karnopp
 from identification.model.plant import Actuator
+from tests.made import made_once
 from workbench.cards.card import Card, load_card
 from workbench.cards.recipe import Recipe
 from workbench.documents.design import Design
@@ -58,7 +58,6 @@ TABLES = {
     "paper_table2": Karnopp(3.5, 16.97, 18.13, 289.0, 287.4, 0.009, -0.01, 20.76, -21.8),
     "paper_table3": Karnopp(6.5, 12.54, 7.35, 147.01, 113.05, 0.015, -0.02, 24.03, -10.18),
 }
-_DESIGNED: dict[str, Design] = {}
 EMPS = Karnopp(95.1, 23.5, 17.2, 203.5, 203.5, 0.001, -0.001, 25.0, -19.0)
 
 
@@ -70,7 +69,7 @@ def short_recipe(duration: float = 6.0) -> tuple[Card, Recipe]:
     return card, replace(card.recipe, duration=duration, h=2e-3, seed=5)
 
 
-@cache
+@made_once
 def identified() -> Identified:
     """The model of the short recipe, by the whole of identification."""
     card, recipe = short_recipe()
@@ -80,11 +79,14 @@ def identified() -> Identified:
 
 
 def designed(model: Model, *given: Any, **asked: Any) -> Design:
-    """`workbench.steps.design.design` of the model, made once a process for what is asked."""
-    key = repr((model, model.read, given, sorted(asked.items())))
-    if key not in _DESIGNED:
-        _DESIGNED[key] = design(model, *given, **asked)
-    return _DESIGNED[key]
+    """`workbench.steps.design.design` of the model, made once for what is asked."""
+    return _designed(model, model.read, *given, **asked)
+
+
+@made_once
+def _designed(model: Model, _read: tuple[str, ...], *given: Any, **asked: Any) -> Design:
+    """By the model and what is said of its file, which is no part of its `repr`."""
+    return design(model, *given, **asked)
 
 
 def model_of(

@@ -12,10 +12,13 @@ import pickle
 import shutil
 import sys
 from collections.abc import Callable
+from dataclasses import fields
 from functools import cache, wraps
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ParamSpec, TypeVar
+
+from identification.effects._base import Effect
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "build" / "made-by-tests"
@@ -30,6 +33,8 @@ def _read_only(of: dict[Any, Any]) -> MappingProxyType[Any, Any]:
 
 
 copyreg.pickle(MappingProxyType, lambda one: (_read_only, (dict(one),)))
+# Without what it has compiled, which is of this process.
+copyreg.pickle(Effect, lambda one: (Effect, tuple(getattr(one, f.name) for f in fields(one))))
 
 
 @cache

@@ -17,7 +17,7 @@ def value(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) ->
 
 EFFECT = Effect(
     key="gravity",
-    meaning="the weight of an arm: a torque by the sine of its angle",
+    meaning="the weight of an arm, a torque by the sine of its angle",
     equation="-a*sin(y/turn) - b*cos(y/turn)",
     source="Gautier, Khalil, On the identification of the inertial parameters of robots, 27th IEEE"
     " Conference on Decision and Control 1988: the gravity terms of the inverse dynamic model",

@@ -51,8 +51,10 @@ def renewed(log: Log) -> Renewed:
 
 def held_for(y: Array) -> int:
     """Samples for which a position is held, 1 where it is not."""
+    if not np.all(np.isfinite(y)):
+        return 1
     changes = np.flatnonzero(np.diff(y) != 0.0) + 1
-    if len(changes) < FEWEST_NEW or not np.all(np.isfinite(y)):
+    if len(changes) < FEWEST_NEW:
         return 1
     gaps = np.diff(changes)
     usual = int(np.argmax(np.bincount(gaps)))

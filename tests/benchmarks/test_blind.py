@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.blind import ROOT, run
 from benchmarks.blind_cases import Case, case_of, effect_keys, make
-from benchmarks.blind_effects import SIZES, acting, place_of, right_signals, shows
+from benchmarks.blind_effects import ABSORBED, SIZES, acting, place_of, right_signals, shows
 from benchmarks.blind_machines import MACHINES, lively, machine, simulated, stream
 from benchmarks.blind_report import clopper_pearson, judged, print_report
 from identification.effects._library import built_in
@@ -55,7 +55,7 @@ def test_machines_slide_and_rest(name: str) -> None:
 
 
 def test_every_effect_has_a_size_on_every_machine_that_shows_it() -> None:
-    assert set(effect_keys()) == set(built_in()) - {"constant_force"} == set(SIZES)
+    assert set(effect_keys()) == set(built_in()) - ABSORBED == set(SIZES)
     for name in ("table1", "motor", "force"):
         one = machine(name, 0)
         at = place_of(one, simulated(one, (), 0, "train"))

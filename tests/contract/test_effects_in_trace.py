@@ -18,7 +18,7 @@ from identification.tracing.trace import trace
 from tests.identification.estimation.test_surroundings import TURNING, pendulum
 from tests.identification.plants import ACTUATOR, NOISE_F, NOISE_Y, table
 
-H, SECONDS = 2e-3, 12.0
+H, SECONDS = 2e-3, 10.0
 # Sizes, the first of which has to be told; what is not given is at its default.
 SIZES: Mapping[str, Mapping[str, float]] = {
     "backlash": {"width": 1e-3},

@@ -26,6 +26,7 @@ def rst(speed: float) -> RST:
     return tune_rst(*NOMINAL, H, Asked(dominant=(speed, 1.0)), Goals()).rst
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("speed", [20.0, 60.0, 150.0])
 def test_they_are_the_margins_of_each_plant(speed: float) -> None:
     controller, plants = rst(speed), drawn(0.3)

@@ -55,6 +55,7 @@ def test_printed_sign_convention_is_the_stable_one() -> None:
     assert abs(closed_loop_poles(A, B, RST(-R, S, R, h))[0]) > 1
 
 
+@pytest.mark.slow
 @given(plant(4), st.floats(2, 60), st.floats(0.3, 1.5), st.lists(st.floats(-0.3, 0.6), max_size=2))
 def test_poles_are_placed(
     AB: tuple[Array, Array], w_n: float, zeta: float, others: list[float]

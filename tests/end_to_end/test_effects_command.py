@@ -75,6 +75,7 @@ def test_the_library_is_listed_with_units_and_sources(
     assert "did you mean 'stribeck'?" in capsys.readouterr().err
 
 
+@pytest.mark.slow
 def test_an_own_effect_is_checked(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["effects", "check", str(folder)]) == 0
     assert "coil_heating: holds to all" in capsys.readouterr().out

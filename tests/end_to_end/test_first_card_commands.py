@@ -33,6 +33,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 2
     return shown.err
 
 
+@pytest.mark.slow
 def test_from_a_log_to_a_card_to_what_it_tells(
     shop: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -88,6 +88,7 @@ def test_add_promote_and_roll_back(here: Path, capsys: pytest.CaptureFixture[str
     assert {d["made_by"] for d in shown["decisions"]} == {"tester"}
 
 
+@pytest.mark.slow
 def test_diff_shows_both_sides(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     filled(capsys)
     found = done(capsys, "registry", "diff", "bench")

@@ -317,6 +317,7 @@ def test_a_card_for_a_log_of_a_hundred_columns(
     assert "... and 95 more: --verbose" in text and text.splitlines()[-1].endswith("card.toml")
 
 
+@pytest.mark.slow
 def test_a_registry_of_many_machines_and_versions(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -13,6 +13,7 @@ def bowl(members: Array) -> Array:
     return np.asarray(np.sum((members / SPREAD) ** 2, axis=1))
 
 
+@pytest.mark.slow
 def test_spread_of_a_normal_density() -> None:
     rng = np.random.default_rng(1)
     found = ensemble(bowl, SPREAD * rng.standard_normal((32, 3)), 3000, rng)

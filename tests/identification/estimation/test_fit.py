@@ -29,6 +29,7 @@ def errors(fit: KarnoppFit, truth: Karnopp) -> np.ndarray:
     return np.abs(fit.friction.array / truth.array - 1.0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("number", [1, 2, 3])
 def test_recovers_the_papers_plants(number: int) -> None:
     truth = table(number)
@@ -47,6 +48,7 @@ def test_recovers_the_papers_plants(number: int) -> None:
         assert abs(found.value - value) < 5 * found.sd + 1e-4 * abs(value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("noise", "off"), [(3e-5, 0.003), (1e-4, 0.01), (1e-3, 0.03)])
 def test_noise_of_the_logged_command_is_the_logs_and_not_the_plants(
     noise: float, off: float
@@ -68,6 +70,7 @@ def test_noise_of_the_logged_command_is_the_logs_and_not_the_plants(
         assert abs(found.value - value) < 4 * found.sd
 
 
+@pytest.mark.slow
 def test_recovers_a_plant_from_the_force_alone() -> None:
     truth = table(2)
     log = made_log(truth, seed=3)
@@ -86,6 +89,7 @@ def test_motor_is_driven_by_its_command() -> None:
     assert fit.actuator == Motor(2.0)
 
 
+@pytest.mark.slow
 def test_two_logs_make_one_fit_with_smaller_spread() -> None:
     truth = table(3)
     logs = [made_log(truth, seed=seed, seconds=6.0) for seed in (1, 2)]
@@ -97,6 +101,7 @@ def test_two_logs_make_one_fit_with_smaller_spread() -> None:
     assert np.trace(both.covariance[:1, :1]) < np.trace(one.covariance[:1, :1])
 
 
+@pytest.mark.slow
 def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
     t = np.arange(8000, dtype=np.float64) * 1e-3
     both = (np.sin(2 * np.pi * 0.5 * t) > 0) & (np.sin(2 * np.pi * 2.0 * t) > -0.2)
@@ -113,6 +118,7 @@ def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
     assert fit.estimates["F_cp"].value == pytest.approx(table(2).F_cp, rel=0.02)
 
 
+@pytest.mark.slow
 def test_same_seed_gives_the_same_fit() -> None:
     log = made_log(table(1), seed=5, seconds=5.0)
     one, two = fitted(log), fitted(log)
@@ -120,6 +126,7 @@ def test_same_seed_gives_the_same_fit() -> None:
         assert getattr(one.friction, field.name) == getattr(two.friction, field.name)
 
 
+@pytest.mark.slow
 def test_arrays_of_the_caller_are_not_changed() -> None:
     log = made_log(table(1), seed=6, seconds=4.0)
     before = {key: values.copy() for key, values in log.signals.items()}
@@ -140,6 +147,7 @@ def test_progress_is_reported_by_stage() -> None:
     assert all(0.0 <= share <= 1.0 for _, share in seen)
 
 
+@pytest.mark.slow
 def test_a_wrong_structure_is_not_called_adequate() -> None:
     log = made_log(table(2), seed=8, seconds=6.0)
     spring = log.with_signals(F=log["F"] + 300.0 * log["y"] ** 2 / np.max(log["y"]))

@@ -1,6 +1,7 @@
 """The posterior agrees with the fit's intervals where both can be believed, and is silent else."""
 
 import numpy as np
+import pytest
 
 from identification.estimation.fit import fit_plant
 from identification.estimation.posterior import Posterior, sample_posterior
@@ -26,6 +27,7 @@ def compared(found: Posterior, fit: KarnoppFit) -> tuple[list[float], list[float
     return off, wider
 
 
+@pytest.mark.slow
 def test_posterior_of_whole_runs_agrees_with_the_fit() -> None:
     log = made_log(table(2), seed=11, seconds=5.0)
     fit, shares = fitted(log), list[float]()
@@ -45,6 +47,7 @@ def test_posterior_of_whole_runs_agrees_with_the_fit() -> None:
     assert all(wide[n][0] < narrow[n][0] < narrow[n][2] < wide[n][2] for n in narrow)
 
 
+@pytest.mark.slow
 def test_a_short_walk_gives_no_interval() -> None:
     log = made_log(table(3), seed=12, seconds=4.0)
     fit = fitted(log)
@@ -55,6 +58,7 @@ def test_a_short_walk_gives_no_interval() -> None:
     assert "\n" not in found.verdict
 
 
+@pytest.mark.slow
 def test_logs_and_fit_are_left_as_they_are_and_a_seed_gives_the_same() -> None:
     log = made_log(table(2), seed=13, seconds=3.0)
     fit = fitted(log)
@@ -66,6 +70,7 @@ def test_logs_and_fit_are_left_as_they_are_and_a_seed_gives_the_same() -> None:
     assert all(np.array_equal(log[name], before[name]) for name in before)
 
 
+@pytest.mark.slow
 def test_by_force_it_is_as_wide_as_the_noise_moves_the_fit() -> None:
     log = made_log(table(2), seed=14, seconds=5.0)
     fit = fit_plant([log], np.random.default_rng(1), rig=RIG, drive="force")

@@ -65,6 +65,7 @@ def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> 
         assert broken(one) is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("key", "p"), PARAMS, ids=[f"{key}.{p.name}" for key, p in PARAMS])
 @given(share=st.floats(0.0, 1.0), wide=st.floats(1e-6, 10.0))
 def test_no_estimate_of_an_effect_breaks_it(key: str, p: Param, share: float, wide: float) -> None:
@@ -119,6 +120,7 @@ def with_intervals(path: Path) -> Iterator[int]:
                 yield node.lineno
 
 
+@pytest.mark.slow
 def test_every_interval_is_made_by_the_rule() -> None:
     found = {
         str(path.relative_to(ROOT))

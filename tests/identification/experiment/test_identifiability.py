@@ -1,6 +1,7 @@
 """The gate: what it promises a fit keeps, and what a log cannot tell it says."""
 
 import numpy as np
+import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
@@ -12,6 +13,7 @@ from tests.identification.motor_logs import K_A, made
 RIG = Rig("motor", force_per_command=K_A)
 
 
+@pytest.mark.slow
 def test_a_fit_is_as_sure_as_promised() -> None:
     log = made(3)
     promised = identifiability(recorded_logs([log], RIG))

@@ -21,6 +21,7 @@ def plain_of(effects: dict[str, dict[str, float]] | None) -> PlainModel:
     return plain_model(rows, library, np.random.default_rng(0))
 
 
+@pytest.mark.slow
 def test_only_a_plant_that_is_followed_says_how_far_noise_walks() -> None:
     followed, lost = plain_of(None), plain_of(COGGING)
     assert followed.model.misfit <= FOLLOWED < lost.model.misfit
@@ -28,6 +29,7 @@ def test_only_a_plant_that_is_followed_says_how_far_noise_walks() -> None:
     assert [one.reference for one in lost.rows.logs] == [None]
 
 
+@pytest.mark.slow
 def test_nothing_is_looked_for_only_where_run_and_equations_leave_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -164,6 +164,7 @@ def test_a_slower_test_log_is_no_drift_of_the_mass() -> None:
     assert found.verdict == "none", found.drift
 
 
+@pytest.mark.slow
 def test_scale_of_forces_is_as_exact_as_its_interval() -> None:
     found = traced(made(11))
     for name, true in (("k1", ACTUATOR.k1), ("k2", ACTUATOR.k2), ("m", PLAIN.m)):

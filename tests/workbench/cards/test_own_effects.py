@@ -118,6 +118,7 @@ def test_without_a_place_for_a_cache_it_works_all_the_same(
     assert not list((tmp_path / "own").rglob("*.nbi"))
 
 
+@pytest.mark.slow
 def test_kernels_are_cached_for_the_next_process(tmp_path: Path) -> None:
     path = written(tmp_path / "own")
     code = "import sys, pathlib; from workbench.cards.own_effects import library\n"

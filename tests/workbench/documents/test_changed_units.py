@@ -88,6 +88,7 @@ def test_a_unit_changed_alone_contradicts_the_model(
     assert "\n" not in text
 
 
+@pytest.mark.slow
 def test_all_forces_in_kilonewton_are_beyond_the_logs(tmp_path: Path) -> None:
     def change(document: Document) -> None:
         for name in ("F_cp", "F_cn", "F_sp", "F_sn"):

@@ -37,6 +37,7 @@ def written(path: Path, change: Callable[[dict[str, Any]], None] = lambda _: Non
     return file
 
 
+@pytest.mark.slow
 def test_every_parameter_has_its_unit() -> None:
     document = json.loads(dumps(design_document(found())))
     assert document["schema"] == "design/2"

@@ -138,6 +138,7 @@ def test_identify_trace_and_design_say_it(
     assert any("t of its logs: sampled every 2 s" in line for line in remarks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["emps", "friction_backlash", "pneumatic_seals", "xl330_servo"])
 def test_measured_sets_have_no_remark(name: str) -> None:
     card = load_card(card_path(name))

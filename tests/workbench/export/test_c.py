@@ -84,6 +84,7 @@ def test_its_steps_are_the_simulations_in_every_bit(
         assert np.array_equal(found.view(np.int64), run.u.view(np.int64)), build
 
 
+@pytest.mark.slow
 def test_a_compensator_of_the_excess_alone_is_the_same_program(tmp_path: Path) -> None:
     one = case("paper_table3")
     own = replace(one.design.compensator, e_T=3e-4, N_c=1.05, excess=True)
@@ -103,6 +104,7 @@ def test_a_limited_command_reaches_its_limit() -> None:
     assert np.max(np.abs(run.u)) == 0.4
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", BUILDS)
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", ["limited", "emps"])

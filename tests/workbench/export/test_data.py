@@ -63,6 +63,7 @@ def value(expression: Any, values: dict[str, Any]) -> Any:
     return OPERATORS[head](*(value(one, values) for one in rest))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", NAMES)
 def test_the_program_runs_from_the_file_alone(name: str) -> None:
     (text,) = json_file(exported(case(name).design, compensated=True)).values()

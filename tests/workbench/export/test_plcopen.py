@@ -26,6 +26,7 @@ def written(name: str, precision: Precision = "double") -> tuple[Exported, str]:
     return what, text
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["limited", "emps"])
 @pytest.mark.parametrize("precision", ["double", "single"])
 def test_the_schemas_classes_read_it_and_write_the_same_back(

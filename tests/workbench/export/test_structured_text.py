@@ -34,6 +34,7 @@ def test_the_block_gives_what_the_simulation_gave(name: str, controller: str) ->
     assert np.max(np.abs(np.array(found) - run.u)) < 1e-9 * np.max(np.abs(run.u))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("precision", ["double", "single"])
 @pytest.mark.parametrize("name", NAMES)
 def test_the_block_passes_its_own_test(name: str, precision: Precision) -> None:

@@ -115,6 +115,7 @@ def test_a_lost_worker_costs_nothing(cluster: Cluster, tmp_path: Path) -> None:
     assert done.verdicts == {"identified": 7}
 
 
+@pytest.mark.slow
 def test_a_worker_killed_from_outside(cluster: Cluster, tmp_path: Path) -> None:
     pids = list(cluster.client.run(os.getpid).values())
     killed: list[int] = []
@@ -241,6 +242,7 @@ def test_a_scheduler_without_workers_is_refused() -> None:
         pass
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "address",
     ["", "tcp://", "tcp://host:port", "tcp://[::1", "nonsense://h:1", "tcp://h:99999",

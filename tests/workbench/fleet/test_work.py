@@ -57,6 +57,7 @@ def done(name: str, card: str | None = None, in_force: Result | None = None) -> 
     return work(item)
 
 
+@pytest.mark.slow
 def test_a_first_model_and_a_judgement_against_it(place: Path) -> None:
     first = done("good")
     assert (first.verdict, first.against) == ("identified", None)

@@ -113,6 +113,7 @@ def test_every_name_of_the_front_is_there() -> None:
         _ = wb.idetify
 
 
+@pytest.mark.slow
 def test_a_notebook_shows_results_as_html_and_figures_as_pictures(tmp_path: Path) -> None:
     cells = ('import workbench as wb\nmade = wb.simulate("demo")\nmade', CELL, "design.plot()")
     notebook = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(one) for one in cells])

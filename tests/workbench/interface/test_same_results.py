@@ -115,6 +115,7 @@ def test_identify_by_keywords_in_other_units(bench: Bench, model: Any) -> None:
         assert found.model.friction[name].value == pytest.approx(one.value, rel=1e-4), name
 
 
+@pytest.mark.slow
 def test_trace(bench: Bench, tmp_path: Path) -> None:
     names = [bench.path(name) for name in LOGS]
     arguments = ("trace", names[0], "--test", names[1], "--card", bench.path("card.toml"))
@@ -128,6 +129,7 @@ def test_trace(bench: Bench, tmp_path: Path) -> None:
     assert 0.3 < float(np.std(rest["before"] / rest["noise"])) < 3.0
 
 
+@pytest.mark.slow
 def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     for given in (model, model.model, bench.path("model/model.json")):
         found = wb.design(given)
@@ -138,6 +140,7 @@ def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     shown_well(found, " recommended, position loop every")
 
 
+@pytest.mark.slow
 def test_robust_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     arguments = ("design", bench.path("model/model.json"), "--robust", "--draws", "20")
     folder = bench.ran("robust", *arguments, "--poles", "15,1", "--seed", "4")
@@ -151,6 +154,7 @@ def test_robust_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     shown_well(found, "machines drawn")
 
 
+@pytest.mark.slow
 def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:
     paths = (bench.path("model/model.json"), bench.path("design/design.json"))
     folder = bench.ran("validation", "validate", *paths)
@@ -163,6 +167,7 @@ def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:
     assert not strict.passed
 
 
+@pytest.mark.slow
 def test_experiment(bench: Bench, model: Any, tmp_path: Path) -> None:
     design = bench.path("design/design.json")
     arguments = (bench.path("model/model.json"), "--design", design, "--time", "6")
@@ -190,6 +195,7 @@ def test_predict(bench: Bench, model: Any, tmp_path: Path) -> None:
     np.testing.assert_array_equal(of_table.frame.to_numpy(), found.frame.to_numpy())
 
 
+@pytest.mark.slow
 def test_drift(bench: Bench, model: Any, tmp_path: Path) -> None:
     path = bench.path("model/model.json")
     arguments = ("drift", path, bench.path("day2.csv"), "--card", bench.path("card.toml"))
@@ -224,6 +230,7 @@ def test_read_logs(bench: Bench) -> None:
     np.testing.assert_allclose(again["y"], found["y"], rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.slow
 def test_effects(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "pull.py").write_text(PULL, "utf-8")
     for keys in ((), ("stribeck", "pull")):
@@ -297,6 +304,7 @@ def test_a_machine_that_is_not_well_said(given: dict[str, Any], words: str, benc
     assert len(str(caught.value).splitlines()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("call", "words"), UNFIT)
 def test_what_cannot_be_done(call: Callable[[Any], object], words: str, model: Any) -> None:
     with pytest.raises(wb.UserError, match=words) as caught:

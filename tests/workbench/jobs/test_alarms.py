@@ -85,6 +85,7 @@ def alarm(name: str, turn: int = 0) -> Alarm:
     return Alarm(1, turn, name, f"{name}.csv", "0" * 64, "set_aside", f"{name}: bad", 1, at)
 
 
+@pytest.mark.slow
 def test_alarms_are_sent_once_although_the_server_stumbles(
     judged: Registry, listener: Listener
 ) -> None:
@@ -196,6 +197,7 @@ def test_an_alarm_on_which_we_fail_does_not_stop_the_others(
     assert "secret" not in repr(told)
 
 
+@pytest.mark.slow
 def test_workers_at_once_send_each_alarm_once(fleet: Registry, listener: Listener) -> None:
     where = str(fleet.database.where)
 

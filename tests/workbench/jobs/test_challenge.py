@@ -39,6 +39,7 @@ def contest(
     return challenge(old, new, [held_out(p)], np.random.default_rng(1), terms)
 
 
+@pytest.mark.slow
 def test_the_model_of_the_machine_as_it_is_wins() -> None:
     found = contest(contender(OLD), contender(NEW), terms=Terms(loop=-10.0))
     assert found.won, found.reason

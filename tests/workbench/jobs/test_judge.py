@@ -162,6 +162,7 @@ def test_a_drifted_machine_gets_a_new_version(shop: Path, first: Judgement) -> N
     assert entry["duration"] == pytest.approx(0.65 * 10.0, rel=0.01)  # the rest was held out
 
 
+@pytest.mark.slow
 def test_a_model_alone_is_replaced_where_the_design_in_force_is_not_beaten(
     shop: Path, first: Judgement
 ) -> None:
@@ -215,6 +216,7 @@ def test_another_structure_is_traced_and_the_effect_put_in_force(
     assert found.evidence["trace"]["verdict"] == "effect"
 
 
+@pytest.mark.slow
 def test_a_structure_that_no_trace_confirms_has_to_win(shop: Path, first: Judgement) -> None:
     found = Chain(says("structure"))(task(shop, "same", first))
     assert found.verdict == "refused"

@@ -48,6 +48,7 @@ def names(registry: Registry, **given: Any) -> list[str]:
     return [one.machine for one in fleet_page(registry.database, asked(**given)).lines]
 
 
+@pytest.mark.slow
 def test_a_state_is_that_of_the_last_log(where: str) -> None:
     with Registry(where) as registry:
         for name in ("tuned", "drifts", "changed", "bad", "unsure", "new"):

@@ -31,6 +31,7 @@ def outbox(registry: Registry) -> Outbox:
     return found
 
 
+@pytest.mark.slow
 def test_an_alarm_is_kept_until_it_is_taken(outbox: Outbox) -> None:
     outbox.fill(["set_aside"], since=NOW, now=NOW)
     (alarm,) = outbox.due(NOW)

@@ -116,6 +116,7 @@ def test_design_report() -> None:
         assert text in html
 
 
+@pytest.mark.slow
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
     result, traces = validate(model, designed(model), np.random.default_rng(0), plant=other)

@@ -23,6 +23,7 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", list(MODELS))
 def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) -> None:
     model = MODELS[name]
@@ -56,6 +57,7 @@ def test_a_pid_s_weights_are_between_none_and_all_of_the_reference() -> None:
             assert -1e-9 <= weight <= 1.0 + 1e-9
 
 
+@pytest.mark.slow
 def test_the_reference_is_moved_no_faster_than_the_force_allows() -> None:
     model = MODELS["paper_table2"]
     weak = replace(model, log=(replace(model.log[0], force_peak=100.0),))
@@ -68,6 +70,7 @@ def test_the_reference_is_moved_no_faster_than_the_force_allows() -> None:
     assert any("move the reference" in (one.note or "") for one in slow.controllers.values())
 
 
+@pytest.mark.slow
 def test_the_command_limit_bounds_it_too() -> None:
     model = MODELS["paper_table2"]
     limited = replace(model, rig=replace(model.rig, control_limit=0.3))
@@ -126,6 +129,7 @@ def failing(model: Model, **changes: float) -> tuple[str, ...]:
     return result.figures["rst"]["plant"].missed
 
 
+@pytest.mark.slow
 def test_validation_judges_force_and_command() -> None:
     model = MODELS["paper_table2"]
     assert failing(model) == ()

@@ -73,7 +73,7 @@ def test_what_could_not_have_been_seen_is_status_0_and_loud(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     capsys.readouterr()
-    assert run(shop, tmp_path / "d", "b", "--variation", "5") == 0
+    assert run(shop, tmp_path / "d", "b", "--variation", "5", "--verbose") == 0
     shown = " ".join(capsys.readouterr().out.split())
     assert shown.startswith("NOT JUDGED, which is no all-clear: b.csv: no alarm, but a change of")
     assert "could have seen: nothing; not judged: m (" in shown

@@ -142,6 +142,7 @@ def test_the_file_alone_gives_the_simulated_commands(
     assert np.max(np.abs(own - run.u)) < 1e-6 * limit
 
 
+@pytest.mark.slow
 def test_command_unit_limit_and_gain_stand_in_the_file() -> None:
     document = json.loads(dumps(design_document(motor()[1])))
     assert document["command"]["unit"] == "A"

@@ -77,6 +77,7 @@ def model_with(recipe: Recipe) -> Model:
     return replace(model, effects={a.key: exact(a, "linear") for a in recipe.plant.effects})
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("drive", ["loop", "command"])
 @pytest.mark.parametrize("key", list(built_in()))
 def test_a_prediction_has_the_effect_that_its_log_has(key: str, drive: str) -> None:

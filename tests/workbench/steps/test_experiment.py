@@ -72,6 +72,7 @@ def test_no_limit_is_exceeded_on_machines_that_it_may_be(planned: Experiment) ->
         assert np.max(np.abs(run.F)) <= 120.0
 
 
+@pytest.mark.slow
 def test_a_fit_of_the_run_is_as_sure_as_promised(planned: Experiment) -> None:
     model = controlled()
     bench, (machine, *_) = bench_of(model, None), drawn_plants(model, np.random.default_rng(5), 1)
@@ -107,6 +108,7 @@ def test_the_parameters_asked_for_are_known() -> None:
         experiment(controlled(), replace(WANTED, parameters=("F_x",)), None, quiet, after(1))
 
 
+@pytest.mark.slow
 def test_without_room_or_controller_it_is_refused() -> None:
     with pytest.raises(NotIdentifiable, match="widen the limits"):
         experiment(controlled(), replace(WANTED, speed=1e-6), None, quiet, after(1))
@@ -116,6 +118,7 @@ def test_without_room_or_controller_it_is_refused() -> None:
         limits_of(controlled(), replace(WANTED, stroke=(0.1, 0.0)))
 
 
+@pytest.mark.slow
 def test_a_controller_that_hardly_moves_the_machine_is_told() -> None:
     model = controlled()
     assert model.controller is not None

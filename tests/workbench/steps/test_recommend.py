@@ -184,6 +184,7 @@ def test_a_design_says_why_it_is_not_at_the_drive_s_period() -> None:
     assert any(line.startswith("not every 1 ms: ") for line in found.remarks)
 
 
+@pytest.mark.slow
 def test_a_loop_is_no_faster_than_its_reference_may_be_moved() -> None:
     model = model_of(EMPS, k_a=35.15)
     precise = replace(model, fit=replace(model.fit, noise_y=1e-8))

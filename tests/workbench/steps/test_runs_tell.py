@@ -52,6 +52,7 @@ def test_identify_and_doctor_promise_the_same(both_ways: tuple[Path, Identified]
     assert {one.name for one in found.model.identifiability} >= set(NAMES)
 
 
+@pytest.mark.slow
 def test_is_written_and_read(both_ways: tuple[Path, Identified], tmp_path: Path) -> None:
     model = both_ways[1].model
     document = model_document(model)

@@ -85,6 +85,7 @@ def test_weak_form_gives_mass_and_sliding_friction() -> None:
     assert np.max(np.abs(found.five / SERVO.array[:5] - 1.0)) < 0.05
 
 
+@pytest.mark.slow
 def test_climb_reaches_the_whole_run() -> None:
     problem = pose([made_log(table(1), seed=2, seconds=6.0)], Rig("force"), "command")
     reached = climb(problem, np.random.default_rng(0), lambda _stage, _share: None)
@@ -93,6 +94,7 @@ def test_climb_reaches_the_whole_run() -> None:
     assert np.max(np.abs(reached.p[:9] / table(1).array - 1.0)) < 0.01
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_motor_that_begins_in_full_motion_is_found(seed: int) -> None:
     fit = fit_plant([motor_log(seed)], np.random.default_rng(seed), rig=RIG)

@@ -63,6 +63,7 @@ def test_effects_are_refined_with_the_nine() -> None:
     assert 0 < found.sd["spring.k"] < 1.0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [2, 3])
 def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
     warm = {"a": 0.3, "b": 0.2, "tau": 6.0, "asymmetry": 0.1}
@@ -79,6 +80,7 @@ def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
     assert np.allclose(found.plant.friction.array, NINE.array, rtol=0.02)
 
 
+@pytest.mark.slow
 def test_a_shape_other_than_the_asymmetry_stays_at_its_default() -> None:
     one = seen(made(3, {"stribeck": {"F_s": 3.0, "v_s": 0.02}}))
     found = onward(plant({"stribeck": {"F_s": 2.5, "v_s": 0.025}}), [one], "command")

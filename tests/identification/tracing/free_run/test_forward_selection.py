@@ -67,6 +67,7 @@ def test_play_shows_in_the_run_alone_and_is_named() -> None:
     assert step.rivals and all(c.gain < step.candidate.gain for c in step.rivals)
 
 
+@pytest.mark.slow
 def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     setting, plain = setting_of(4, 4e-4)
     library = {"stribeck": built_in()["stribeck"]}

@@ -59,7 +59,7 @@ def test_a_tight_spot_is_found_where_it_is() -> None:
 
 def test_what_a_sensor_adds_is_refined_though_a_recipe_may_leave_it_out() -> None:
     optional = {p.name for e in built_in().values() for p in e.params if p.optional}
-    assert optional == {"asymmetry", "delta"}
+    assert optional == {"asymmetry", "delta", "turn"}
     found = best("sensor_nonlinearity", {"sensor_nonlinearity": {"a": 0.0, "b": 9.0}})
     assert found.values["b"] == pytest.approx(9.0, rel=0.15)
 

@@ -119,6 +119,7 @@ def test_the_ramp_moves_within_the_stick_band() -> None:
     assert np.diff(ramp) == pytest.approx(speed * 2e-3)
 
 
+@pytest.mark.slow
 def test_a_machine_that_runs_away_keeps_no_limit() -> None:
     model = uncertain()
     kept = found().design
