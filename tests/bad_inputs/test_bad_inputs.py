@@ -42,6 +42,7 @@ def test_a_bad_input_ends_in_one_line(
     assert not found.faults, found
 
 
+@pytest.mark.slow
 def test_an_ending_is_judged(shop: Shop) -> None:
     def make(_shop: Shop, folder: Path) -> list[str]:
         (folder / "a.part").touch()

@@ -16,6 +16,8 @@ from workbench.documents.design_file import design_document
 from workbench.documents.model_file import model_document
 from workbench.output import dumps
 
+pytestmark = pytest.mark.slow
+
 ACTUATOR = Actuator(19530.0, 10405.0)
 WHY = ["--reason", "a test", "--by", "tester"]
 
@@ -106,6 +108,7 @@ def test_diff_shows_both_sides(here: Path, capsys: pytest.CaptureFixture[str]) -
     assert "version 1" in shown and "+2.5e+02 %" in shown and "N s/m" in shown
 
 
+@pytest.mark.slow
 def test_show_writes_the_files_of_a_version(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     filled(capsys)
     assert main(["registry", "show", "bench", "1", "--out", "old"]) == 0
@@ -134,6 +137,7 @@ def test_what_is_wrong_is_said_in_one_line(here: Path, capsys: pytest.CaptureFix
     assert "secret" not in line and "127.0.0.1" in line
 
 
+@pytest.mark.slow
 def test_reidentify_from_nothing_to_a_new_version(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

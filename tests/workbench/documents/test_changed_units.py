@@ -20,6 +20,8 @@ from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
 from workbench.steps.design import design
 
+pytestmark = pytest.mark.slow
+
 Document = dict[str, Any]
 NUMBERS = ("value", "sd", "low", "high")
 
@@ -112,6 +114,7 @@ def test_a_motor_s_constant_is_that_of_its_rig(tmp_path: Path) -> None:
     assert len(read_model(path).read) == 1
 
 
+@pytest.mark.slow
 def test_a_converted_value_is_read_and_said(tmp_path: Path) -> None:
     found = read_model(model_file(tmp_path, in_grams))
     plain = identified().model

@@ -231,6 +231,7 @@ def test_a_cluster_of_another_version_is_refused(
         pass
 
 
+@pytest.mark.slow
 def test_a_scheduler_without_workers_is_refused() -> None:
     with (
         LocalCluster(

@@ -16,6 +16,8 @@ from workbench.cli import main
 from workbench.interface.result import Result
 from workbench.output import dumps
 
+pytestmark = pytest.mark.slow
+
 LOGS = ("day1.csv", "day2.csv")
 PULL = '''"""A magnet."""
 
@@ -84,6 +86,7 @@ def the_same(found: Result, folder: Path, tmp_path: Path) -> None:
         assert found.to_json() + "\n" == (folder / main_file).read_text("utf-8")
 
 
+@pytest.mark.slow
 def test_identify(bench: Bench, model: Any, tmp_path: Path) -> None:
     the_same(model, bench.folder / "model", tmp_path)
 

@@ -162,6 +162,7 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
     assert liveliest(y[:20]) == slice(0, 20)
 
 
+@pytest.mark.slow
 def test_a_rotary_validation_has_rotary_columns() -> None:
     model = turned(identified()).model
     result, _ = validate(model, designed(model), np.random.default_rng(0))

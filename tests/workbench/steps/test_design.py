@@ -49,6 +49,7 @@ def test_defaults_follow_closely_without_overshoot_or_excess_force(name: str) ->
     assert ("rst", "model") in traces
 
 
+@pytest.mark.slow
 def test_a_pid_s_weights_are_between_none_and_all_of_the_reference() -> None:
     for model in MODELS.values():
         found = designed(model)

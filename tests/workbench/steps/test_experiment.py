@@ -28,6 +28,8 @@ from workbench.steps.experiment.planned import Experiment, Wanted, experiment_do
 from workbench.steps.experiment.rivals import read_rivals
 from workbench.steps.present import present
 
+pytestmark = pytest.mark.slow
+
 K_A = 35.0
 MOTOR = replace(TABLES["paper_table3"], dv_p=0.01, dv_n=-0.012)
 WANTED = Wanted(stroke=(-0.05, 0.05), speed=0.4, force=120.0, seconds=8.0, seed=2)

@@ -137,6 +137,7 @@ def test_what_is_decisive() -> None:
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("first", "tried"),
     [

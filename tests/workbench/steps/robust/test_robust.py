@@ -30,6 +30,8 @@ from workbench.steps.robust.robust import (
     robust_design,
 )
 
+pytestmark = pytest.mark.slow
+
 K_A = 35.0
 MOTOR = replace(TABLES["paper_table3"], dv_p=0.01, dv_n=-0.012, F_sp=18.0, F_sn=-11.0)
 WANTED = RobustAsked(draws=20, seed=1)
