@@ -2,7 +2,8 @@
 
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
-command acts as late as it does, and nowhere else.
+command acts as late as it does, and nowhere else. So a lag of a motor in a loop is believed where a
+run follows with it, and looked for there where the log is slow.
 """
 
 from collections.abc import Callable, Sequence
@@ -13,11 +14,11 @@ import numpy as np
 from identification.errors import UserError
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.structure_fit import plain_structure
-from identification.estimation.surroundings import surroundings
+from identification.estimation.surroundings import explains, surroundings
 from identification.log import Log, Rig
-from identification.model.surroundings import Size, Surroundings
+from identification.model.surroundings import NOT_SHOWN, Size, Surroundings
 from identification.progress import Halt
-from identification.thresholds import FOLLOWED, SURROUNDINGS_LEAVE
+from identification.thresholds import FOLLOWED
 
 SLOW_LOG = 6e-3  # s between samples, from which the equation's windows are too long to tell a lag
 DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
@@ -28,26 +29,34 @@ SEED = 0  # the lags are compared on the same draws
 
 
 def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) -> Surroundings:
-    """What acts beside the applied force, as `surroundings` has it; of a slow motor's logs with the
-    lag that lets a run follow them, where none else does."""
+    """What acts beside the applied force, as `surroundings` has it; of a motor's logs with the lag
+    that lets a run follow them."""
     found = surroundings(logs, rig)
-    slow = rig.kind == "motor" and logs[0].h >= SLOW_LOG
-    if not slow or found.lag.value or not rig.force_per_command:
+    if rig.kind != "motor" or not rig.force_per_command:
         return found
+    h, halt = logs[0].h, halt or Halt()
     tried: dict[float, float] = {}
 
     def left(samples: float) -> float:
         """Misfit of the plain plant on the logs with that lag taken out."""
         if samples not in tried:
-            late = replace(found, lag=Size(samples * logs[0].h), gives=rig.force_per_command)
+            late = replace(found, lag=Size(samples * h), gives=rig.force_per_command)
             tried[samples] = _misfit([late.taken_out(log) for log in logs], rig, halt)
         return tried[samples]
 
-    best = _best_lag(left, halt or Halt())
-    if best == 0.0 or left(best) - 1.0 > SURROUNDINGS_LEAVE * (left(0.0) - 1.0):
+    def follows(samples: float) -> bool:
+        """Whether a run follows with that lag where it does not without."""
+        return explains(left(0.0) - 1.0, left(samples) - 1.0)
+
+    in_loop = any("r" in log for log in logs)
+    if found.lag.value and in_loop and not follows(found.lag.value / h):
+        found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
+    if found.lag.value or h < SLOW_LOG:
         return found
-    h = logs[0].h
-    return replace(found, lag=Size(best * h, LAG_SD * h), gives=rig.force_per_command)
+    best = _best_lag(left, halt)
+    if best == 0.0 or not follows(best):
+        return found
+    return replace(found, lag=Size(best * h, LAG_SD * h))
 
 
 def _best_lag(left: Callable[[float], float], halt: Halt) -> float:

@@ -89,6 +89,8 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
         return NO_SURROUNDINGS
     used = GRAVITY if turns and _has_gravity(found) else PLAIN
     lag, sampled = _lag(found, used), False
+    if held and -1.0 < lag.value < 0.0:  # its loop is faster than its log (`held_command`)
+        lag = NOT_SHOWN
     if held and lag.value:
         current = _squares(moved, turns, held=False) or found
         other = _lag(current, used)

@@ -32,6 +32,7 @@ from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
 from identification.tracing.regression.stepwise import Choice
+from identification.tracing.remaining_structure import FEWEST_ROWS
 from identification.tracing.result import Trace, TraceVerdict
 from identification.tracing.structure_search import (
     FirstEffect,
@@ -105,7 +106,7 @@ def trace(
 def _slides(log: Log, rig: Rig) -> bool:
     """Whether the body slides in a log, for long enough to judge."""
     one = motion_log(log, held=rig.kind == "motor", by_command=False)
-    return len(one.sliding.start) > 0
+    return len(one.sliding.start) >= FEWEST_ROWS
 
 
 def _proved(

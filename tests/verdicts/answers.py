@@ -60,12 +60,16 @@ def answer(entry: Entry, data: Path | None, folder: Path) -> Answer:
 
 
 def _said(traced: Traced, looks: int, seconds: float) -> Answer:
+    """The answer; among its effects gravity and a constant force, which the plain model has."""
     found = traced.trace
     return Answer(
         verdict=found.verdict,
         effects={
-            one.effect.key: with_amplitudes({n: e.value for n, e in one.params.items()})
-            for one in found.effects
+            **{one.key: dict(one.values) for one in found.surroundings.effects},
+            **{
+                one.effect.key: with_amplitudes({n: e.value for n, e in one.params.items()})
+                for one in found.effects
+            },
         },
         parameters={name: e.value for name, e in found.parameters_after.items()},
         depends_on=tuple(dict.fromkeys((*found.unknown.depends_on, *found.left.depends_on))),
