@@ -104,7 +104,8 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     ways = np.concatenate([one.up for one in moved])
     both = bool(np.any(ways) and not np.all(ways))
     if both and larger_than_friction(up, down):
-        force = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
+        always = Size(0.5 * (down - up), float(0.5 * np.hypot(sd[1], sd[2])))
+        force = always if stands_out(always.value, always.sd) else NOT_SHOWN
     h = logs[0].h
     gives = rig.force_per_command if held else None
     return Surroundings(Size(lag.value * h, lag.sd * h), force, sine, cosine, gives, sampled)
