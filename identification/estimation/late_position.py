@@ -46,7 +46,10 @@ def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) ->
 
     def follows(samples: float) -> bool:
         """Whether a run follows with that lag where it does not without."""
-        return explains(left(0.0) - 1.0, left(samples) - 1.0)
+        without, with_it = left(0.0), left(samples)
+        if without <= FOLLOWED or not np.isfinite(with_it):
+            return False
+        return explains(without - 1.0, with_it - 1.0)
 
     in_loop = any("r" in log for log in logs)
     if found.lag.value and in_loop and not follows(found.lag.value / h):

@@ -18,6 +18,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import of_effect, told_estimate
+from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
     MotionLog,
     mechanical,
@@ -83,7 +84,10 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
         moved = [motion_log(log, held=held, by_command=False) for log in logs]
     except UserError:
         return NO_SURROUNDINGS
-    turns = rig.motion == "rotary" and max(float(np.ptp(log["y"])) for log in logs) > TURNS
+    # Between an actuator's command and the torque that it makes, gravity is an effect as any other.
+    direct = held or chosen_drive(logs, rig, None) == "force"
+    turns = direct and max(float(np.ptp(log["y"])) for log in logs) > TURNS
+    turns = turns and rig.motion == "rotary"
     found = _squares(moved, turns, held)
     if found is None:
         return NO_SURROUNDINGS
@@ -247,7 +251,8 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
         X = plain.X
         if turns:
             X = np.column_stack([X, w.mean @ y, w.mean @ np.sin(y), w.mean @ np.cos(y)])
-        B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in lags])
+        own_lags = lags * (moved[0].log.h / one.log.h)  # lags are in samples of the first log
+        B = np.column_stack([mean @ np.interp(at - lag, at, F) for lag in own_lags])
         inside = (w.start >= LAG) & (w.start + w.length < len(F) + LEAD) & (plain.speed >= slow)
         for k in range(BLOCKS):
             in_block = inside & (plain.block == k)

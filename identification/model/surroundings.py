@@ -1,6 +1,6 @@
 """What acts on a body beside the applied force, and by how much its motion follows that force."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -49,15 +49,30 @@ class Surroundings:
         """
         if self.none:
             return log
+        whole, behind = self._with_whole_force(log)
+        unknown, n = int(np.ceil(abs(behind))), len(log)
+        first, last = (unknown, n) if behind > 0.0 else (0, n - unknown)
+        return whole.part(first, last)
+
+    def of_one_instant(self, log: Log) -> Log:
+        """The log with its force or command moved to the instants of its position, all samples."""
+        return replace(self, force=NOT_SHOWN, sine=NOT_SHOWN, cosine=NOT_SHOWN)._with_whole_force(
+            log
+        )[0]
+
+    def _with_whole_force(self, log: Log) -> tuple[Log, float]:
+        """The log with the whole force, and by how many samples its column was moved."""
         # What a measured current is until the next sample is its mean between both.
         behind, n = self.lag.value / log.h - 0.5 * self.sampled, len(log)
         y, at = np.asarray(log["y"]), np.arange(n)
         force = np.interp(at - behind, at, log["F"]) + self.force.value
         force = force - self.sine.value * np.sin(y) - self.cosine.value * np.cos(y)
-        signals = {"F": force, "u": force / self.gives} if self.gives else {"F": force}
-        unknown = int(np.ceil(abs(behind)))
-        first, last = (unknown, n) if behind > 0.0 else (0, n - unknown)
-        return log.with_signals(**signals).part(first, last)
+        signals = {"F": force}
+        if self.gives:
+            signals["u"] = force / self.gives
+        elif "u" in log:  # of an actuator: its force and command are of one instant
+            signals["u"] = np.interp(at - behind, at, log["u"])
+        return log.with_signals(**signals), behind
 
     @property
     def effects(self) -> tuple[Acting, ...]:

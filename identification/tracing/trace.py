@@ -55,7 +55,7 @@ from identification.tracing.verdict import (
     run_residual,
 )
 
-ALWAYS_THERE = ("gravity",)  # where they show, in the plain model: they are nothing to be found
+OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
 MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing is proved"
 FOR_NOW = "for now, since the trace ended early"
 
@@ -80,7 +80,8 @@ def trace(
     beside = what_acts_beside(train, rig, halt)
     recorded_as = train, test
     train, test = ([beside.taken_out(log) for log in logs] for logs in (train, test))
-    library = {key: effect for key, effect in library.items() if key not in ALWAYS_THERE}
+    if rig.motion == "linear":
+        library = {key: effect for key, effect in library.items() if key not in OF_AN_ANGLE}
     still = bool(test) and not any(_slides(log, rig) for log in test)
     if still:  # nothing could be proved of an effect
         library = {}

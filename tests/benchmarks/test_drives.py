@@ -63,6 +63,7 @@ def test_momentum_is_what_driving_force_and_friction_leave(family: str) -> None:
     assert np.max(np.abs(np.diff(y) * rate - middle)[slides]) < 1e-6 * one.speed
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("family", FAMILIES)
 def test_a_stuck_body_stands_still_within_its_limits(family: str) -> None:
     one = bare(family, 64000)

@@ -65,6 +65,7 @@ def test_the_share_counts_the_plants_on_which_no_loop_is_stable() -> None:
     assert "90 %" in delay
 
 
+@pytest.mark.slow
 def test_a_loop_is_placed_for_the_plants_drawn() -> None:
     """The wider they are, the slower the loop that keeps its margins on nine in ten of them."""
     speeds = []

@@ -27,6 +27,7 @@ def sylvester_condition(a: Array, b: Array) -> float:
     return float(np.linalg.cond(np.array(columns)))
 
 
+@pytest.mark.slow
 @given(plant(), stable_polynomial(1, 14), st.booleans(), st.booleans())
 def test_closed_loop_is_as_asked(
     AB: tuple[Array, Array], P: Array, integrator: bool, notch: bool
@@ -52,6 +53,7 @@ def test_closed_loop_is_as_asked(
         assert np.array_equal(x, y)
 
 
+@pytest.mark.slow
 @given(plant(), st.integers(0, 2**32 - 1))
 def test_least_degree_solution_is_the_unique_one(AB: tuple[Array, Array], seed: int) -> None:
     A, B = AB

@@ -55,6 +55,7 @@ def test_frequency_and_damping_read_back(w_n: float, zeta: float) -> None:
     assert frequency_and_damping(complex(z), 0.01) == pytest.approx((w_n, zeta), rel=1e-6)
 
 
+@pytest.mark.slow
 @given(stable_polynomial(1, 3), stable_polynomial(1, 3), stable_polynomial(1, 2))
 def test_common_factor_is_found(c: Array, d: Array, factor: Array) -> None:
     shared = common_roots(multiply(c, factor), multiply(d, factor))

@@ -95,6 +95,7 @@ def test_every_command_has_its_page() -> None:
     assert set(found) == {"commands/index.md"} | {f"commands/{name}.rst" for name in COMMANDS}
 
 
+@pytest.mark.slow
 def test_every_effect_has_its_page_with_equation_units_source_and_picture(tmp_path: Path) -> None:
     found = dict(
         effect_pages.pages(tmp_path, keys=("spring", "valve_dead_zone", "rising_stiction"))

@@ -78,6 +78,7 @@ def test_a_folder_gets_the_card(shop: Path) -> None:
     assert (shop / "bench/card.toml").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

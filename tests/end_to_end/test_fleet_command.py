@@ -71,6 +71,7 @@ def test_a_fleet_with_a_bad_log_and_then_again(
     assert len(pd.read_parquet("fleet/results")) == 3
 
 
+@pytest.mark.slow
 def test_what_is_wrong_is_said_in_one_line(here: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "none: no logs" in refused(capsys, "fleet", "none")
     away = ["--cluster", "tcp://127.0.0.1:9", "--timeout", "1"]

@@ -133,6 +133,7 @@ def test_an_edit_below_recompiles(
     assert result(load()) == (expected, True)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "more"),
     [

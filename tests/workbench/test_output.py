@@ -221,6 +221,7 @@ def test_progress_is_mute(
     assert capsys.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_progress_shows_on_a_terminal(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -27,6 +27,7 @@ PARTS = st.one_of(
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.lists(PARTS, min_size=1, max_size=12), st.integers(5, 40), st.integers(60, 100))
 def test_whatever_there_is_fits(parts: list[Part | str], room: int, width: int) -> None:

@@ -23,6 +23,7 @@ def threads() -> set[int]:
     return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.cpu_count() == 1, reason="one core has one thread anyhow")
 @pytest.mark.parametrize(("set_by_user", "expected"), [({}, 1), ({"OPENBLAS_NUM_THREADS": "2"}, 2)])
 def test_a_command_has_one_thread_unless_told(set_by_user: dict[str, str], expected: int) -> None:
@@ -42,6 +43,7 @@ def test_python_has_one_within_a_call_and_its_own_after() -> None:
         assert threads() == before
 
 
+@pytest.mark.slow
 def test_what_is_set_stays() -> None:
     environment = {"MKL_NUM_THREADS": "4"}
     one_thread_by_default(environment)

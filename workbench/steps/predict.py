@@ -13,11 +13,13 @@ from identification.estimation.regression.held_command import with_period
 from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
+from identification.model.plant import Motor
+from identification.model.surroundings import Size, Surroundings
 from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.logs.sources import Sources
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
 
@@ -91,7 +93,7 @@ def predict(
         raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
     plant = model.simulated
     refuse_missing(log, plant.effects)
-    log = with_motor_force(_with_force(log, model), plant)
+    log = _of_one_instant(with_motor_force(_with_force(log, model), plant), model)
     body = of_body(log, plant)
     restarts = None if window is None else _restarts(body, window)
     how = Smoothing(held=model.rig.kind == "motor")
@@ -244,6 +246,16 @@ def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
         stiffness=model.fit.stiffness if drive == "force" else 0.0,
         restarts=restarts,
     )
+
+
+def _of_one_instant(log: Log, model: Model) -> Log:
+    """The log with its force at the instants of its position, where its columns are apart and no
+    effect of the model says so."""
+    if model.lag is None or "input_delay" in model.effects:
+        return log
+    drive = model.simulated.actuator
+    gives = drive.k_a if isinstance(drive, Motor) else None
+    return Surroundings(lag=Size(used(model.lag)), gives=gives).of_one_instant(log)
 
 
 def _with_force(log: Log, model: Model) -> Log:

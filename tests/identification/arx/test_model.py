@@ -250,6 +250,7 @@ def test_without_noise_any_model_comes_back(
         np.testing.assert_allclose(model.B, B, atol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("exact", [False, True])
 @pytest.mark.parametrize("nk", [0, 1, 3, 12])
 @pytest.mark.parametrize(("na", "nb"), [(0, 1), (0, 9), (1, 0), (2, 1), (3, 2), (9, 1), (5, 12)])

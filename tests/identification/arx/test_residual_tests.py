@@ -41,6 +41,7 @@ def assert_one_per_cent(tests: list[ResidualTests]) -> None:
     assert np.mean([not t.uncorrelated for t in tests]) <= 0.025
 
 
+@pytest.mark.slow
 def test_white_errors_leave_the_bands_at_one_lag_in_a_hundred() -> None:
     tests = []
     for seed in range(RUNS):
@@ -51,6 +52,7 @@ def test_white_errors_leave_the_bands_at_one_lag_in_a_hundred() -> None:
     assert np.histogram(p_values, 4, (0.0, 1.0))[0] == pytest.approx(RUNS / 4, rel=0.25)
 
 
+@pytest.mark.slow
 def test_bands_hold_on_the_runs_of_the_fit_itself() -> None:
     tests = []
     for seed in range(RUNS // 2):
@@ -59,6 +61,7 @@ def test_bands_hold_on_the_runs_of_the_fit_itself() -> None:
     assert_one_per_cent(tests)
 
 
+@pytest.mark.slow
 def test_bands_hold_for_errors_coloured_at_lags_below_the_step() -> None:
     tests = []
     for seed in range(RUNS):
@@ -70,6 +73,7 @@ def test_bands_hold_for_errors_coloured_at_lags_below_the_step() -> None:
     assert tests[0].whiteness.independent < 2000 / 1.5
 
 
+@pytest.mark.slow
 def test_other_levels_and_several_runs() -> None:
     tests = []
     for seed in range(RUNS):

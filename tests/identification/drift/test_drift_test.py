@@ -48,6 +48,7 @@ def with_spring(k: float) -> Log:
     return log.with_signals(y=y, F=run.F + NOISE_F * rng.standard_normal(len(log)))
 
 
+@pytest.mark.slow
 def test_the_same_machine_on_another_day_shows_no_drift() -> None:
     found = verdict_on(made_log(NINE, seed=2))
     assert found.verdict == "none"
@@ -58,6 +59,7 @@ def test_the_same_machine_on_another_day_shows_no_drift() -> None:
     assert found.state.logs == 1
 
 
+@pytest.mark.slow
 def test_table_2_to_table_3_is_found_from_one_log() -> None:
     found = verdict_on(made_log(table(3), seed=3))
     assert found.verdict == "drift"
@@ -114,6 +116,7 @@ def test_a_log_that_stands_still_is_not_judged() -> None:
     assert "no motion" in found.reason
 
 
+@pytest.mark.slow
 def test_what_a_log_does_not_show_is_not_judged() -> None:
     t: Array = 1e-3 * np.arange(12000, dtype=np.float64)
     one_way = 0.05 * (np.sin(2 * np.pi * 0.5 * t) > 0.0) + 0.003
@@ -123,6 +126,7 @@ def test_what_a_log_does_not_show_is_not_judged() -> None:
     assert "F_vp" in found.shifts
 
 
+@pytest.mark.slow
 def test_a_state_of_another_model_begins_anew() -> None:
     last = verdict_on(made_log(NINE, seed=2))
     other = replace(model(), key="second")

@@ -107,6 +107,7 @@ def test_a_parameter_is_never_surer_than_the_models_own_logs_were_of_it() -> Non
     assert np.all(np.diag(misfit.of_log(np.eye(9), LEFT)) == misfit.factor)
 
 
+@pytest.mark.slow
 def test_logs_that_a_model_follows_lie_as_far_from_it_as_their_errors_say() -> None:
     logs = [made_log(NINE, seed=k, seconds=8.0) for k in (1, 2)]
     rig = Rig("force")
@@ -119,6 +120,7 @@ def test_logs_that_a_model_follows_lie_as_far_from_it_as_their_errors_say() -> N
     assert (scatter["F_cp"] or 0.0) < 0.01
 
 
+@pytest.mark.slow
 def test_a_single_log_of_which_more_is_left_is_cut_up() -> None:
     known = model(np.random.default_rng(1))
     rig = Rig("force")

@@ -66,6 +66,7 @@ def strokes(seconds: float) -> Array:
     return np.asarray(size * np.sin(2 * np.pi * 4.0 * t))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sigma_0", [2e3, 1e5])
 def test_it_is_the_lugre_model(sigma_0: float) -> None:
     u = strokes(0.8)

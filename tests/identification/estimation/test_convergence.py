@@ -21,6 +21,7 @@ def walk(share: float, chains: int, draws: int, seed: int = 1) -> Array:
     return x
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(importlib.util.find_spec("arviz") is None, reason="the extra arviz")
 @pytest.mark.parametrize(("share", "chains", "draws"), [
     (0.0, 4, 500), (0.5, 4, 501), (0.9, 4, 2000), (-0.4, 4, 300), (0.9, 64, 200),

@@ -36,6 +36,7 @@ def test_spread_of_a_normal_density() -> None:
     assert found.evaluations > found.chains[..., 0].size
 
 
+@pytest.mark.slow
 def test_a_bent_density_is_walked_until_the_ensembles_agree() -> None:
     def banana(x: Array) -> Array:
         return np.asarray(x[:, 0] ** 2 + 25.0 * (x[:, 1] - x[:, 0] ** 2) ** 2)
@@ -47,6 +48,7 @@ def test_a_bent_density_is_walked_until_the_ensembles_agree() -> None:
     assert np.mean(second) == pytest.approx(1.0, rel=0.1)
 
 
+@pytest.mark.slow
 def test_ensembles_in_different_places_do_not_converge() -> None:
     def two(x: Array) -> Array:
         return np.asarray(np.minimum(np.sum((x - 30.0) ** 2, axis=1), np.sum((x + 30.0) ** 2, 1)))
@@ -70,6 +72,7 @@ def test_forbidden_regions_are_not_entered() -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_chains() -> None:
     def once() -> Array:
         rng = np.random.default_rng(6)

@@ -56,6 +56,7 @@ def test_no_estimate_breaks_the_rule(
     assert one.known or one.reason
 
 
+@pytest.mark.slow
 @given(st.lists(st.tuples(sizes, st.floats(0.0, 1e4)), min_size=9, max_size=9))
 def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> None:
     sign = np.array([-1.0 if name in NEGATIVE else 1.0 for name in NAMES])

@@ -31,6 +31,7 @@ def test_a_fine_ripple_is_seen() -> None:
     assert found.depends_on == ("y",)
 
 
+@pytest.mark.slow
 def test_noise_depends_on_nothing() -> None:
     named = 0
     for seed in range(40):
@@ -41,6 +42,7 @@ def test_noise_depends_on_nothing() -> None:
     assert named == 0
 
 
+@pytest.mark.slow
 def test_a_switch_is_a_signal() -> None:
     rng = np.random.default_rng(4)
     n = 4000

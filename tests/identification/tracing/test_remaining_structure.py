@@ -209,6 +209,7 @@ def test_equations_tell_on_what_is_left_depends(
     assert named[0] == signals[0] or signals == ("reversal",)
 
 
+@pytest.mark.slow
 def test_the_plain_machine_leaves_nothing_of_any_size() -> None:
     choice, after = lacking({})
     assert remaining_structure(choice, after, any_size=True).depends_on == ()

@@ -140,6 +140,7 @@ def test_an_effect_that_the_library_lacks_is_unknown(
     assert found.next_experiment
 
 
+@pytest.mark.slow
 def test_other_parameters_are_drift() -> None:
     worn = replace(PLAIN, F_cp=12.0, F_vn=180.0)
     found = traced(made(41), made(42, plain=worn))
@@ -150,6 +151,7 @@ def test_other_parameters_are_drift() -> None:
     assert changes["F_vn"].after == pytest.approx(180.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_slower_test_log_is_no_drift_of_the_mass() -> None:
     slow = made(51)
     u = 0.15 * np.sin(2 * np.pi * 0.1 * slow["t"])

@@ -97,6 +97,7 @@ def test_a_plant_that_walks_more_is_not_forgiven_for_it() -> None:
     assert len(starts(one, "command").at) > 3
 
 
+@pytest.mark.slow
 def test_a_force_that_never_brakes_is_said_so() -> None:
     one = seen(made(6))
     assert driven_only([one])
@@ -117,6 +118,7 @@ def test_a_machine_that_hardly_moves_is_refused() -> None:
         traced(stands.with_signals(y=stands["y"] + noise))
 
 
+@pytest.mark.slow
 def test_a_stick_limit_far_above_friction_is_searched_from_what_the_body_bore(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -60,6 +60,7 @@ def test_every_parameter_has_its_unit() -> None:
     assert found().compensator.value.friction.F_sn == -20.0
 
 
+@pytest.mark.slow
 def test_numbers_without_a_unit_are_coefficients_and_results_only() -> None:
     document = json.loads(dumps(design_document(found())))
     free = {"R", "S", "T", "W", "A", "B", "C", "slope"}  # coefficients

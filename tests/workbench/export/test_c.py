@@ -98,6 +98,7 @@ def test_a_compensator_of_the_excess_alone_is_the_same_program(tmp_path: Path) -
     assert not np.array_equal(simulated(one, whole, FEWER)[0].u, run.u)
 
 
+@pytest.mark.slow
 def test_a_limited_command_reaches_its_limit() -> None:
     one = case("limited")
     run, _ = simulated(one, exported(one.design, "rst", compensated=True), 20_000)
@@ -139,6 +140,7 @@ def test_it_needs_no_header_and_allocates_nothing(tmp_path: Path) -> None:
         assert "alloc" not in text.replace("Nothing is allocated", "")
 
 
+@pytest.mark.slow
 def test_c_plus_plus_takes_the_header(tmp_path: Path) -> None:
     if shutil.which("g++") is None:
         pytest.skip("no g++ on PATH")

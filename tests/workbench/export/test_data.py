@@ -81,6 +81,7 @@ def test_the_program_runs_from_the_file_alone(name: str) -> None:
         assert values[found["output"]["name"]] == wanted
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compensated", [True, False])
 @pytest.mark.parametrize("name", ["limited", "emps"])
 def test_matlab_reads_the_law_and_the_test(name: str, compensated: bool) -> None:

@@ -64,6 +64,7 @@ def test_it_gives_the_simulations_commands(
     assert np.array_equal(found["v"][1::part][:N], run.velocity)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("compiled", ["limited"], indirect=True)
 def test_it_refuses_a_foreign_description(compiled: Path) -> None:
     description = compiled / "modelDescription.xml"

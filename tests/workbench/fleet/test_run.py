@@ -70,6 +70,7 @@ def verdicts(folder: Path) -> dict[str, str]:
     return {name.partition("/")[0]: verdict for name, verdict in found.items()}
 
 
+@pytest.mark.slow
 def test_a_worker_has_one_core(cluster: Cluster) -> None:
     futures = cluster.client.map(core_of, range(8), pure=False)
     found = {pid: cores for pid, cores in cluster.client.gather(futures)}

@@ -69,6 +69,7 @@ def test_the_plant_and_the_loop_in_python_control() -> None:
     assert model.to_control(period=0.02).dt == pytest.approx(0.02)
 
 
+@pytest.mark.slow
 def test_the_posterior_in_arviz_has_a_chain_for_each_ensemble() -> None:
     found = result(walk()).to_arviz()
     names = identified().fit.free

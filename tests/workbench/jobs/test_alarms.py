@@ -99,6 +99,7 @@ def test_alarms_are_sent_once_although_the_server_stumbles(
     assert len(set(listener.keys)) == 2
 
 
+@pytest.mark.slow
 def test_a_dead_webhook_is_told_of_and_tried_again(judged: Registry, listener: Listener) -> None:
     told = Told()
     found = send(judged, dead(), report=told)
@@ -145,6 +146,7 @@ def test_a_refused_alarm_waits_longer_each_time_and_is_given_up_after_a_day(
     assert send(fleet, webhook(listener), later=passed) == Delivery()
 
 
+@pytest.mark.slow
 def test_results_from_before_there_was_a_webhook_are_not_given_up(
     fleet: Registry, listener: Listener
 ) -> None:
@@ -178,6 +180,7 @@ def test_a_pass_spends_so_much_time_on_alarms(fleet: Registry, listener: Listene
     assert send(fleet, webhook(listener)) == Delivery(10)
 
 
+@pytest.mark.slow
 def test_an_alarm_on_which_we_fail_does_not_stop_the_others(
     fleet: Registry, listener: Listener, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -214,6 +217,7 @@ ODD = ["Pr\u00fcfstand", 'say "no"; \\', "tab\tand\x7f", "\u65e5\u672c \U0001f52
        "\udcff", "x" * 5000, "%C3%BC", "new\nline", "\ud83d"]  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ODD)
 def test_any_name_goes_through(listener: Listener, name: str) -> None:
     with httpx.Client() as client:
@@ -224,6 +228,7 @@ def test_any_name_goes_through(listener: Listener, name: str) -> None:
     assert listener.keys == [key(alarm(name))]
 
 
+@pytest.mark.slow
 def test_any_machine_goes_from_its_folder_to_the_webhook(
     registry: Registry, listener: Listener, tmp_path: Path
 ) -> None:
@@ -284,6 +289,7 @@ def test_an_address_that_is_none(url: str) -> None:
     assert "geheim" not in str(caught.value)
 
 
+@pytest.mark.slow
 def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Path) -> None:
     listener.by_machine = {"m0": 500}
     outbox, now = Outbox(fleet.database), datetime.now(UTC)
@@ -298,6 +304,7 @@ def test_metrics_count_alarms(fleet: Registry, listener: Listener, tmp_path: Pat
         assert f'servo_workbench_alarms_failed{{machine="{name}"}} {failed}.0' in text
 
 
+@pytest.mark.slow
 def test_metrics_are_what_the_registry_holds(judged: Registry, tmp_path: Path) -> None:
     figures = MachineFigures(judged)
     figures.passed(datetime(2026, 3, 1, tzinfo=UTC), 1)

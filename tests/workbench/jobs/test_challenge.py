@@ -52,6 +52,7 @@ def test_the_model_of_the_machine_as_it_is_wins() -> None:
     assert document["held_out"]["challenger"]["position_rms"] == new.position_rms
 
 
+@pytest.mark.slow
 def test_a_model_that_follows_no_better_is_refused() -> None:
     found = contest(contender(NEW), contender(NEW))
     assert not found.won
@@ -71,6 +72,7 @@ def test_the_margin_counts() -> None:
     assert "99.99 % at least" in found.reason
 
 
+@pytest.mark.slow
 def test_a_design_that_tracks_no_better_is_refused() -> None:
     same = Contender(contender(OLD).model, contender(NEW).design)
     found = contest(same, contender(NEW))

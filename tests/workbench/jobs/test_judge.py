@@ -119,6 +119,7 @@ def test_the_first_model_is_one_that_passes(first: Judgement) -> None:
     assert first.candidate.validation["passed"] is True
 
 
+@pytest.mark.slow
 def test_the_refit_tells_a_changed_machine_from_the_same(
     shop: Path, first: Judgement, tmp_path: Path
 ) -> None:
@@ -134,6 +135,7 @@ def test_the_refit_tells_a_changed_machine_from_the_same(
     assert (moved.before, moved.after) == pytest.approx((12.0, 16.0), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_chart_goes_on_from_log_to_log(shop: Path, first: Judgement, tmp_path: Path) -> None:
     model, rng = model_of(first, tmp_path), np.random.default_rng(1)
     state: Mapping[str, Any] = {}

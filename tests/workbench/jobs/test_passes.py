@@ -68,6 +68,7 @@ def test_each_log_once_a_bad_one_set_aside(run: Run, registry: Registry, root: P
     assert verdicts(run()) == {"5.csv": "none"}
 
 
+@pytest.mark.slow
 def test_logs_of_a_machine_come_in_order_and_evidence_goes_on(
     run: Run, registry: Registry, root: Path
 ) -> None:
@@ -84,6 +85,7 @@ def test_logs_of_a_machine_come_in_order_and_evidence_goes_on(
     ]
 
 
+@pytest.mark.slow
 def test_a_file_still_being_written_is_left(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     logs = machine(root, "a", {"old.csv": "quiet", "new.csv": "quiet 2", "late.csv": "quiet 3"})
@@ -98,6 +100,7 @@ def test_a_file_still_being_written_is_left(run: Run, registry: Registry, root: 
     assert verdicts(run()) == {"new.csv": "none"}
 
 
+@pytest.mark.slow
 def test_a_file_open_for_writing_is_left(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     logs = machine(root, "a", {})
@@ -113,6 +116,7 @@ def test_a_file_open_for_writing_is_left(run: Run, registry: Registry, root: Pat
     assert verdicts(run()) == {"1.csv": "none"}
 
 
+@pytest.mark.slow
 def test_a_file_that_changes_while_it_is_judged_has_no_result(
     run: Run, registry: Registry, root: Path
 ) -> None:
@@ -133,6 +137,7 @@ def test_a_file_that_changes_while_it_is_judged_has_no_result(
     ]
 
 
+@pytest.mark.slow
 def test_a_log_taken_away_waits(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
@@ -160,6 +165,7 @@ def stopping_judge_after(file: str) -> Judge:
     return dying
 
 
+@pytest.mark.slow
 def test_one_machine_that_fails_does_not_stop_others(
     run: Run, registry: Registry, root: Path
 ) -> None:
@@ -183,6 +189,7 @@ def test_one_machine_that_fails_does_not_stop_others(
     assert [o.machine for o in run().outcomes] == ["a", "b"]  # nothing was lost
 
 
+@pytest.mark.slow
 def test_a_fault_of_ours_on_one_machine_does_not_stop_others(
     run: Run, registry: Registry, root: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -210,6 +217,7 @@ def odd(folder: Path) -> Path:
     return Path(os.fsdecode(os.fsencode(folder) + b"/caf\xe9.csv"))
 
 
+@pytest.mark.slow
 def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a", "z")
     logs = machine(root, "a", {"1.csv": "quiet", "2.csv": "quiet 2"})
@@ -227,6 +235,7 @@ def test_names_that_are_not_utf8_stop_nothing(run: Run, registry: Registry, root
     assert run().outcomes == ()
 
 
+@pytest.mark.slow
 def test_a_marker_tells_that_a_writer_has_finished(
     run: Run, registry: Registry, root: Path
 ) -> None:
@@ -240,6 +249,7 @@ def test_a_marker_tells_that_a_writer_has_finished(
     assert verdicts(run(marker=".done")) == {"1.csv": "none"}
 
 
+@pytest.mark.slow
 def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     machine(root, "a", {"log5.csv": "drift 5"})
@@ -271,6 +281,7 @@ def test_the_clock_is_the_databases_where_it_has_one(registry: Registry) -> None
         assert ahead > timedelta(hours=2)
 
 
+@pytest.mark.slow
 def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     raises = {
@@ -295,6 +306,7 @@ def test_what_a_log_raises_is_its_result(run: Run, registry: Registry, root: Pat
     assert told.count("fault_of_ours") == 1
 
 
+@pytest.mark.slow
 def test_a_log_that_ends_its_workers_is_set_aside(run: Run, registry: Registry, root: Path) -> None:
     in_force(registry, "a")
     machine(root, "a", {"1.csv": "quiet", "2.csv": "drift"})
@@ -338,6 +350,7 @@ def test_many_workers_at_once_judge_every_log_once(registry: Registry, root: Pat
     assert [len(registry.versions(name)) for name in names] == [5] * 4
 
 
+@pytest.mark.slow
 def test_a_database_away_in_the_middle(postgres: Server, tmp_path: Path) -> None:
     root = tmp_path / "machines"
     url = postgres.database()

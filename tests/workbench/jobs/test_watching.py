@@ -53,6 +53,7 @@ def watching(
         assert not thread.is_alive()
 
 
+@pytest.mark.slow
 def test_a_pass_at_once_and_with_every_new_log(tmp_path: Path) -> None:
     logs = machine(tmp_path, "a", {})
     passes: list[int] = []
@@ -97,6 +98,7 @@ def test_files_still_being_written_bring_another_pass(tmp_path: Path) -> None:
     assert passes == growing
 
 
+@pytest.mark.slow
 def test_passes_never_overlap(tmp_path: Path) -> None:
     logs = machine(tmp_path, "a", {})
     running, most, count = 0, 0, 0
@@ -118,6 +120,7 @@ def test_passes_never_overlap(tmp_path: Path) -> None:
     assert most == 1
 
 
+@pytest.mark.slow
 def test_what_the_watcher_dies_of_is_told_and_it_goes_on(tmp_path: Path) -> None:
     logs = machine(tmp_path, "a", {})
     passes: list[int] = []
@@ -145,6 +148,7 @@ def write_odd(logs: Path) -> bool:
     return True
 
 
+@pytest.mark.slow
 def test_a_marker_brings_a_pass(tmp_path: Path) -> None:
     logs = machine(tmp_path, "a", {"1.csv": "quiet"})
     passes: list[int] = []

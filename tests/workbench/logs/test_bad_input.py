@@ -184,6 +184,7 @@ def test_directory(tmp_path: Path) -> None:
     assert "is a directory" in refusal(tmp_path / "logs")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted({*WRITERS} - {"a.csv", "a.tdms", "a.ulg"}))
 @pytest.mark.parametrize("share", [0.02, 0.3, 0.5, 0.8, 0.99])
 def test_truncated_files(tmp_path: Path, name: str, share: float) -> None:
@@ -211,6 +212,7 @@ def test_no_bytes_make_a_traceback(tmp_path: Path, content: bytes, name: str) ->
     refusal(tmp_path / name)
 
 
+@pytest.mark.slow
 @settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
 )

@@ -28,6 +28,7 @@ def claimed(bench: Bench, owner: str, seconds: float = 0.0) -> WorkClaim:
     return claim
 
 
+@pytest.mark.slow
 def test_a_task_has_one_worker_until_its_lease_ends(where: str) -> None:
     with Registry(where) as registry:
         bench = bench_of(registry)
@@ -84,6 +85,7 @@ def test_what_is_given_back_waits_and_what_kills_is_given_up(where: str) -> None
             bench.ask("none", "trace", by="anna", now=NOW)
 
 
+@pytest.mark.slow
 def test_many_workers_share_the_tasks(where: str) -> None:
     taken: list[int] = []
     with Registry(where) as registry:

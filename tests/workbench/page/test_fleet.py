@@ -73,6 +73,7 @@ def test_a_state_is_that_of_the_last_log(where: str) -> None:
         assert condition(registry.database, "drifts") == "not_judged"
 
 
+@pytest.mark.slow
 def test_pages_are_filtered_sorted_and_cut(where: str) -> None:
     with Registry(where) as registry:
         for k in range(7):

@@ -99,6 +99,7 @@ def test_a_limiter_forgets() -> None:
     assert not limiter.full("a", 60.5)
 
 
+@pytest.mark.slow
 def test_changes_of_one_token_are_limited(page: Page) -> None:
     changer, why = page.token("anna", "change"), {"reason": "r"}
 
@@ -142,6 +143,7 @@ def test_markup_in_names_and_reasons_stays_text(page: Page) -> None:
     assert part.status_code == 400 and "<" not in part.text
 
 
+@pytest.mark.slow
 def test_hosts_and_sizes(page: Page, tmp_path: Path) -> None:
     assert page.client.get("/", headers={"Host": "evil.example"}).status_code == 421
     assert page.client.get("/", headers={"Host": "127.0.0.1:8000"}).status_code == 200

@@ -41,6 +41,7 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
     assert ScriptDirectory.from_config(config()).get_current_head() == HEAD
 
 
+@pytest.mark.slow
 def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> None:
     log = SeenLog("f" * 64, "a.csv", 1, 1)
     moved = {"name": "F_cp", "before": 10.0, "after": 12.0}
@@ -95,6 +96,7 @@ def test_an_empty_file_is_no_new_registry(tmp_path: Path) -> None:
     assert [one.name for one in tmp_path.iterdir()] == ["r.db"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("change", "said"),
     [
@@ -146,6 +148,7 @@ def test_several_processes_make_it_and_write_it_at_once(where: str) -> None:
     assert state.in_force is not None and state.in_force.number == moved[-1].number
 
 
+@pytest.mark.slow
 def test_a_server_that_is_away_says_so_and_is_used_when_back(postgres: Server) -> None:
     url = postgres.database()
     with Registry(url) as registry:

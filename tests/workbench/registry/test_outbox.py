@@ -46,6 +46,7 @@ def test_an_alarm_is_kept_until_it_is_taken(outbox: Outbox) -> None:
         assert outbox.counts(NOW) == {}
 
 
+@pytest.mark.slow
 def test_what_is_older_is_left_out(registry: Registry, outbox: Outbox) -> None:
     (alarm,) = outbox.due(NOW)
     outbox.fill(["none"], since=NOW + MINUTE, now=NOW)

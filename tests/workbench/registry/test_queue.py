@@ -119,6 +119,7 @@ def test_evidence_of_the_last_log_goes_to_the_next(queue: Queue, registry: Regis
     assert queue.last_evidence(version) == {"n": 1}
 
 
+@pytest.mark.slow
 def test_a_log_reopened_is_judged_once_more(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
     queue.begin(claim, LOG, now=NOW)
@@ -145,6 +146,7 @@ LATE = SeenLog("d" * 64, "run3.csv", 40, 400)
 COPIED = SeenLog("e" * 64, "run4.csv", 40, 900)
 
 
+@pytest.mark.slow
 def test_an_older_log_changes_nothing_in_force(queue: Queue, registry: Registry) -> None:
     claim = claimed(queue)
     queue.announce("m", [NEWER, LATE, COPIED], now=NOW)

@@ -86,6 +86,7 @@ def test_what_is_not_there_is_refused(registry: Registry) -> None:
     assert len(registry.decisions()) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["", "a/b", ".hidden", "two\nlines"])
 def test_a_name_that_no_folder_can_have_is_refused(registry: Registry, name: str) -> None:
     with pytest.raises(BadRegistry, match="can be a folder's"):

@@ -119,6 +119,7 @@ def test_poles_that_miss_the_goals_are_searched(found: Design, too_fast: Design)
     assert after_design(found, MODEL, False, ()) is None
 
 
+@pytest.mark.slow
 def test_a_loop_that_misses_a_limit(model: Model, found: Design) -> None:
     def then(limits: Limits, of: Model = model, plant: Path | None = None) -> Step | None:
         result, _ = validate(of, found, np.random.default_rng(0), limits=limits)

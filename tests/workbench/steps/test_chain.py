@@ -103,6 +103,7 @@ def test_default_designs_of_the_paper_s_plants_pass_in_simulation(name: str) -> 
     assert result.passed, result.figures
 
 
+@pytest.mark.slow
 def test_the_default_design_of_the_emps_axis_passes() -> None:
     model = model_of(EMPS, k_a=35.15)
     found = designed(model)
@@ -125,6 +126,7 @@ def test_a_design_comes_back_from_its_file(tmp_path: Path) -> None:
         read_design(path)
 
 
+@pytest.mark.slow
 def test_asked_poles_and_period_are_taken() -> None:
     model = model_of(TABLES["paper_table2"], ACTUATOR)
     found = designed(model, Asked((12.0, 0.9)), period=0.02)
@@ -192,6 +194,7 @@ def test_another_plant_can_fail_what_the_model_passes() -> None:
     assert document["figures"]["rst"]["plant"]["passed"] is False
 
 
+@pytest.mark.slow
 def test_limits_are_taken() -> None:
     model = model_of(TABLES["paper_table1"], ACTUATOR)
     found = designed(model)
@@ -222,6 +225,7 @@ def test_a_prediction_follows_a_log_it_has_not_seen() -> None:
     assert card.recipe is not None
 
 
+@pytest.mark.slow
 def test_a_prediction_by_force_drifts_less_in_windows() -> None:
     log = identified().sources[0].log
     model = identified().model
@@ -319,6 +323,7 @@ def test_a_loop_that_runs_away_is_no_log() -> None:
         record("wild", replace(recipe, loop=wild))
 
 
+@pytest.mark.slow
 def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -> None:
     model = replace(model_of(EMPS), rig=Rig("force"))
     found = designed(model)
@@ -333,6 +338,7 @@ def test_a_volt_limit_does_not_bound_the_force_of_a_machine_without_actuator() -
     assert np.max(np.abs(run_loop(motor, found, found.rst, r, rng()).u)) <= 1e-3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["standstill", "tracking", "modulus", "delay", "overshoot", "force"]
 )

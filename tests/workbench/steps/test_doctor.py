@@ -68,6 +68,7 @@ def test_what_it_tells_is_what_a_fit_tells(motor: tuple[Card, Table]) -> None:
     assert found.verdict == "ready"
 
 
+@pytest.mark.slow
 def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> None:
     card, table = motor
     up = table["u"] > 0
@@ -80,6 +81,7 @@ def test_one_way_alone_tells_nothing_of_the_other(motor: tuple[Card, Table]) -> 
     assert any("motion that way" in one for one in found.add)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("kind", "signal"),
     [("spike", "y"), ("jump", "y"), ("missing", "F"), ("saturated", "u"), ("saturated", "F")],

@@ -117,6 +117,7 @@ def test_the_model_file_carries_its_own_logs_and_older_ones_keep_their_key(tmp_p
     assert model_key(read_model(path)) == hashlib.sha256(dumps(document).encode()).hexdigest()
 
 
+@pytest.mark.slow
 def test_drift_is_status_1_and_names_the_parameter(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

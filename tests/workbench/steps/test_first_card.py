@@ -211,6 +211,7 @@ def test_answers_change_column_unit_and_rig(logs: dict[str, Table], tmp_path: Pa
     assert next(x.value for x in given_one.rig if x.key == "force_per_command") == 35.2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "answer"),
     [("y", "-"), ("y", "nowhere"), ("y", "bar"), ("t", "1 mm"), ("u", "a furlong")],

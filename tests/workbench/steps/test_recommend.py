@@ -59,6 +59,7 @@ def plain() -> LoopFigures:
     return replace(recommend.compared(model, found)["rst"], limit_cycle=None, missed=())
 
 
+@pytest.mark.slow
 def test_the_better_loop_is_taken_and_said_with_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     one = plain()
     better = replace(

@@ -72,6 +72,7 @@ def promised(model: Model, share: float) -> Model:
     return replace(model, identifiability=(replace(own, within=within),))
 
 
+@pytest.mark.slow
 def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
     model = both_ways[1].model
     assert broken_promises(model) == ()

@@ -98,6 +98,7 @@ def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
     assert found.plant.friction.array == pytest.approx(NINE.array, rel=0.06)
 
 
+@pytest.mark.slow
 def test_a_search_close_by_keeps_what_is_right() -> None:
     one = seen(made(2))
     found = nudged_search(

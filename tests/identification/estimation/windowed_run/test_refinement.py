@@ -53,6 +53,7 @@ def test_a_rough_refinement_ends_where_it_cannot_follow(monkeypatch: pytest.Monk
     assert len(steps) - count < count and min(steps[count:]) > max(steps[:count])
 
 
+@pytest.mark.slow
 def test_effects_are_refined_with_the_nine() -> None:
     effects = {"spring": {"k": 60.0}}
     one = seen(made(3, effects))

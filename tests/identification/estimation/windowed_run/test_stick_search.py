@@ -30,6 +30,7 @@ def test_stops_are_found_from_anywhere(effects: dict[str, dict[str, float]] | No
     assert refit(wrong, [one], "command", prior={}, effort="near").misfit > COMPLETE
 
 
+@pytest.mark.slow
 def test_only_what_shows_in_stops_is_changed() -> None:
     one, true = seen(made(4)), plant()
     found = stick_search(true, [one], "command", np.random.default_rng(0))

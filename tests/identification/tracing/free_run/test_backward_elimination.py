@@ -51,6 +51,7 @@ def found() -> tuple[Setting, Choice]:
     return setting, choose(start, first, library, rng, lambda _stage, _share: None)
 
 
+@pytest.mark.slow
 def test_a_choice_goes_on_from_its_first_effect(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     more = setting.start, setting.first, setting.library
@@ -252,6 +253,7 @@ def test_what_stops_lack_is_searched_in_the_run_where_sliding_is_explained(
     assert known(replace(setting, plain=replace(setting.plain, misfit=4.0)))
 
 
+@pytest.mark.slow
 def test_what_was_doubted_is_not_tried_again(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     stribeck = next(one for one in choice.tried if one.effect.key == "stribeck")

@@ -121,6 +121,7 @@ def test_a_late_command_of_a_motor_is_named() -> None:
     assert found.effects[0].params["tau"].value == pytest.approx(0.006, rel=0.02)
 
 
+@pytest.mark.slow
 def test_a_complete_run_of_a_motor_has_nothing_missing() -> None:
     found = trace([made(8)], [made(9)], MOTOR, built_in(), np.random.default_rng(0))
     assert found.verdict == "none" and not found.effects and not found.unknown.depends_on

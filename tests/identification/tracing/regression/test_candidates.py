@@ -64,6 +64,7 @@ def test_what_a_sensor_adds_is_refined_though_a_recipe_may_leave_it_out() -> Non
     assert found.values["b"] == pytest.approx(9.0, rel=0.15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("tau", [0.02, 0.12])
 def test_a_lag_is_fitted_with_the_friction_that_lags(tau: float) -> None:
     found = best("frictional_lag", {"frictional_lag": {"tau": tau}})

@@ -66,6 +66,7 @@ def test_a_bristle_that_explains_rest_gives_way() -> None:
     assert candidate is not None and gives_way(candidate, first)
 
 
+@pytest.mark.slow
 def test_logs_left_out_say_nothing_against_an_effect_of_another_equation() -> None:
     effects = {"leakage": {"leak": 1.5}}
     logs = [motion_log(pneumatic(seed, effects), held=False, by_command=True) for seed in (21, 22)]
