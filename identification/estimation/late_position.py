@@ -3,7 +3,7 @@
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
 command acts as late as it does, and nowhere else. So a lag of a motor in a loop is believed where a
-run follows with it, and looked for there where the log is slow.
+run follows with it, and looked for there where the log is slow; so is that of a measured force.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,18 +29,19 @@ SEED = 0  # the lags are compared on the same draws
 
 
 def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) -> Surroundings:
-    """What acts beside the applied force, as `surroundings` has it; of a motor's logs with the lag
-    that lets a run follow them."""
-    found = surroundings(logs, rig)
-    if rig.kind != "motor" or not rig.force_per_command:
+    """What acts beside the applied force, as `surroundings` has it, with a lag that lets a run
+    follow the logs."""
+    found, motor = surroundings(logs, rig), rig.kind == "motor"
+    if motor and not rig.force_per_command:
         return found
     h, halt = logs[0].h, halt or Halt()
+    found = replace(found, gives=rig.force_per_command if motor else None)
     tried: dict[float, float] = {}
 
     def left(samples: float) -> float:
         """Misfit of the plain plant on the logs with that lag taken out."""
         if samples not in tried:
-            late = replace(found, lag=Size(samples * h), gives=rig.force_per_command)
+            late = replace(found, lag=Size(samples * h))
             tried[samples] = _misfit([late.taken_out(log) for log in logs], rig, halt)
         return tried[samples]
 
@@ -51,10 +52,10 @@ def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) ->
             return False
         return explains(without - 1.0, with_it - 1.0)
 
-    in_loop = any("r" in log for log in logs)
+    in_loop = not motor or any("r" in log for log in logs)
     if found.lag.value and in_loop and not follows(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
-    if found.lag.value or h < SLOW_LOG:
+    if found.lag.value or not motor or h < SLOW_LOG:
         return found
     best = _best_lag(left, halt)
     if best == 0.0 or not follows(best):
