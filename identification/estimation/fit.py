@@ -51,6 +51,7 @@ from identification.thresholds import (
     MOST_UNEXPLAINED,
     NO_RUN,
     PLACES_SET_ASIDE,
+    RUN_ASTRAY,
     SHARE_SET_ASIDE,
     WORSE_THAN_EQUATION,
 )
@@ -247,7 +248,9 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
     left = left_by(fit, recorded)
     if left is None:
         return fit
-    if bends_the_equation(left[0], left[1]):
+    travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
+    off = max(one.position_rms for one in fit.logs)
+    if goes_astray(off, travel) and bends_the_equation(left[0], left[1]):
         try:
             fit = fit_imposed(recorded, rng, FLOOR_WHY, by_rig=False)
         except NotIdentifiable:
@@ -259,6 +262,11 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
 def bends_the_equation(left: float, by_equation: float) -> bool:
     """Whether a fit leaves clearly more force than the equation of motion does by itself."""
     return left > WORSE_THAN_EQUATION * by_equation
+
+
+def goes_astray(off: float, travel: float) -> bool:
+    """Whether a run that is off by so much (rms) follows a motion over that travel no more."""
+    return not off <= RUN_ASTRAY * travel
 
 
 def is_unexplained(share: float) -> bool:

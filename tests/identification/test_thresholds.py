@@ -28,6 +28,7 @@ from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import (
     are_few,
     bends_the_equation,
+    goes_astray,
     is_no_run,
     is_unexplained,
     leaves_much,
@@ -784,6 +785,13 @@ def test_worse_than_equation() -> None:
     """So many times what the equation's own least squares leave, a fit may leave of it."""
     assert not bends_the_equation(1.04, 1.0) and not bends_the_equation(0.6, 1.0)
     assert bends_the_equation(1.06, 1.0)
+
+
+def test_run_astray() -> None:
+    """A run that is off by more than this part of the travel leaves the word to the equation."""
+    assert not goes_astray(0.016, 1.0)
+    assert goes_astray(0.025, 1.0)
+    assert goes_astray(float("nan"), 1.0)
 
 
 def test_most_unexplained() -> None:
