@@ -156,12 +156,12 @@ def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[f
 
 def _has_gravity(found: _Squares) -> bool:
     """Whether the force goes by the sine of the angle, surely, for much of what is left without,
-    and no worse than by the angle itself, as a spring's would."""
+    and a spring's, by the angle itself, would not leave clearly less: in a narrow swing both do."""
     plain, spring, weight = (found.least(used) for used in (PLAIN, SPRING, GRAVITY))
-    if not explains(plain, weight) or weight > spring:
+    if not explains(plain, weight) or explains(weight, spring):
         return False
     theta, sd = _with_spread(found, GRAVITY, 0.0)
-    return stands_out(*(float(np.hypot(x[-2], x[-1])) for x in (theta, sd)))
+    return any(stands_out(float(theta[i]), float(sd[i])) for i in (-2, -1))
 
 
 def explains(without: float, left: float) -> bool:

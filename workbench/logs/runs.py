@@ -72,8 +72,7 @@ def read_runs(path: Path, card: Card) -> Prepared:
 def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     """As `read_runs`, of a table; path: what the run and the messages are called by."""
     raw = _signals_of(table, path, card)
-    period = raw.log.h
-    fresh = renewed(raw.log)
+    written, fresh = raw.log, renewed(raw.log)
     raw = replace(raw, log=fresh.log, remarks=(*raw.remarks, *fresh.remarks))
     first_row, read = raw.first_row, raw.remarks
     repaired = _repaired(raw, path, card)
@@ -86,7 +85,8 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
     remarks = (*read, *repaired.remarks, *thin.remarks, *prepared.remarks)
     bad = (*repaired.bad, *prepared.bad)  # a command's limits are seen twice
     remarks, bad = tuple(dict.fromkeys(remarks)), tuple(dict.fromkeys(bad))
-    return Prepared(prepared.runs, remarks, bad, period if fresh.remarks else repaired.log.h)
+    period = written.h if fresh.remarks else repaired.log.h
+    return Prepared(prepared.runs, remarks, bad, period)
 
 
 def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:
