@@ -118,7 +118,10 @@ def test_a_late_command_of_a_motor_is_named() -> None:
     )
     assert found.verdict == "effect"
     assert [e.effect.key for e in found.effects] == ["input_delay"]
-    assert found.effects[0].params["tau"].value == pytest.approx(0.006, rel=0.02)
+    delay = found.effects[0].params["tau"]  # of the columns, by the equation of motion
+    assert delay.low is not None and delay.high is not None
+    assert delay.low < 0.006 < delay.high
+    assert delay.value == pytest.approx(0.006, rel=0.15)
 
 
 @pytest.mark.slow
