@@ -14,7 +14,7 @@ BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 UV := $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt
 install = $(UV) $(1) 2>/dev/null || $(PIP) install --constraint constraints.txt $(1)
 
-.PHONY: demo test test-all environment lint types floors kernels tests wheel docs slow verdicts \
+.PHONY: demo test test-all test-method environment lint types floors kernels tests wheel docs slow verdicts \
 	bench format clean
 
 demo: $(VENV)/.installed
@@ -60,7 +60,7 @@ kernels: environment
 	$(BIN)/python tools/compile_kernels.py
 
 tests: environment
-	$(PYTEST) --dist loadfile -m "not slow and not verdicts"
+	$(PYTEST) --dist loadfile -m "not slow and not verdicts and not method"
 
 wheel: environment
 	$(BIN)/python tools/check_wheel.py
@@ -71,7 +71,11 @@ docs: environment
 	@echo "the site: build/site/index.html"
 
 slow: environment
-	$(PYTEST) --dist loadfile -m slow
+	$(PYTEST) --dist loadfile -m "slow and not method"
+
+# Traces and fits of many seconds each, for who changes a method; `verdicts` guards every day.
+test-method: environment kernels
+	$(PYTEST) --dist worksteal -m method
 
 verdicts: environment
 	$(PYTEST) --dist worksteal -m verdicts

@@ -73,6 +73,7 @@ VANISHED = 0.99  # of its value, that a mass or friction parameter loses where i
 
 # What the equation of motion's own least squares are to a fit (real.py).
 WORSE_THAN_EQUATION = 1.05  # times what they leave of the force unseen, that a fit may leave
+CONTRADICTS_EQUATION = 2.0  # the same, from which a run's nearness to the log does not matter
 RUN_ASTRAY = 0.02  # of the travel, that a run is off by (rms), from which the equation decides
 MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of its numbers holds
 
@@ -80,6 +81,8 @@ MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of
 LAG_FROM = 0.4  # samples, from which motion and force are not of one instant
 SURROUNDINGS_LEAVE = 0.8  # of the equation's square, left at most by a lag, or by gravity
 SURE_OF_SURROUNDINGS = 4.0  # deviations from 0, of either
+ORDERS_LEAVE = 0.5  # of the same, left at most by all orders of a turn that repeat with it
+SURE_OF_ORDER = 5.0  # deviations from 0, of each: a hundred are tried
 BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).

@@ -9,6 +9,7 @@ from nbclient import NotebookClient
 ROOT = Path(__file__).resolve().parent.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 SECONDS_A_CELL = 300
+LONG = ("06_next_run",)  # a posterior and two robust designs
 
 each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
@@ -27,7 +28,13 @@ def test_outputs_are_stripped(path: Path) -> None:
 
 
 @pytest.mark.slow
-@each_notebook
+@pytest.mark.parametrize(
+    "path",
+    [
+        pytest.param(path, id=path.stem, marks=[pytest.mark.method] * (path.stem in LONG))
+        for path in NOTEBOOKS
+    ],
+)
 def test_runs(path: Path, tmp_path: Path) -> None:
     place = {"metadata": {"path": str(tmp_path)}}
     NotebookClient(read(path), timeout=SECONDS_A_CELL, resources=place).execute()

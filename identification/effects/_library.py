@@ -3,6 +3,7 @@
 import importlib
 import pkgutil
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
 from types import MappingProxyType, ModuleType
 
@@ -31,6 +32,19 @@ def declared(module: ModuleType) -> Effect:
             " declare one, or begin the file's name with '_'"
         )
     return effect
+
+
+def numbered(effect: Effect, number: int) -> Effect:
+    """The effect once more in the same machine, as KEY_2, KEY_3; the first by its own key."""
+    return effect if number == 1 else replace(effect, key=f"{effect.key}_{number}")
+
+
+def of_key(key: str, library: Library) -> Effect | None:
+    """The effect of that key, numbered ones too; None where there is none."""
+    name, _, number = key.rpartition("_")
+    if key in library or name not in library or not (number.isdigit() and int(number) > 1):
+        return library.get(key)
+    return numbered(library[name], int(number))
 
 
 def joined_library(found: Iterable[Effect], to: Library | None = None) -> Library:

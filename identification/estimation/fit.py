@@ -11,13 +11,20 @@ force, or along a motion that a rig imposes; from nothing, or from the model tha
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.errors import NotIdentifiable
+from identification.errors import NotIdentifiable, UserError
 from identification.estimation.contradicted import Corrected, corrected, told_of
-from identification.estimation.imposed_motion import fit_imposed, left_by
+from identification.estimation.imposed_motion import (
+    fit_imposed,
+    fit_one_way,
+    left_by,
+    of_one_way,
+    way_of,
+)
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
@@ -48,6 +55,7 @@ from identification.thresholds import (
     ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
     COMPLETE,
+    CONTRADICTS_EQUATION,
     MOST_UNEXPLAINED,
     NO_RUN,
     PLACES_SET_ASIDE,
@@ -59,6 +67,7 @@ from identification.thresholds import (
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
+ONE_WAY_WHY = "motion one way, in which no free run tells friction from a constant force"
 FLOOR_WHY = (
     "the free run is not followed, and bends mass and friction; stick limits and band are not told"
 )
@@ -91,7 +100,16 @@ def fit_plant(
     for log in logs:
         check_driven(log)
     beside = what_acts_beside(logs, rig, halt)
-    fit = _fit([beside.taken_out(log) for log in logs], rng, rig, drive, None, on_progress, halt)
+    alone = [beside.taken_out(log) for log in logs]
+    try:
+        fit = _fit(alone, rng, rig, drive, None, on_progress, halt)
+    except NotIdentifiable as refused:
+        fit = _one_way(alone, rng, rig, refused)
+    if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
+        with suppress(NotIdentifiable):
+            fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
+    up = way_of(alone, held=rig.kind == "motor")
+    fit = fit if up is None else of_one_way(fit, up, rig)
     if halt.reached():
         fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
     if beside.none:
@@ -100,6 +118,16 @@ def fit_plant(
         fit, surroundings=beside, effects=beside.effects,
         estimates={**fit.estimates, **surrounding_estimates(beside)},
     )  # fmt: skip
+
+
+def _one_way(
+    logs: Sequence[Log], rng: np.random.Generator, rig: Rig, refused: NotIdentifiable
+) -> KarnoppFit:
+    """The fit of logs that move one way alone; raises `refused` where they do not."""
+    try:
+        return fit_one_way(recorded_logs(logs, rig, None), rng, ONE_WAY_WHY)
+    except UserError:
+        raise refused from None
 
 
 def _fit(
@@ -250,7 +278,8 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
         return fit
     travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
     off = max(one.position_rms for one in fit.logs)
-    if goes_astray(off, travel) and bends_the_equation(left[0], left[1]):
+    astray = goes_astray(off, travel) and bends_the_equation(left[0], left[1])
+    if astray or contradicts_the_equation(left[0], left[1]):
         try:
             fit = fit_imposed(recorded, rng, FLOOR_WHY, by_rig=False)
         except NotIdentifiable:
@@ -262,6 +291,11 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
 def bends_the_equation(left: float, by_equation: float) -> bool:
     """Whether a fit leaves clearly more force than the equation of motion does by itself."""
     return left > WORSE_THAN_EQUATION * by_equation
+
+
+def contradicts_the_equation(left: float, by_equation: float) -> bool:
+    """Whether a fit leaves so much more force that its run follows something else, however near."""
+    return left > CONTRADICTS_EQUATION * by_equation
 
 
 def goes_astray(off: float, travel: float) -> bool:

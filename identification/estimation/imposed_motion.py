@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.arrays import Array
+from identification.arrays import Array, BoolArray
 from identification.arx.residual_tests import effective_samples
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import NORMAL_SETS, Events, estimates, normal_samples
@@ -25,17 +25,20 @@ from identification.estimation.regression.equation_rows import (
 from identification.estimation.regression.inertia import speed_ratios
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
+from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
-from identification.model.plant import Motor, Plant
+from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.thresholds import SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
+OTHER_WAY = 0.02  # of the windows of sliding; fewer of a direction are noise
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
+ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
 WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
@@ -48,7 +51,8 @@ WHY_NOT = {
 
 @dataclass(frozen=True)
 class ForceFit:
-    """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia."""
+    """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia in the
+    force, condition of the scaled columns."""
 
     used: tuple[int, ...]
     theta: Array
@@ -57,6 +61,7 @@ class ForceFit:
     rms: float
     relative: float
     share: float
+    condition: float
 
 
 def fit_imposed(
@@ -73,12 +78,20 @@ def fit_imposed(
     a rig leads the body, so that its motion may be smoothed until its direction is sure.
     Raises NotIdentifiable where no log slides enough in both directions.
     """
+    fit, rows = force_fit(recorded, by_rig=by_rig)
+    return _made(fit, rows, recorded, rng, why, remarks)
+
+
+def _made(
+    fit: ForceFit, rows: Sequence[Rows], recorded: RecordedLogs, rng: np.random.Generator,
+    why: str, remarks: Sequence[str],
+) -> KarnoppFit:  # fmt: skip
+    """A fit of the force equation as one of the machine."""
     logs = recorded.plain
     firsts = [first_estimate(log, held=recorded.held) for log in logs]
     noise_F = float(np.median([one.noise_F for one in recorded.logs]))
     # A motor's force is as exact as its command: what is left is then no noise, but no number too.
     noise_F = max(noise_F, OF_FORCE * max(float(np.std(log["F"])) for log in logs))
-    fit, rows = force_fit(recorded, by_rig=by_rig)
     center = np.zeros(5)
     center[list(fit.used)] = fit.theta
     samples = np.tile(center, (NORMAL_SETS, 1))
@@ -138,6 +151,56 @@ def force_fit(recorded: RecordedLogs, *, by_rig: bool = True) -> tuple[ForceFit,
     return _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART), rows
 
 
+def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
+    """The equation of motion of logs that move one way: mass, viscous and Coulomb friction.
+
+    Raises NotIdentifiable where they go both ways, or hardly slide.
+    """
+    moved = _moved(recorded.plain, recorded.held)
+    way = way_of(recorded.plain, held=recorded.held)
+    if way is None:
+        raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
+    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    data = [_kept(mechanical(one, theta), one.up == way) for one in moved]
+    return _made(_solved(data, ONE_WAY[way]), data, recorded, rng, why, ())
+
+
+def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
+    """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
+    up = np.concatenate([one.up for one in _moved(logs, held)])
+    if len(up) < FEWEST_JUDGED or OTHER_WAY < np.mean(up) < 1.0 - OTHER_WAY:
+        return None
+    return bool(np.mean(up) > 0.5)
+
+
+def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
+    """The fit of logs that move one way, with Coulomb friction as no such log tells it: together
+    with whatever constant force there is."""
+    name = "F_cp" if up else "F_cn"
+    both = fit.estimates[name]
+    if both.value is None:
+        return fit
+    between = "" if both.low is None else f" ({both.low:.3g} to {both.high:.3g})"
+    reason = (
+        f"motion one way alone: {both.value:.3g} {units_of(rig.motion)[name]}{between} is friction"
+        " and any constant force together; log motion both ways"
+    )
+    both = replace(both, value=None, sd=None, low=None, high=None, assumed=both.value,
+                   reason=reason)  # fmt: skip
+    return replace(fit, estimates={**fit.estimates, name: both})
+
+
+def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
+    return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
+
+
+def _kept(rows: Rows, kept: BoolArray) -> Rows:
+    return replace(
+        rows, b=rows.b[kept], X=rows.X[kept], sd=rows.sd[kept], block=rows.block[kept],
+        speed=rows.speed[kept],
+    )  # fmt: skip
+
+
 def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:
     """The equation of motion in weak form, in windows of sliding, of each log.
 
@@ -158,32 +221,36 @@ def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:
 
 def _best(data: Sequence[Rows], alike: bool) -> ForceFit:
     """The largest set of columns that the motion tells apart; alike: whether its speeds are."""
-    noise = np.concatenate([part.sd for part in data])
-    columns = np.concatenate([part.X for part in data])
-    force = np.concatenate([part.b for part in data])
-    weight = np.median(noise) / noise
-    inertia = 0.0
+    made = _solved(data, COLUMN_SETS["all"])
+    inertia = made.share
     for name in ("all", "no mass", "constant"):
-        used = COLUMN_SETS[name]
-        chosen = columns[:, used] * weight[:, np.newaxis]
-        size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
-        theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
-        residual = force - columns[:, used] @ theta
-        if name == "all":
-            size_of_force = max(float(np.std(force)), 1e-300)
-            inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / size_of_force
-            if theta[0] <= 0 or inertia < INERTIA_SHARE:
-                continue
+        if name != "all":
+            made = _solved(data, COLUMN_SETS[name])
+        if name == "all" and (made.theta[0] <= 0 or inertia < INERTIA_SHARE):
+            continue
         if alike and name == "no mass":
             continue
-        if float(np.linalg.cond(chosen / size)) < CONDITION:
+        if made.condition < CONDITION:
             break
-    lengths = np.cumsum([len(part.b) for part in data])[:-1]
-    parts = tuple(np.split(residual, lengths))
+    return replace(made, share=inertia)
+
+
+def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
+    """Weighted least squares of these columns."""
+    noise = np.concatenate([part.sd for part in data])
+    columns = np.concatenate([part.X for part in data])[:, used]
+    force = np.concatenate([part.b for part in data])
+    weight = np.median(noise) / noise
+    chosen = columns * weight[:, np.newaxis]
+    size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
+    theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
+    residual = force - columns @ theta
+    parts = tuple(np.split(residual, np.cumsum([len(part.b) for part in data])[:-1]))
     independent = effective_samples([part for part in parts if len(part) > 8])
     inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
     square = float(np.mean((weight * residual) ** 2))
     variance = square * len(residual) / max(independent - len(used), 1.0)
+    inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / max(np.std(force), 1e-300)
     return ForceFit(
         used=used,
         theta=theta,
@@ -191,7 +258,8 @@ def _best(data: Sequence[Rows], alike: bool) -> ForceFit:
         residuals=parts,
         rms=float(np.sqrt(np.mean(residual**2))),
         relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),
-        share=inertia,
+        share=float(inertia),
+        condition=float(np.linalg.cond(chosen / size)),
     )
 
 

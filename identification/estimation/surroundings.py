@@ -11,7 +11,7 @@ dynamic model, Gautier, Khalil, CDC 1988.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -25,9 +25,16 @@ from identification.estimation.regression.equation_rows import (
     motion_log,
 )
 from identification.estimation.regression.weighted_rows import BLOCKS, OVERLAP
+from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
-from identification.model.surroundings import NO_SURROUNDINGS, NOT_SHOWN, Size, Surroundings
+from identification.model.surroundings import (
+    NO_SURROUNDINGS,
+    NOT_SHOWN,
+    Order,
+    Size,
+    Surroundings,
+)
 from identification.thresholds import (
     BEYOND_FRICTION,
     LAG_FROM,
@@ -43,6 +50,7 @@ TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
+WHOLE = "exact: a whole number of times in a turn"
 NO_FIRST = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is known
 
 
@@ -77,8 +85,19 @@ class _Squares:
 def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
     """What acts beside the applied force in logs of one machine, with y [m] and F [N].
 
-    Nothing where too little of their motion slides to tell.
+    Nothing where too little of their motion slides to tell. Orders of a turn hide all the rest,
+    which is looked for without them.
     """
+    orders: tuple[Order, ...] = ()
+    if rig.kind == "motor" or chosen_drive(logs, rig, None) == "force":
+        orders = turn_orders(logs, rig)
+    gives = rig.force_per_command if rig.kind == "motor" else None
+    known = Surroundings(orders=orders, gives=gives)
+    return replace(_beside([known.taken_out(log) for log in logs], rig), orders=orders)
+
+
+def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
+    """The same but for orders of a turn."""
     held = rig.kind == "motor"
     try:
         moved = [motion_log(log, held=held, by_command=False) for log in logs]
@@ -112,7 +131,7 @@ def surroundings(logs: Sequence[Log], rig: Rig) -> Surroundings:
         force = always if stands_out(always.value, always.sd) else NOT_SHOWN
     h = logs[0].h
     gives = rig.force_per_command if held else None
-    return Surroundings(Size(lag.value * h, lag.sd * h), force, sine, cosine, gives, sampled)
+    return Surroundings(Size(lag.value * h, lag.sd * h), force, sine, cosine, (), gives, sampled)
 
 
 def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
@@ -121,13 +140,22 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
         "gravity.a": around.sine.sd, "gravity.b": around.cosine.sd,
         "constant_force.F_0": around.force.sd, "input_delay.tau": around.lag.sd,
     }  # fmt: skip
-    return {
+    for acting, one in zip(around.cogging, around.orders, strict=True):
+        deviations |= {f"{acting.key}.a": one.sine.sd, f"{acting.key}.b": one.cosine.sd}
+    known = {
         f"{acting.key}.{p.name}": of_effect(
             p, acting.values[p.name], deviations.get(f"{acting.key}.{p.name}")
         )
         for acting in around.effects
         for p in acting.effect.params
     }
+    for acting in around.cogging:
+        known |= {
+            f"{acting.key}.{p.name}": Estimate(acting.values[p.name], p.unit, reason=WHOLE)
+            for p in acting.effect.params
+            if p.name not in ("a", "b")
+        }
+    return known
 
 
 def lag_estimate(around: Surroundings) -> Estimate | None:

@@ -40,6 +40,13 @@ class WeakWindows:
         """Sample in the middle of each window."""
         return self.start + self.length // 2
 
+    def every(self, k: int) -> "WeakWindows":
+        """Each k-th window."""
+        return WeakWindows(
+            self.mean[::k], self.first[::k], self.second[::k], self.held[::k], self.kinked[::k],
+            self.start[::k], self.length,
+        )  # fmt: skip
+
 
 @lru_cache
 def weights(length: int, h: float) -> tuple[Array, Array, Array, Array, Array]:

@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.effects._library import Library
+from identification.errors import NotIdentifiable
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
@@ -45,7 +46,7 @@ from identification.tracing.structure_search import (
     share_beside,
     without_effects,
 )
-from identification.tracing.surroundings_told import with_surroundings
+from identification.tracing.surroundings_told import orders_alone, with_surroundings
 from identification.tracing.verdict import (
     found_effect,
     next_experiment,
@@ -85,6 +86,22 @@ def trace(
     still = bool(test) and not any(_slides(log, rig) for log in test)
     if still:  # nothing could be proved of an effect
         library = {}
+    try:
+        told = _traced(train, test, rig, library, rng, report, halt)
+    except NotIdentifiable as refused:
+        if not beside.orders:
+            raise
+        return orders_alone(refused, beside, *recorded_as, rig, rng)
+    if still:
+        told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
+    return told if beside.none else with_surroundings(told, beside, *recorded_as, rig)
+
+
+def _traced(
+    train: Sequence[Log], test: Sequence[Log], rig: Rig, library: Library,
+    rng: np.random.Generator, report: Progress, halt: Halt,
+) -> Trace:  # fmt: skip
+    """The trace of logs on which nothing acts but the applied force and what the library has."""
     begin, settle, choose = rng.spawn(3)
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
     report("refitting", 0.0)
@@ -97,11 +114,7 @@ def trace(
         found, doubt = _proved(chosen, found, seen)
         judged = judgement(chosen, found, seen, rig)
         told = _told(chosen, found, judged, seen, halt.not_tried)
-    if doubt:
-        told = replace(told, remarks=(*told.remarks, doubt))
-    if still:
-        told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
-    return told if beside.none else with_surroundings(told, beside, *recorded_as, rig)
+    return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
 
 
 def _slides(log: Log, rig: Rig) -> bool:

@@ -10,8 +10,6 @@ from workbench.cards.card import load_card
 from workbench.cli import main
 from workbench.logs.fetch import card_path
 
-pytestmark = pytest.mark.slow
-
 
 @pytest.fixture
 def data(workbench_data: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -37,6 +35,7 @@ def traced(arguments: list[str], out: Path, capsys: pytest.CaptureFixture[str]) 
     return found
 
 
+@pytest.mark.method
 def test_seals_friction_grows_with_pressure(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -53,6 +52,7 @@ def test_seals_friction_grows_with_pressure(
         assert after <= 0.4 * before
 
 
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("seal", "share", "signal"), [("O-ring", 1.1, "reversal"), ("X-ring257", 0.4, "p_n")]
 )
@@ -79,6 +79,7 @@ def test_what_another_seal_leaves_after_pressure_is_told(
     assert after <= share * before
 
 
+@pytest.mark.method
 def test_emps_held_out_errors_do_not_rise(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -90,6 +91,7 @@ def test_emps_held_out_errors_do_not_rise(
         assert after[error] <= before[error]
 
 
+@pytest.mark.method
 def test_a_seismic_bearing_gives_way_before_it_slides(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -101,6 +103,7 @@ def test_a_seismic_bearing_gives_way_before_it_slides(
         assert after <= 0.85 * before
 
 
+@pytest.mark.method
 def test_a_pendulum_on_a_servo_has_its_gravity(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -114,6 +117,7 @@ def test_a_pendulum_on_a_servo_has_its_gravity(
     assert "spring" not in {one["key"] for one in found["effects"]}
 
 
+@pytest.mark.slow
 def test_a_training_log_is_no_test(
     data: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -406,7 +406,7 @@ def test_demo_runs_the_chain(
     assert names | {"report.html", "design.html", "validation.html"} <= files(tmp_path / "demo")
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_demo_that_fails_says_so_by_its_status(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     traced: list[Traced],

@@ -18,10 +18,15 @@ from workbench.logs.fetch import card_path
 from workbench.logs.sources import read_sources
 from workbench.steps.simulate import record
 
-pytestmark = pytest.mark.slow
-
-RECIPES = ("paper_table1", "paper_table1_rich", "paper_table2", "paper_table3", "demo")
-SETS = ("emps", "friction_backlash", "pneumatic_seals", "xl330_servo")
+LONG = pytest.mark.method
+RECIPES = (
+    "paper_table1", "paper_table3",
+    *(pytest.param(name, marks=LONG) for name in ("paper_table1_rich", "paper_table2", "demo")),
+)  # fmt: skip
+SETS = (
+    "friction_backlash", "pneumatic_seals",
+    *(pytest.param(name, marks=LONG) for name in ("emps", "xl330_servo")),
+)  # fmt: skip
 SEED, SECONDS = 3, 10.0
 MOST_LOGS = 3  # of a set
 

@@ -52,7 +52,7 @@ def test_its_files_serve_validate_and_export(
     assert main(["export", "made/design.json", "--to", "c", "--out", "code"]) == 0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_machines_drift_so_far_widens_the_draws(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -28,6 +28,7 @@ from identification.estimation.estimates import Events, estimates
 from identification.estimation.fit import (
     are_few,
     bends_the_equation,
+    contradicts_the_equation,
     goes_astray,
     is_no_run,
     is_unexplained,
@@ -55,6 +56,7 @@ from identification.estimation.surroundings import (
     larger_than_friction,
     stands_out,
 )
+from identification.estimation.turn_orders import are_most, is_sure
 from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
@@ -829,6 +831,18 @@ def test_share_set_aside() -> None:
     assert len(logs[0].log) == 10_000
     assert are_few(contradicted_at(8), logs)
     assert not are_few(contradicted_at(12), logs)
+
+
+def test_contradicts_equation() -> None:
+    assert contradicts_the_equation(1.9, 0.9) and not contradicts_the_equation(1.7, 0.9)
+
+
+def test_orders_leave() -> None:
+    assert are_most(2.0, 0.9) and not are_most(2.0, 1.1)
+
+
+def test_sure_of_order() -> None:
+    assert is_sure(0.6, 0.1) and not is_sure(0.4, 0.1)
 
 
 def test_every_threshold_has_a_test() -> None:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from identification.effects._base import Acting, Effect
-from identification.effects._library import Library
+from identification.effects._library import Library, of_key
 from identification.errors import BadCard, BadModel
 from identification.model.estimates import Estimate
 from workbench.cards.nearest import nearest
@@ -29,12 +29,13 @@ def effect_units(effect: Effect, motion: Motion, command: str = "V") -> dict[str
 
 def known_effect(key: str, library: Library) -> Effect:
     """The effect of that key; raises BadModel with the nearest one where there is none."""
-    if key not in library:
+    found = of_key(key, library)
+    if found is None:
         raise BadModel(
             f"unknown effect {key!r}{nearest(key, library)}; one of your own needs its folder:"
             " --effects FOLDER"
         )
-    return library[key]
+    return found
 
 
 def written_effect(

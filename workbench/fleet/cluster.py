@@ -92,6 +92,8 @@ def local_cluster(workers: int, attempts: int) -> Iterator[Cluster]:
         # One log a worker at a time: a log that waits is not blamed for the death of a worker.
         "distributed.scheduler.worker-saturation": 1.0,
         "distributed.scheduler.allowed-failures": attempts - 1,
+        # A worker that dies twice within Dask's 15 s would be closed for good while its log runs.
+        "distributed.deploy.lost-worker-timeout": "365 days",
         "distributed.nanny.pre-spawn-environ": {**environment, **ONE_THREAD},
     }
     with dask.config.set(settings):

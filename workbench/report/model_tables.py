@@ -4,7 +4,9 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
+from identification.effects._base import Param
 from identification.model.estimates import Estimate
+from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
 from workbench.documents.model import Model, used
@@ -44,15 +46,20 @@ def parameter_rows(model: Model) -> list[Row]:
         (name, *_cells(value), meaning.get(name, "")) for name, value in found.items()
     ]
     for key, own in model.effects.items():
-        params = {p.name: p for p in model.library[key].params}
+        params = {p.name: p for p in known_effect(key, model.library).params}
         rows += [
             (f"{key.replace('_', ' ')} {name}", *_cells(value), params[name].meaning)
             for name, value in own.items()
-            if not params[name].held(used(value))
+            if not (params[name].held(used(value)) or is_left_out(params[name], value))
         ]
     if model.lag is not None:
         rows.append(("lag", *_cells(model.lag), "of the position behind the force of its row"))
     return rows
+
+
+def is_left_out(param: Param, estimate: Estimate) -> bool:
+    """Whether it is a size that its effect does without."""
+    return param.spare and estimate.value == 0.0 and estimate.sd is None
 
 
 def _cells(estimate: Estimate) -> tuple[str, str, str]:

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from identification.effects._base import Param
 from identification.log import Rig
 from identification.model.estimates import Estimate
 from identification.tracing.regression.significance import DRAWS
@@ -23,7 +24,7 @@ from workbench.cards.readable import (
     units_of,
 )
 from workbench.output import Row, next_step, written
-from workbench.report.model_tables import reasons_once
+from workbench.report.model_tables import is_left_out, reasons_once
 from workbench.report.notes import notes
 from workbench.report.trace_words import percent, then_of, trace_sentence, words
 from workbench.screen import Part, Screen, more, screen, tabled
@@ -76,11 +77,16 @@ def effect_rows(found: Trace, rig: Rig) -> list[Row]:
     out: list[Row] = []
     for e in found.effects:
         estimates = effect_estimates(e, rig)
-        for p in e.effect.params:
+        for p in shown_params(e):
             value, interval = _value_cells(estimates[p.name])
             unit = "" if p.unit == "1" else as_shown(estimates[p.name]).unit
             out.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
     return out
+
+
+def shown_params(of: FoundEffect) -> list[Param]:
+    """The parameters of an effect but for sizes that it does without."""
+    return [p for p in of.effect.params if not is_left_out(p, of.params[p.name])]
 
 
 def _value_cells(estimate: Estimate) -> tuple[str, str]:
@@ -99,9 +105,10 @@ def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row
     """The rows of `effect_rows` for one screen: a row names the effect, those of its parameters
     follow."""
     out: list[Row] = []
+    left = iter(rows)
     for e in found.effects:
         name = words(e.effect.key)
-        own = [row for row in rows if row[0].startswith(f"{name} ")]
+        own = [next(left) for _ in shown_params(e)]
         short = [(row[0].removeprefix(f"{name} "), *row[1:]) for row in own]
         out.append((f"{name}:", "", "", "", ""))
         if len(found.effects) > 1:  # their reasons would push other effects from the screen

@@ -88,7 +88,8 @@ def identify(
     fit = fit_plant(
         logs, rng, rig=rig, drive=options.drive, on_progress=on_progress, keep_going=keep_going
     )
-    if all(fit.estimates[n].value is None for n in NAMES if n in fit.estimates):
+    friction = [fit.estimates[n].value for n in NAMES if n in fit.estimates]
+    if fit.surroundings.none and all(value is None for value in friction):
         first = next(e.reason for n, e in fit.estimates.items() if n in NAMES)
         raise NotIdentifiable(f"none of the nine parameters is identifiable: m: {first}")
     plant, reason = _arx_or_reason(logs, options)

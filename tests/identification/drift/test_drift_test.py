@@ -87,7 +87,7 @@ def test_a_change_within_the_margin_is_no_drift_however_sure() -> None:
     assert {shift.name for shift in strict.moved} == {"F_cp", "F_cn"}
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize("names", [("F_cp", "F_cn"), ("m",)])
 def test_a_drift_of_two_percent_a_log_is_found_within_five(names: tuple[str, ...]) -> None:
     last: DriftTest | None = None
@@ -99,7 +99,7 @@ def test_a_drift_of_two_percent_a_log_is_found_within_five(names: tuple[str, ...
     assert {shift.name for shift in last.moved} == set(names)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_spring_that_joined_is_another_structure() -> None:
     found = verdict_on(with_spring(500.0))
     assert found.verdict == "structure"

@@ -53,7 +53,7 @@ def worn() -> Array:
     return factor
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_machine_that_the_model_never_followed_has_not_changed() -> None:
     """Without its own logs the model cries drift on the next log of the unchanged machine."""
     cried = 0

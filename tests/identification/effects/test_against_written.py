@@ -79,7 +79,7 @@ def differs(key: str, wrong: str = "") -> tuple[float, float]:
     )
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize("key", list(VALUES))
 def test_it_is_the_written_equation(key: str) -> None:
     error, size = differs(key)

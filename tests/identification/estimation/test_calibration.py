@@ -30,12 +30,12 @@ def mean_square(seeds: Sequence[int]) -> float:
     return float(np.mean(norm.ppf(np.clip(told, OUTERMOST, 1.0 - OUTERMOST)) ** 2))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_with_the_noise_of_the_logs_ranks_are_uniform() -> None:
     assert 0.5 < mean_square(range(700, 706)) < 2.0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(("factor", "low", "high"), [(2.0, 2.0, np.inf), (0.5, 0.0, 0.5)])
 def test_a_wrong_noise_is_seen(
     monkeypatch: pytest.MonkeyPatch, factor: float, low: float, high: float

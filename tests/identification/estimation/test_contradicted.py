@@ -14,7 +14,7 @@ from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import RUN_JUMP_FROM
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("signal", "at", "size", "kind"),
     [("y", 1800, 3e-3, "jump"), ("y", 3000, 1.5e-3, "jump"), ("u", 1150, 0.1, "spike")],

@@ -82,7 +82,7 @@ def test_recovers_a_plant_from_the_force_alone() -> None:
     assert np.max(errors(fit, truth)) < 0.10
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_motor_is_driven_by_its_command() -> None:
     log = made_log(table(2), seed=4, seconds=3.0)
     motor = Log(log.name, {"t": log["t"], "y": log["y"], "F": 2.0 * log["u"], "u": log["u"]})

@@ -27,7 +27,7 @@ def compared(found: Posterior, fit: KarnoppFit) -> tuple[list[float], list[float
     return off, wider
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_posterior_of_whole_runs_agrees_with_the_fit() -> None:
     log = made_log(table(2), seed=11, seconds=5.0)
     fit, shares = fitted(log), list[float]()
@@ -58,7 +58,7 @@ def test_a_short_walk_gives_no_interval() -> None:
     assert "\n" not in found.verdict
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_logs_and_fit_are_left_as_they_are_and_a_seed_gives_the_same() -> None:
     log = made_log(table(2), seed=13, seconds=3.0)
     fit = fitted(log)
@@ -70,7 +70,7 @@ def test_logs_and_fit_are_left_as_they_are_and_a_seed_gives_the_same() -> None:
     assert all(np.array_equal(log[name], before[name]) for name in before)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_by_force_it_is_as_wide_as_the_noise_moves_the_fit() -> None:
     log = made_log(table(2), seed=14, seconds=5.0)
     fit = fit_plant([log], np.random.default_rng(1), rig=RIG, drive="force")

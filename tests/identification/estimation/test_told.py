@@ -66,7 +66,7 @@ def test_no_estimate_of_the_nine_breaks_it(drawn: list[tuple[float, float]]) -> 
         assert broken(one) is None
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(("key", "p"), PARAMS, ids=[f"{key}.{p.name}" for key, p in PARAMS])
 @given(share=st.floats(0.0, 1.0), wide=st.floats(1e-6, 10.0))
 def test_no_estimate_of_an_effect_breaks_it(key: str, p: Param, share: float, wide: float) -> None:

@@ -49,7 +49,7 @@ def traced(speeds: tuple[float, ...]) -> Trace:
     return trace([logs[0]], [logs[1]], Rig("force"), built_in(), np.random.default_rng(0))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_the_run_that_is_named_tells_the_rivals_apart() -> None:
     found = traced((0.1,))
     assert found.verdict == "inseparable"

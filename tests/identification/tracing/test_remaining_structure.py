@@ -190,7 +190,7 @@ def run_of(effects: str, fast: bool, seeds: tuple[int, ...]) -> FittedStructure:
     return fitted_structure(choice.start, choice.first, (), recorded, np.random.default_rng(0))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("missing", "signals"),
     [
@@ -234,7 +234,7 @@ def test_breakaways_tell_that_they_depend_on_the_time_at_rest() -> None:
     assert at_breakaway(replace(choice, base={})).depends_on == ()
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("missing", "signals"),
     [

@@ -95,7 +95,7 @@ def test_nothing_is_missing_where_nothing_is() -> None:
         assert np.sqrt(np.mean(errors**2)) == pytest.approx(model["train"].position_rms)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("key", "values"),
     [
@@ -122,7 +122,7 @@ def test_the_effect_is_named_and_its_size_found(key: str, values: dict[str, Any]
     assert bool(found.curves) == (key in ("stribeck", "warmup", "cogging"))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("key", "values", "signal"),
     [
@@ -175,7 +175,7 @@ def test_scale_of_forces_is_as_exact_as_its_interval() -> None:
         assert abs(told.value - true) < 4.0 * told.sd, name
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_an_effect_of_the_command_is_no_rival_without_one() -> None:
     effects = {"stribeck": {"F_s": 5.0, "v_s": 0.04}}
     train = made(61, effects)
@@ -185,7 +185,7 @@ def test_an_effect_of_the_command_is_no_rival_without_one() -> None:
     assert not named & {"input_delay", "valve_dead_zone", "leakage"}
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_stand_in_is_not_named_beside_unknown() -> None:
     values = {"width": 4e-4}
     library = {k: e for k, e in built_in().items() if k != "backlash"}

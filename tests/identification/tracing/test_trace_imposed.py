@@ -62,7 +62,7 @@ def traced(train: Sequence[Log], test: Sequence[Log]) -> Trace:
     return trace(train, test, RIG, built_in(), np.random.default_rng(0))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_slow_strokes_count_as_fast_ones_do() -> None:
     # At 7 bar the rig is so slow that a quick derivative hardly tells its direction.
     at = ((1, 13e-3), (5, 9e-3), (7, 6e-3))
@@ -80,7 +80,7 @@ def test_slow_strokes_count_as_fast_ones_do() -> None:
     assert any("too alike" in remark and "stribeck" in remark for remark in found.remarks)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     def falls(v: Array) -> Array:
         return np.asarray(2.0 * np.exp(-((v / 6e-3) ** 2)))
@@ -185,7 +185,7 @@ def test_rest_between_strokes_is_not_smoothed_away(rate: float) -> None:
     assert imposed.signals["v"] == pytest.approx(free.signals["v"])
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_strokes_that_no_log_lets_one_judge_are_said_so() -> None:
     train = [strokes(1, [speed] * 4, 1) for speed in (4e-3, 5e-3)]
     slower = strokes(5, [3e-3] * 4, 3)  # slower than any that was learned from, at more pressure

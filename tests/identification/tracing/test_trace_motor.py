@@ -47,7 +47,7 @@ def test_a_counted_position_has_the_noise_of_its_step() -> None:
     assert resolution(still) == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_nothing_is_missing_on_a_motor_whose_position_is_counted() -> None:
     found = traced(counted(made(2, n=15_000), 1e-5), counted(made(5), 1e-5))
     assert found.verdict == "none"
@@ -67,7 +67,7 @@ def test_a_dead_zone_that_leaves_a_motor_no_force_explains_nothing() -> None:
     assert MECHANICAL in base_fits(stage)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_spring_on_a_motor_is_no_dead_zone() -> None:
     effects = {"spring": {"k": 60.0}}
     found = traced(made(3, effects, n=15_000), made(4, effects))
@@ -147,7 +147,7 @@ def test_a_body_pressed_against_a_stop_tells_no_stick_limit() -> None:
     assert _limit(10.0, 0.0) == 12.0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_either_stick_limit_has_its_own_share_of_friction_along_the_stroke() -> None:
     values = {"c1": 100.0, "period": 0.05, "at_rest_p": 1.33, "at_rest_n": 0.5}
     effects = {"position_dependent_friction": values}

@@ -81,7 +81,7 @@ def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
     assert broken_promises(promised(model, 1.1 / BROKEN)) == ()
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_runs_to_add_are_those_of_what_is_not_told(tmp_path: Path) -> None:
     log = made(3)
     step = np.diff(log["y"], prepend=log["y"][0])

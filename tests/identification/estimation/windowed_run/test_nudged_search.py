@@ -61,7 +61,7 @@ def test_what_leads_a_body_is_no_kink_of_its_force() -> None:
     assert np.allclose(by_velocity.driving["F"] - by_velocity.log["F"], one.kinks, atol=1e-9)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_the_search_finds_what_a_gradient_does_not() -> None:
     true = plant({"stribeck": {"F_s": 3.0, "v_s": 0.03}})
     one = seen(made(4, {"stribeck": {"F_s": 3.0, "v_s": 0.03}}))
@@ -160,7 +160,7 @@ def test_an_asymmetry_is_searched_only_where_it_is_asked_for() -> None:
         assert (low[at], high[at]) == (-off, off)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_growth_is_searched_with_sliding_held() -> None:
     one = seen(made(2, {"rising_stiction": {"F_r": 3.0, "tau": 0.4}}))
     off = plant({"rising_stiction": {"F_r": 2.2, "tau": 0.25}})
@@ -222,7 +222,7 @@ def test_a_size_that_sliding_does_not_call_for_stays_at_none() -> None:
     assert f"{key}.c1" not in closed
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_search_ends_where_another_has_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     one = seen(made(2, {"spring": {"k": 40.0}}))  # which no plain plant follows
     searched = []

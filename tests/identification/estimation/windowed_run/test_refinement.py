@@ -64,7 +64,7 @@ def test_effects_are_refined_with_the_nine() -> None:
     assert 0 < found.sd["spring.k"] < 1.0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize("seed", [2, 3])
 def test_brief_windows_lead_where_long_ones_lead_astray(seed: int) -> None:
     warm = {"a": 0.3, "b": 0.2, "tau": 6.0, "asymmetry": 0.1}

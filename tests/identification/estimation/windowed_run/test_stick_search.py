@@ -15,7 +15,7 @@ COGGING = {"cogging": {"a": 1.5, "b": 0.0, "period": 0.012}}
 WRONG = replace(NINE, dv_p=0.0006, dv_n=-0.03, F_sp=2.3 * NINE.F_cp, F_sn=-1.02 * NINE.F_cn)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize("effects", [None, COGGING], ids=["plain", "cogging"])
 def test_stops_are_found_from_anywhere(effects: dict[str, dict[str, float]] | None) -> None:
     true, one = plant(effects), seen(made(4, effects))

@@ -103,7 +103,7 @@ def test_what_is_chosen_up_to_an_effect_of_slow_motion_stays(
     assert not without_slow(replace(choice, steps=(other, first))).steps
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_an_effect_that_is_needed_stays(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     kept = without_slow(choice)

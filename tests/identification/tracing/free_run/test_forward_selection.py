@@ -52,7 +52,7 @@ def fitted_setting(seed: int, width: float) -> tuple[Setting, FittedStructure]:
     return Setting([one], [one], "command", MOTOR, built_in(), start, first, plain, rng), plain
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_play_shows_in_the_run_alone_and_is_named() -> None:
     setting, plain = setting_of(4, 4e-4)
     assert plain.misfit > 5.0
@@ -98,7 +98,7 @@ def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyP
     assert cut_short(replace(tried, steps=(step,)), plain, setting)[0].log["t"][0] == 0.0
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_an_effect_taken_out_of_the_library_is_not_replaced_by_a_helper() -> None:
     setting, plain = setting_of(4, 4e-4)
     library = {k: e for k, e in built_in().items() if k != "backlash"}
@@ -110,7 +110,7 @@ def test_an_effect_taken_out_of_the_library_is_not_replaced_by_a_helper() -> Non
     assert not found.steps and model is plain
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_late_command_of_a_motor_is_named() -> None:
     effects = {"input_delay": {"tau": 0.006}}
     found = trace(
@@ -141,7 +141,7 @@ def test_what_is_decisive() -> None:
     assert decisive(1.6, others(1.5)) == pytest.approx(1.3)  # hardly anything was missing
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize(
     ("first", "tried"),
     [

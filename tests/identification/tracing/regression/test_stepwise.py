@@ -29,7 +29,7 @@ def outside_log(folder: Path, effect: str, seed: int) -> Log:
     return Log(effect, {"t": t, "y": y, "u": u, "F": K_A * u})
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_an_effect_that_bends_the_rest_does_not_hide_the_next(tmp_path: Path) -> None:
     # On this log friction by load gains most, with nine tenths of the force taken by it.
     one = motion_log(outside_log(tmp_path, "input_delay", 51), held=True, by_command=False)

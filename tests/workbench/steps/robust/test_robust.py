@@ -86,7 +86,7 @@ def test_machines_further_off_than_the_model_says_break_the_promise() -> None:
     assert min(share - (promised[name].kept or 0.0) for name, share in shares.items()) < -PATIENCE
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_the_same_seed_gives_the_same_design() -> None:
     again = robust_design(uncertain(), WANTED, POLES)
     assert design_document(again.design) == design_document(found().design)
@@ -103,7 +103,7 @@ def test_a_limit_that_no_loop_keeps_is_said_and_nothing_recommended() -> None:
     assert any("along the smooth reference" in line for line in one.design.remarks)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_slow_motion_asked_for_is_smaller_than_the_pids() -> None:
     """The body sticks and leaps behind an integrator: the excess alone takes most of that away."""
     one = robust_design(uncertain(0.005), replace(WANTED, staircase=1e-6), POLES)
@@ -121,7 +121,7 @@ def test_the_ramp_moves_within_the_stick_band() -> None:
     assert np.diff(ramp) == pytest.approx(speed * 2e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_a_machine_that_runs_away_keeps_no_limit() -> None:
     model = uncertain()
     kept = found().design
@@ -150,7 +150,7 @@ def test_the_report_shows_the_shares_and_the_design() -> None:
     assert any("drawn anew" in line for line in robust_lines(found(), rotary=False))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_drift_so_far_is_told() -> None:
     one = robust_design(uncertain(0.005), replace(WANTED, drift={"F_cp": 0.1}), POLES)
     assert any("F_cp 10 %" in line for line in robust_lines(one, rotary=False))

@@ -1,0 +1,214 @@
+"""Forces that repeat a whole number of times in a turn: cogging of magnets and teeth, by orders.
+
+The equation of motion in weak form, over windows of sliding in one direction (N m):
+    F = m y'' + (+-)F_c + F_v y' + sum over the orders n of A_n sin(n y) + B_n cos(n y).
+The first order is gravity's and there from the start; the others join one by one, the one first
+that explains most. On a slow motor they are larger than friction: no run follows its log, and no
+friction shows, before they are known.
+Sources: harmonics of cogging torque, Hanselman, Brushless Permanent Magnet Motor Design, 2nd ed.,
+chapter 4; forward selection by orthogonal least squares, Chen, Billings, Luo, Int. J. Control 50
+(1989) 1873.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray, IntArray
+from identification.errors import NotIdentifiable, UserError
+from identification.estimation.regression.equation_rows import (
+    LEAST_SAMPLES,
+    WINDOW_SECONDS,
+    MotionLog,
+    motion_log,
+)
+from identification.estimation.regression.weighted_rows import BLOCKS
+from identification.log import Log, Rig
+from identification.model.surroundings import Order, Size, Surroundings
+from identification.signals.weak_form import WeakWindows, sliding_windows
+from identification.thresholds import (
+    ORDERS_LEAVE,
+    SURE_OF_ORDER,
+    SURROUNDINGS_LEAVE,
+)
+
+HIGHEST = 100  # order that the windows are made short enough for
+MOST_ORDERS = 8
+PLAIN = 7  # columns beside those of the orders
+LEAST_TURNS = 0.5  # of motion, in which neighbouring orders differ
+MOST_ROWS = 3000
+FEWEST_ROWS = 60
+BETWEEN = np.array([-0.5, -0.25, 0.25, 0.5])  # of an order, where no whole number may fit better
+
+
+@dataclass(frozen=True, eq=False)
+class _Turning:
+    """Rows of the equation of all logs: force b (r,), columns X (r, 7) of friction, inertia and
+    gravity; windows and angles [rad] of each log; highest order that they show."""
+
+    b: Array
+    X: Array
+    block: IntArray
+    angles: tuple[tuple[WeakWindows, Array], ...]
+    highest: int
+
+    def pair(self, order: float) -> Array:
+        """The columns of an order, (r, 2): weighted means of its sine and cosine."""
+        each = [
+            np.column_stack([w.mean @ np.sin(order * y), w.mean @ np.cos(order * y)])
+            for w, y in self.angles
+        ]
+        return np.vstack(each)
+
+
+def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
+    """Orders of the turn whose forces explain most of what friction and inertia leave, each sure.
+
+    None where a machine does not turn, too little of its motion slides, or the whole of what is
+    left is not mostly theirs: a small one is an effect as any other, for a trace to find.
+    """
+    if rig.motion != "rotary" or max(float(np.ptp(log["y"])) for log in logs) < _turns():
+        return ()
+    found = _turning(logs, held=rig.kind == "motor")
+    if found is None:
+        return ()
+    chosen = _chosen(found)
+    if not chosen:
+        return ()
+    columns = np.column_stack([found.X, *(found.pair(n) for n in chosen)])
+    if not are_most(_left(found.X, found.b), _left(columns, found.b)):
+        return ()
+    theta, sd = _with_spread(columns, found)
+    sizes = [
+        Size(-float(value), float(s)) for value, s in zip(theta[PLAIN:], sd[PLAIN:], strict=True)
+    ]
+    made = [Order(n, sizes[2 * i], sizes[2 * i + 1]) for i, n in enumerate(chosen)]
+    sure = (one for one in made if is_sure(one.size, one.sd))
+    return tuple(sorted(sure, key=lambda one: -one.size))
+
+
+def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:
+    """What the equation leaves of the force without the orders and with them [N m], root mean
+    squares; the orders as they are, friction and inertia of these logs.
+
+    Raises NotIdentifiable where too little of them slides.
+    """
+    held = rig.kind == "motor"
+    without, left = (
+        _turning(some, held) for some in (logs, [around.of_place.taken_out(log) for log in logs])
+    )
+    if without is None or left is None:
+        raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_ROWS} windows of sliding")
+    each = (np.sqrt(_left(one.X, one.b) / len(one.b)) for one in (without, left))
+    first, second = each
+    return float(first), float(second)
+
+
+def are_most(without: float, left: float) -> bool:
+    """Whether orders that leave this of a square are most of what is left without them."""
+    return left <= ORDERS_LEAVE * without
+
+
+def is_sure(size: float, sd: float) -> bool:
+    """Whether the size of an order is no luck among all the orders that were tried."""
+    return size > SURE_OF_ORDER * sd
+
+
+def _turns() -> float:
+    return LEAST_TURNS * 2.0 * np.pi
+
+
+def _chosen(found: _Turning) -> tuple[int, ...]:
+    """Orders in the order in which they join, each with most of what the others leave."""
+    orders = np.arange(2, found.highest + 1)
+    pairs = np.stack([found.pair(float(n)) for n in orders])  # (orders, r, 2)
+    base, left = np.linalg.qr(_kept(found.X))[0], found.b
+    chosen: list[int] = []
+    while len(chosen) < MOST_ORDERS:
+        left = found.b - base @ (base.T @ found.b)
+        explained = np.array([_explained(pair, base, left) for pair in pairs])
+        best, before = int(np.argmax(explained)), float(left @ left)
+        n = int(orders[best])
+        after = before - float(explained[best])
+        if n in chosen or after > SURROUNDINGS_LEAVE * before:
+            break
+        beside = max(_explained(found.pair(n + off), base, left) for off in BETWEEN)
+        if before - beside < SURROUNDINGS_LEAVE * after:
+            break  # it repeats with something else than the turn
+        chosen.append(n)
+        base = np.linalg.qr(np.column_stack([base, pairs[best]]))[0]
+    return tuple(chosen)
+
+
+def _explained(pair: Array, base: Array, left: Array) -> float:
+    """Square of what is left (r,) that a pair of columns takes beside an orthonormal base."""
+    own = np.linalg.qr(pair - base @ (base.T @ pair))[0]
+    return float(np.sum((own.T @ left) ** 2))
+
+
+def _left(X: Array, b: Array) -> float:
+    """Square that least squares leave."""
+    rest = b - X @ np.linalg.lstsq(X, b, rcond=1e-10)[0]
+    return float(rest @ rest)
+
+
+def _kept(X: Array) -> Array:
+    """Columns in which anything is."""
+    return np.asarray(X[:, np.any(X != 0.0, axis=0)])
+
+
+def _with_spread(X: Array, found: _Turning) -> tuple[Array, Array]:
+    """Coefficients (c,) and their deviations by leaving out blocks of time."""
+    theta = np.linalg.lstsq(X, found.b, rcond=1e-10)[0]
+    each = []
+    for k in np.unique(found.block):
+        kept: BoolArray = np.asarray(found.block != k)
+        each.append(np.linalg.lstsq(X[kept], found.b[kept], rcond=1e-10)[0])
+    n, off = len(each), np.array(each) - np.mean(each, axis=0)
+    return np.asarray(theta), np.asarray(np.sqrt((n - 1) / n * np.sum(off**2, axis=0)))
+
+
+def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
+    """Rows of the equation, thinned to so many; None where too few slide."""
+    moved: list[MotionLog] = []
+    for log in logs:
+        try:  # slow motion is smoothed until its direction is sure
+            moved.append(motion_log(log, held=held, by_command=False, imposed=True))
+        except UserError:
+            continue
+    rates = [np.abs(one.signals["v"][one.signals["d"] != 0]) for one in moved]
+    if not any(len(rate) for rate in rates):
+        return None
+    speed = float(np.median(np.concatenate(rates)))
+    made = [(one, _windows(one, speed)) for one in moved]
+    made = [(one, w) for one, w in made if len(w.start)]
+    rows = sum(len(w.start) for _, w in made)
+    if rows < FEWEST_ROWS:
+        return None
+    X, b, block, angles = [], [], [], []
+    for i, (one, every) in enumerate(made):
+        w = every.every(max(1, rows // MOST_ROWS))
+        y, up = np.asarray(one.log["y"]), one.signals["d"][w.middle] > 0
+        rate = w.first @ y
+        friction = (1.0 * up, -1.0 * ~up, rate * up, rate * ~up)
+        gravity = (w.mean @ np.sin(y), w.mean @ np.cos(y))
+        X.append(np.column_stack([w.second @ y, *friction, *gravity]))
+        b.append((w.held if held else w.mean) @ np.asarray(one.log["F"]))
+        block.append(BLOCKS * i + w.middle * BLOCKS // len(y))
+        angles.append((w, y))
+    longest = max(w.length * one.log.h for one, w in made)
+    highest = int(min(2.0 * HIGHEST, 2.0 * np.pi / (speed * longest)))
+    if highest < 2:
+        return None
+    return _Turning(
+        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), highest
+    )  # fmt: skip
+
+
+def _windows(one: MotionLog, speed: float) -> WeakWindows:
+    """Windows of sliding, short enough for the highest order at that speed."""
+    h = one.log.h
+    seconds = min(WINDOW_SECONDS, 2.0 * np.pi / (HIGHEST * speed))
+    length = max(LEAST_SAMPLES, 2 * round(seconds / h / 2))
+    return sliding_windows(one.signals["d"], length, h)
