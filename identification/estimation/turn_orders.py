@@ -11,7 +11,7 @@ chapter 4; forward selection by orthogonal least squares, Chen, Billings, Luo, I
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,18 +39,21 @@ PLAIN = 7  # columns beside those of the orders
 LEAST_TURNS = 0.5  # of motion, in which neighbouring orders differ
 MOST_ROWS = 3000
 FEWEST_ROWS = 60
+OUTLYING = 6.0  # times the median of what is left, beyond which a row is of a start or a stop
 BETWEEN = np.array([-0.5, -0.25, 0.25, 0.5])  # of an order, where no whole number may fit better
 
 
 @dataclass(frozen=True, eq=False)
 class _Turning:
     """Rows of the equation of all logs: force b (r,), columns X (r, 7) of friction, inertia and
-    gravity; windows and angles [rad] of each log; highest order that they show."""
+    gravity; windows and angles [rad] of each log, and which of their rows count; highest order
+    that they show."""
 
     b: Array
     X: Array
     block: IntArray
     angles: tuple[tuple[WeakWindows, Array], ...]
+    counts: BoolArray
     highest: int
 
     def pair(self, order: float) -> Array:
@@ -59,7 +62,18 @@ class _Turning:
             np.column_stack([w.mean @ np.sin(order * y), w.mean @ np.cos(order * y)])
             for w, y in self.angles
         ]
-        return np.vstack(each)
+        return np.asarray(np.vstack(each)[self.counts])
+
+    def without_outliers(self, chosen: Sequence[int]) -> "_Turning":
+        """The rows that a model of these orders does not leave far outside."""
+        columns = np.column_stack([self.X, *(self.pair(n) for n in chosen)])
+        rest = np.abs(self.b - columns @ np.linalg.lstsq(columns, self.b, rcond=1e-10)[0])
+        kept = rest <= OUTLYING * float(np.median(rest))
+        counts = self.counts.copy()
+        counts[counts] = kept
+        return replace(
+            self, b=self.b[kept], X=self.X[kept], block=self.block[kept], counts=counts
+        )  # fmt: skip
 
 
 def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
@@ -73,6 +87,7 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     found = _turning(logs, held=rig.kind == "motor")
     if found is None:
         return ()
+    found = found.without_outliers(_chosen(found))
     chosen = _chosen(found)
     if not chosen:
         return ()
@@ -201,8 +216,9 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     highest = int(min(2.0 * HIGHEST, 2.0 * np.pi / (speed * longest)))
     if highest < 2:
         return None
+    every = np.ones(sum(map(len, b)), dtype=bool)
     return _Turning(
-        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), highest
+        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), every, highest
     )  # fmt: skip
 
 

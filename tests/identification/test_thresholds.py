@@ -834,7 +834,7 @@ def test_share_set_aside() -> None:
 
 
 def test_contradicts_equation() -> None:
-    assert contradicts_the_equation(1.9, 0.9) and not contradicts_the_equation(1.7, 0.9)
+    assert contradicts_the_equation(1.4, 1.0) and not contradicts_the_equation(1.2, 1.0)
 
 
 def test_orders_leave() -> None:
