@@ -27,6 +27,8 @@ SCANNED_STEP = 0.02  # s between scanned delays
 SCANNED_SAMPLES = 6000
 STARTS = 3
 STEP_OF_SLOPE = 1e-4  # of a number's scale
+OPEN_WAY = 1e-9  # of the largest curvature, below which numbers are not told from each other
+LOADED = 1e-3  # part of a number in such a combination
 STANDS_OUT = 3.0  # deviations, beyond which an error counts as its size
 
 
@@ -121,7 +123,8 @@ def refined(
             x_scale=1.0, max_nfev=60,
         )  # fmt: skip
         x = found.x
-    inside = (x > low + 1e-9) & (x < high - 1e-9)
+    # A time that is none is left out; a dead zone is not, which a gain may stand in for.
+    inside = np.array([n[:2] == "d_" for n in names]) | (x > low + 1e-9) & (x < high - 1e-9)
     weight = 1.0 / np.sqrt(1.0 + (found.fun / (STANDS_OUT * spread)) ** 2)
     sizes = [rows.shape[1] for rows in _centred(record, valve(x), kept) for _ in rows]
     covariance = np.full((len(x), len(x)), np.nan)
@@ -151,17 +154,26 @@ def _slopes(errors: Callable[[Array], Array], x: Array, low: Array, high: Array)
 def _jackknife(errors: Array, slopes: Array, weight: Array, sizes: Sequence[int]) -> Array:
     """Covariance (d, d) by leaving out one window after the other, to first order.
 
-    The windows' errors may be of any colour. Source: Bell & McCaffrey (2002), Bias reduction in
-    standard errors for linear regression with multi-stage samples (the jackknife of clusters).
+    Infinite where a number is not told from others. The windows' errors may be of any colour.
+    Source: Bell & McCaffrey (2002), Bias reduction in standard errors for linear regression with
+    multi-stage samples (the jackknife of clusters).
     """
     borders = np.cumsum([0, *sizes])
-    whole = slopes.T @ (weight[:, np.newaxis] * slopes)
+    unit = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    scaled = slopes / unit
+    whole = scaled.T @ (weight[:, np.newaxis] * scaled)
+    size, ways = np.linalg.eigh(whole)
+    open_ways = ways[:, size < OPEN_WAY * size[-1]]
     moves = []
     for a, b in pairwise(borders):
-        part = slopes[a:b].T * weight[a:b]
-        moves.append(np.linalg.pinv(whole - part @ slopes[a:b], rcond=1e-13) @ (part @ errors[a:b]))
+        part = scaled[a:b].T * weight[a:b]
+        rest = np.linalg.pinv(whole - part @ scaled[a:b], rcond=OPEN_WAY, hermitian=True)
+        moves.append(rest @ (part @ errors[a:b]))
     count = len(sizes)
-    return np.asarray((count - 1.0) / count * np.einsum("ki,kj->ij", moves, moves))
+    out = (count - 1.0) / count * np.einsum("ki,kj->ij", moves, moves) / np.outer(unit, unit)
+    lost = np.any(np.abs(open_ways) > LOADED, axis=1)
+    out[lost], out[:, lost] = np.inf, np.inf
+    return np.asarray(out)
 
 
 def _scanned(record: Record) -> list[Valve]:

@@ -82,11 +82,15 @@ class Record:
             out.append(inside @ square / np.maximum(inside.sum(axis=1), 1))
         return np.concatenate(out)
 
-    def placed(self, valve: Valve) -> "Record":
-        """The same with the place in the travel, as the valve predicts it in each window."""
+    @property
+    def travel(self) -> tuple[float, float]:
+        """Lowest and highest measured position [m]."""
         low = min(float(run.y.min()) for run in self.runs)
-        span = max(float(run.y.max()) for run in self.runs) - low
-        runs = []
+        return low, max(float(run.y.max()) for run in self.runs)
+
+    def placed(self, valve: Valve, travel: tuple[float, float]) -> "Record":
+        """The same with the place in the travel [m], as the valve predicts it in each window."""
+        low, span, runs = travel[0], travel[1] - travel[0], list[Run]()
         for run, e in zip(self.runs, self.errors(valve), strict=True):
             starts = run.starts(WINDOW)
             at = np.searchsorted(starts, np.arange(len(run.y)), side="right") - 1

@@ -134,8 +134,8 @@ def left_by_valve(
     """
     plain = fit(record, keep_going=keep_going)
     held = held_out(record, plain.valve, plain.free, test)
-    placed = record.placed(plain.valve)
-    test_placed = test.placed(plain.valve) if test else None
+    placed = record.placed(plain.valve, record.travel)
+    test_placed = test.placed(plain.valve, record.travel) if test else None
     rivals, fits, not_tried = list[Rival](), dict[str, ValveFit](), list[str]()
     for key, structure in STRUCTURES.items():
         if not keep_going():

@@ -1,6 +1,6 @@
 """What a log tells of a valve's numbers: values with intervals, or why there is none."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 
 import numpy as np
@@ -20,11 +20,10 @@ WAYS = {"p": ("positive", 1.0), "n": ("negative", -1.0)}
 def units(motion: str, command_unit: str) -> Mapping[str, str]:
     """The unit of each number of the model; motion: "linear" or "rotary"."""
     speed = "rad/s" if motion == "rotary" else "m/s"
-    per = "" if command_unit == "1" else f"/{command_unit}"
-    parted = f"{speed}{per}" if not per else f"{speed.split('/')[0]}/(s {command_unit})"
+    parted = f"{speed.split('/')[0]}/(s {command_unit})" if command_unit != "1" else speed
     return {
         "g_p": parted, "g_n": parted, "d_p": command_unit, "d_n": command_unit,
-        "delay": "s", "lag": "s",
+        "delay": "s", "lag": "s", "creep": speed,
     }  # fmt: skip
 
 
@@ -44,6 +43,11 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
             continue
         size = {"d": record.u_max, "l": 1.0, "g": 0.0}.get(name[0], 0.0)
         low = bounds.get(name, (-np.inf, np.inf))
+        if np.isinf(sd[name]):
+            out[name] = Estimate(
+                None, unit[name], reason=_together(name, record), assumed=values[name]
+            )
+            continue
         spread = sd[name] * wide if np.isfinite(sd[name]) else None
         if spread is None and values[name] <= low[0] + 1e-9 * max(record.u_max, 1.0):
             zero = "at its bound: the logs cannot tell it from 0"
@@ -51,12 +55,25 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
             continue
         out[name] = told_estimate(values[name], unit[name], spread, bounds=low, beside=size)
     if out["g_p"].value is None and out["g_n"].value is None:
-        why = out["g_p"].reason
+        first = f"{record.runs[0].name}: "
+        why = str(out["g_p"].reason).removeprefix(first)
         raise NotIdentifiable(
-            f"{record.runs[0].name}: the position does not tell how the velocity follows the"
-            f" command (g_p: {why})"
+            f"{first}the position does not tell how the velocity follows the command (g_p: {why})"
         )
     return out
+
+
+def _together(name: str, record: Record) -> str:
+    """Why a number is not told from another one."""
+    if name not in ("g_p", "g_n", "d_p", "d_n"):
+        return (
+            f"{record.runs[0].name}: not told from the other numbers; add commands of other sizes"
+        )
+    way = WAYS[name[-1]][0]
+    return (
+        f"{record.runs[0].name}: gain and dead zone of the {way} direction cannot be told apart;"
+        " add commands of other sizes"
+    )
 
 
 def _silent(name: str, record: Record, valve: Valve) -> str | None:
@@ -85,3 +102,19 @@ def _silent(name: str, record: Record, valve: Valve) -> str | None:
             f" {SAMPLES_INSIDE} needed; add slow passages through 0"
         )
     return None
+
+
+def told_beside(
+    found: ValveFit, names: Sequence[str], unit: Mapping[str, str]
+) -> dict[str, Estimate]:
+    """The numbers `names` that a richer structure has beside the plain model's, told likewise."""
+    sd = dict(zip(found.free, np.sqrt(np.diag(found.covariance)).tolist(), strict=True))
+    wide = float(student.ppf(0.975, max(found.clusters - 1, 1))) / NORMAL_95
+    values = asdict(found.valve)
+    return {
+        name: told_estimate(
+            values[name], unit.get(name, "1"), sd[name] * wide if np.isfinite(sd[name]) else None
+        )
+        for name in names
+        if name in sd
+    }

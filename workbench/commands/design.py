@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand, refused_with, step
 from workbench.options import (
     POSITIVE,
     Finite,
     effects_option,
     motion_limits,
     present_card_option,
+    refuse_for_velocity,
 )
 from workbench.output import OutputFolder, emit, output_options, progress
 
@@ -128,10 +129,16 @@ def command(
     from design.tune import Asked
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
+    from workbench.documents.velocity import is_velocity_model
     from workbench.options import parse_auxiliary, parse_poles
     from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
 
+    if is_velocity_model(model_file):
+        refuse_for_velocity(
+            *ROBUST_ONLY, "poles", "auxiliary", "source", "robust", "probability", "card", "effects"
+        )
+        return _velocity(model_file, (modulus, delay), integrator, design_period, as_json, out)
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
@@ -177,6 +184,37 @@ def _nominal(
         after_design(found, model_file, asked.dominant is not None, kept),
     )
     return 1 if found.recommended == "none" else 0
+
+
+def _velocity(
+    model_file: Path, least: tuple[float, float], integrator: bool, period: float | None,
+    as_json: bool, out: Path | None,
+) -> int:  # fmt: skip
+    """The same of a rig whose velocity follows the command; least: modulus and delay margin."""
+    from workbench.documents.velocity import read_velocity_model, velocity_document
+    from workbench.report.next_steps import looked_over
+    from workbench.report.velocity import velocity_design_report, velocity_design_view
+    from workbench.steps.velocity_loop import design_velocity
+
+    model = read_velocity_model(model_file)
+    logs = [entry.file for entry in model.log]
+    with (
+        refused_with(looked_over(logs, "CARD")),
+        OutputFolder("design", out, now=datetime.now()) as folder,
+    ):
+        found = design_velocity(
+            model, modulus=least[0], delay=least[1], integrator=integrator, period=period
+        )
+        document = velocity_document(found)
+        folder.write_json("design.json", document)
+        folder.write_text("report.html", velocity_design_report(found))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: velocity_design_view(found, folder.final),
+        step("the loop in simulation", "validate", model_file, folder.final / "design.json"),
+    )
+    return 0
 
 
 def _only_robust(context: click.Context) -> None:

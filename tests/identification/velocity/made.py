@@ -44,10 +44,11 @@ def moved_finely(u: Array, h: float, valve: Valve, travel: float = 0.3) -> Array
     y = np.empty_like(w_p)
     place, p, n, p2, n2 = 0.0, w_p[0], w_n[0], w_p[0], w_n[0]
     for k in range(len(y)):
-        y[k] = place
-        place += step * ((p2 - n2) * (1.0 + valve.place * place / travel) + valve.creep)
+        y[k], old = place, p2 - n2
         p, n = p + share[0] * (w_p[k] - p), n + share[1] * (w_n[k] - n)
         p2, n2 = p2 + second * (p - p2), n2 + second * (n - n2)
+        speed = 0.5 * (old + p2 - n2) * (1.0 + valve.place * place / travel)
+        place += step * (speed + valve.creep)
     return y[::FINE]
 
 
