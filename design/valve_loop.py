@@ -7,8 +7,9 @@ v = k_p e + k_i int(e) + dr/dt, so that what is left of the plant is a delay, a 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.signal import lfilter
 
-from design.margins import Margins, margins
+from design.margins import margins
 from design.polynomial import add, multiply
 from design.rst import RST
 from identification.arrays import Array
@@ -17,6 +18,10 @@ from identification.velocity.model import SHORTEST_LAG, Valve, flows
 
 DAMPED = 6.0  # k_p T_i: the integral's time over the loop's
 HALVINGS = 40
+GAINS = ("g_p", "g_n")
+SLOW_END = "delay, lag, gains high"
+SETTLES, LONGEST_STEP = 8.0, 20_000  # time constants and periods of a step response
+NEAR = 10.0  # bands from the target, within which the integral works
 
 
 @dataclass(frozen=True)
@@ -25,7 +30,7 @@ class ValveController:
 
     g_p, g_n, d_p, d_n: the valve as the law has it, as in `Valve`. smooth [m/s]: wanted speed up to
     which the dead zone's offset grows in proportion; band [m]: error below which the integral
-    rests; limit: of the command's size, in its unit.
+    rests, as it does beyond `NEAR` of them; limit: of the command's size, in its unit.
     """
 
     k_p: float
@@ -87,36 +92,44 @@ def valve_rst(k_p: float, k_i: float, h: float) -> RST:
 
 
 def tuned(
-    delay: float, lag: float, h: float, *, modulus: float, delay_samples: float, integrator: bool
-) -> tuple[float, float, Margins]:
-    """k_p [1/s] and k_i [1/s²] of the fastest loop that keeps both margins, and its margins.
+    valve: Valve, h: float, *, gain: float = 1.0, modulus: float, delay_samples: float,
+    overshoot: float, integrator: bool,
+) -> tuple[float, float]:  # fmt: skip
+    """k_p [1/s] and k_i [1/s²] of the fastest loop of period h [s] that keeps the goals.
 
-    modulus: least modulus margin [-]; delay_samples: least delay margin in periods h [s]. Raises
-    BadSpecification where no gain keeps them.
+    gain: the plant's over the law's; modulus: least modulus margin [-]; delay_samples: least delay
+    margin in periods; overshoot: largest of a step, relative to it, without the integral, which
+    rests then. Raises BadSpecification where no gain keeps them.
     """
-    A, B = valve_plant(delay, lag, h)
+    A, B = valve_plant(valve.delay, valve.lag, h)
+    B = gain * B
 
-    def loop(k_p: float) -> Margins | None:
+    def keeps(k_p: float) -> bool:
         try:
             found = margins(A, B, valve_rst(k_p, k_p**2 / DAMPED if integrator else 0.0, h))
         except BadSpecification:
-            return None
+            return False
         slow = found.delay_s is None or found.delay_s >= delay_samples * h
-        return found if found.modulus >= modulus and slow else None
+        return bool(found.modulus >= modulus and slow and step_overshoot(A, B, k_p) <= overshoot)
 
-    low, high = 1e-3 / (delay + lag + h), 2.0 / h
-    if loop(low) is None:
+    low, high = 1e-3 / (valve.delay + valve.lag + h), 2.0 / h
+    if not keeps(low):
         raise BadSpecification(
             f"no gain keeps a modulus margin of {modulus:g} and a delay margin of"
-            f" {delay_samples:g} periods of {h:g} s behind a delay of {delay:.3g} s and a lag of"
-            f" {lag:.3g} s; ask for less, by --modulus or --delay"
+            f" {delay_samples:g} periods of {h:g} s behind a delay of {valve.delay:.3g} s and a lag"
+            f" of {valve.lag:.3g} s; ask for less, by --modulus or --delay"
         )
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
-        low, high = (middle, high) if loop(middle) is not None else (low, middle)
-    best = loop(low)
-    assert best is not None
-    return low, low**2 / DAMPED if integrator else 0.0, best
+        low, high = (middle, high) if keeps(middle) else (low, middle)
+    return low, low**2 / DAMPED if integrator else 0.0
+
+
+def step_overshoot(A: Array, B: Array, k_p: float) -> float:
+    """Overshoot of the position's step, relative to it, under k_p [1/s] alone."""
+    dies = int(np.ceil(SETTLES / (1.0 - float(np.max(np.abs(np.roots(add(A, k_p * B))))))))
+    y = lfilter(k_p * B, add(A, k_p * B), np.ones(min(dies, LONGEST_STEP)))
+    return float(np.max(y)) - 1.0
 
 
 class _Plant:
@@ -172,8 +185,8 @@ def run_valve_loop(
         e = float(r[k]) - plant.y - float(noise[k])
         wanted = law.k_p * e + (float(r[k]) - before) / law.h
         u[k] = law.command(wanted + whole)
-        # The integral rests near the target and while the command is at its limit.
-        if abs(e) > law.band and abs(u[k]) < law.limit:
+        # Over a large step it would only overshoot; in the band it would hunt.
+        if law.band < abs(e) < NEAR * law.band:
             whole += law.k_i * law.h * e
         before = float(r[k])
         plant.step(float(u[k]))
@@ -181,11 +194,10 @@ def run_valve_loop(
 
 
 def at_edges(valve: Valve, low: Valve, high: Valve) -> dict[str, Valve]:
-    """The valve with its dead zones, then delay and gains, at the ends of their intervals."""
+    """The valve with its dead zones, then delay, lag and gains, at the ends of their intervals."""
+    largest = {name: max((getattr(x, name) for x in (low, high)), key=abs) for name in GAINS}
     return {
         "dead zones narrow": replace(valve, d_p=low.d_p, d_n=low.d_n),
         "dead zones wide": replace(valve, d_p=high.d_p, d_n=high.d_n),
-        "delay, lag and gains high": replace(
-            valve, delay=high.delay, lag=high.lag, g_p=high.g_p, g_n=high.g_n
-        ),
+        SLOW_END: replace(valve, delay=high.delay, lag=high.lag, **largest),
     }

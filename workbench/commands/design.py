@@ -135,10 +135,14 @@ def command(
     from workbench.steps.present import with_card
 
     if is_velocity_model(model_file):
+        refused = [name for name in ROBUST_ONLY if name != "overshoot"]
         refuse_for_velocity(
-            *ROBUST_ONLY, "poles", "auxiliary", "source", "robust", "probability", "card", "effects"
+            *refused, "poles", "auxiliary", "source", "robust", "probability", "card", "effects"
         )
-        return _velocity(model_file, (modulus, delay), integrator, design_period, as_json, out)
+        return _velocity(
+            model_file, Limits(modulus, delay, overshoot=overshoot), (integrator, design_period),
+            as_json, out,
+        )  # fmt: skip
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
@@ -187,10 +191,10 @@ def _nominal(
 
 
 def _velocity(
-    model_file: Path, least: tuple[float, float], integrator: bool, period: float | None,
-    as_json: bool, out: Path | None,
+    model_file: Path, limits: "Limits", loop: tuple[bool, float | None], as_json: bool,
+    out: Path | None,
 ) -> int:  # fmt: skip
-    """The same of a rig whose velocity follows the command; least: modulus and delay margin."""
+    """The same of a rig whose velocity follows the command; loop: integrator, and period [s]."""
     from workbench.documents.velocity import read_velocity_model, velocity_document
     from workbench.report.next_steps import looked_over
     from workbench.report.velocity import velocity_design_report, velocity_design_view
@@ -202,9 +206,7 @@ def _velocity(
         refused_with(looked_over(logs, "CARD")),
         OutputFolder("design", out, now=datetime.now()) as folder,
     ):
-        found = design_velocity(
-            model, modulus=least[0], delay=least[1], integrator=integrator, period=period
-        )
+        found = design_velocity(model, limits, integrator=loop[0], period=loop[1])
         document = velocity_document(found)
         folder.write_json("design.json", document)
         folder.write_text("report.html", velocity_design_report(found))

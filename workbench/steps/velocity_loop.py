@@ -8,6 +8,7 @@ import numpy as np
 
 from design.margins import Margins, margins
 from design.valve_loop import (
+    SLOW_END,
     ValveController,
     ValveLoopRun,
     at_edges,
@@ -30,16 +31,17 @@ SETTLED = 15.0  # time constants of the loop, that a step is given
 SHORTEST_STEP = 4.0  # s
 SMOOTH_OF_SPEED = 0.5  # of the fastest speed, that the smooth reference reaches
 SMOOTH_OF_LOOP = 0.1  # of k_p, that it turns with at most
+LESS_OVERSHOOT = 0.7  # of the limit, that a design takes: the integral and the sensor add to it
 NEEDED = ("g_p", "g_n", "d_p", "d_n")
 
 
 def design_velocity(
-    model: VelocityModel, *, modulus: float, delay: float, integrator: bool,
-    period: float | None = None,
-) -> VelocityDesign:  # fmt: skip
+    model: VelocityModel, limits: Limits, *, integrator: bool = True, period: float | None = None
+) -> VelocityDesign:
     """The fastest P or PI position loop that keeps the margins, dead zones compensated.
 
-    modulus [-], delay [periods]: least margins; period: of the loop [s], by default the logs'.
+    They are kept at the slow ends of the model's intervals too. limits: of them modulus [-], delay
+    [periods] and overshoot; period: of the loop [s], by default the logs'.
     Raises NotIdentifiable where gains or dead zones are not told, BadSpecification where no gain
     keeps the margins.
     """
@@ -50,10 +52,13 @@ def design_velocity(
                 f" {model.valve[name].reason}"
             )
     valve, narrow = model.simulated, model.end(low=True)
+    slow = at_edges(valve, narrow, model.end(low=False))[SLOW_END]
     h = period or min(entry.h for entry in model.log)
-    k_p, k_i, found = tuned(
-        valve.delay, valve.lag, h, modulus=modulus, delay_samples=delay, integrator=integrator
-    )
+    k_p, k_i = tuned(
+        slow, h, gain=_gain_over(slow, valve), modulus=limits.modulus, delay_samples=limits.delay,
+        overshoot=LESS_OVERSHOOT * limits.overshoot, integrator=integrator,
+    )  # fmt: skip
+    found = margins(*valve_plant(valve.delay, valve.lag, h), valve_rst(k_p, k_i, h))
     band = SMOOTHED * model.fit.noise_y
     limit = model.rig.control_limit or model.command_peak
     # A dead zone compensated too far makes the loop hunt: the law has the narrow end.
@@ -76,6 +81,11 @@ def design_velocity(
         remarks=tuple(remarks),
         versions=versions(),
     )
+
+
+def _gain_over(plant: Valve, law: ValveController | Valve) -> float:
+    """The plant's gain over the one that the law has, of the way where that is more."""
+    return max(plant.g_p / law.g_p, plant.g_n / law.g_n)
 
 
 def margin_numbers(found: Margins) -> dict[str, float | None]:
@@ -182,10 +192,8 @@ def _figures(
     tracking = float(np.sqrt(np.mean((smooth.y - r)[late] ** 2))) / amplitude
     limited = float(np.mean(np.abs(smooth.u) >= law.limit))
     A, B = valve_plant(valve.delay, valve.lag, law.h)
-    # Of the loop's gain as the plant has it, not as the law does.
-    ratio = max(valve.g_p / law.g_p, valve.g_n / law.g_n)
     try:
-        found = margins(A, B * ratio, valve_rst(law.k_p, law.k_i, law.h))
+        found = margins(A, _gain_over(valve, law) * B, valve_rst(law.k_p, law.k_i, law.h))
     except BadSpecification:
         found = None
     misses = tuple(_missed(limits, found, law.h, (standstill, tracking, overshoot), limited))
