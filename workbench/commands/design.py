@@ -196,14 +196,13 @@ def _velocity(
 ) -> int:  # fmt: skip
     """The same of a rig whose velocity follows the command; loop: integrator, and period [s]."""
     from workbench.documents.velocity import read_velocity_model, velocity_document
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import without_design
     from workbench.report.velocity import velocity_design_report, velocity_design_view
     from workbench.steps.velocity_loop import design_velocity
 
     model = read_velocity_model(model_file)
-    logs = [entry.file for entry in model.log]
     with (
-        refused_with(looked_over(logs, "CARD")),
+        refused_with(without_design(model, None)),
         OutputFolder("design", out, now=datetime.now()) as folder,
     ):
         found = design_velocity(model, limits, integrator=loop[0], period=loop[1])

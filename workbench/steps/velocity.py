@@ -12,13 +12,11 @@ from identification.log import Log
 from identification.model.estimates import Estimate
 from identification.progress import KeepGoing, without_end
 from identification.velocity.fit import fit
-from identification.velocity.other_kind import body_squares
-from identification.velocity.record import Record, recorded
+from identification.velocity.record import recorded
 from identification.velocity.rivals import (
     STRUCTURES,
     HeldOut,
     Left,
-    clearly_better,
     held_out,
     left_by_valve,
 )
@@ -27,8 +25,7 @@ from workbench.documents.plain import as_number
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
 from workbench.documents.versions import versions
 from workbench.logs.sources import Source, Sources
-
-MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
+from workbench.steps.other_kind import looks_like_friction
 
 
 @dataclass(frozen=True)
@@ -116,47 +113,6 @@ def _entry(source: Source) -> VelocityLog:
         h=log.h,
         travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
         command_peak=float(np.max(np.abs(log["u"]))),
-    )
-
-
-def looks_like_friction(record: Record, held: HeldOut) -> tuple[str, ...]:
-    """A line where a body that the command accelerates against friction predicts held-out windows
-    clearly better than the valve."""
-    if sum(len(run.y) for run in record.runs) > MOST_COMPARED:
-        return ()
-    body = body_squares(record)
-    if not clearly_better(body, held.long)[0]:
-        return ()
-    return (
-        'the log looks like kind = "motor": a body that the command accelerates against friction'
-        f" predicts 2 s of held-out position within {np.sqrt(np.mean(body)):.3g}, the valve within"
-        f" {held.rms[0]:.3g} (rms, SI)",
-    )
-
-
-def looks_like_velocity(logs: Sequence[Log], left: Array | None) -> tuple[str, ...]:
-    """A line where the velocity follows the command: the few numbers of such a rig predict 2 s of
-    held-out position clearly better than friction does.
-
-    left: mean square errors [m²] of the friction model in the same windows, None where it follows
-    none; the body of six numbers stands in for it then.
-    """
-    if not all("u" in log for log in logs) or sum(map(len, logs)) > MOST_COMPARED:
-        return ()
-    try:
-        record = recorded(logs)
-        found = fit(record)
-        told(record, found, units("linear", "1"))
-    except (BadLog, ArithmeticError, ValueError):
-        return ()
-    held = held_out(record, found.valve, found.free, None)
-    others = body_squares(record) if left is None else left
-    if not clearly_better(held.long, others)[0]:
-        return ()
-    return (
-        'the log looks like kind = "velocity": the velocity follows the command (dead zone, gain,'
-        f" delay, lag), which predicts 2 s of held-out position within {held.rms[0]:.3g}, friction"
-        f" within {np.sqrt(np.mean(others)):.3g} (rms, SI); set it under [rig] of the card",
     )
 
 

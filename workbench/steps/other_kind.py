@@ -1,0 +1,91 @@
+"""Which kind of rig a log looks like, where it is taken for another one."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import UserError
+from identification.log import Log, Rig
+from identification.velocity.fit import fit
+from identification.velocity.other_kind import body_squares
+from identification.velocity.record import WINDOW, Record, recorded
+from identification.velocity.rivals import HeldOut, clearly_better, held_out
+from identification.velocity.told import told, units
+from workbench.documents.model import Model
+from workbench.steps.predict import predict
+
+MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
+
+
+def looks_like_friction(record: Record, held: HeldOut) -> tuple[str, ...]:
+    """A line where a body that the command accelerates against friction predicts held-out windows
+    clearly better than the valve."""
+    if sum(len(run.y) for run in record.runs) > MOST_COMPARED:
+        return ()
+    body = body_squares(record)
+    if not clearly_better(body, held.long)[0]:
+        return ()
+    return (
+        'the log looks like kind = "motor": a body that the command accelerates against friction'
+        f" predicts 2 s of held-out position within {_rms(body)}, the valve within"
+        f" {_rms(held.long)} (rms, SI)",
+    )
+
+
+def looks_like_velocity(
+    logs: Sequence[Log], rig: Rig, model: Model | None = None
+) -> tuple[str, ...]:
+    """A line where the velocity follows what is taken for the force: a valve's few numbers predict
+    2 s of held-out position clearly better than friction does.
+
+    model: with friction, of the same logs; the valve has to be better than it, and than a body of
+    six numbers. Only where the force is the command itself, or nothing else is logged.
+    """
+    commanded = _commanded(logs, rig)
+    if not commanded or sum(map(len, logs)) > MOST_COMPARED:
+        return ()
+    try:
+        record = recorded(commanded)
+        found = fit(record)
+        told(record, found, units(rig.motion, "1"))
+    except UserError:
+        return ()
+    held = held_out(record, found.valve, found.free, None)
+    friction = [body_squares(record)]
+    if model is not None:
+        friction += _left_by_friction(model, logs, record)
+    if not all(clearly_better(held.long, one)[0] for one in friction):
+        return ()
+    best = min(friction, key=np.mean)
+    return (
+        'the log looks like kind = "velocity": the velocity follows the command (dead zone, gain,'
+        f" delay, lag), which predicts 2 s of held-out position within {_rms(held.long)}, friction"
+        f" within {_rms(best)} (rms, SI); set it under [rig] of the card",
+    )
+
+
+def _commanded(logs: Sequence[Log], rig: Rig) -> list[Log]:
+    """The logs with the command in `u`; none where the force is another signal than the command."""
+    if rig.kind == "motor":
+        return list(logs)
+    if rig.kind != "force" or any("u" in log or "F" not in log for log in logs):
+        return []
+    return [log.with_signals(u=log["F"]) for log in logs]
+
+
+def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list[Array]:
+    """Mean square errors [m²] of the model with friction in the windows of the record, which start
+    anew each; none where it cannot be run."""
+    try:
+        runs = [predict(model, log, window=WINDOW) for log in logs]
+    except UserError:
+        return []
+    errors = tuple(one.position_measured - one.position_simulated for one in runs)
+    rows = [one for part in record.split(errors, WINDOW) for one in part]
+    squares = np.array([np.mean((one - one[0]) ** 2) for one in rows])
+    return [squares] if np.all(np.isfinite(squares)) else []
+
+
+def _rms(squares: Array) -> str:
+    return f"{np.sqrt(np.mean(squares)):.3g}"
