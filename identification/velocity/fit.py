@@ -159,7 +159,8 @@ def _jackknife(errors: Array, slopes: Array, weight: Array, sizes: Sequence[int]
     multi-stage samples (the jackknife of clusters).
     """
     borders = np.cumsum([0, *sizes])
-    unit = np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+    unit = np.linalg.norm(slopes, axis=0)
+    unit[unit == 0.0] = 1.0  # of a number that changes nothing
     scaled = slopes / unit
     whole = scaled.T @ (weight[:, np.newaxis] * scaled)
     size, ways = np.linalg.eigh(whole)

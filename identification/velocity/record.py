@@ -16,6 +16,7 @@ from identification.velocity.model import Valve, moved
 WINDOW = 2.0  # s, over which a position is predicted
 SHORT_WINDOW = 0.2  # s, the same
 RUN_IN = 1.0  # s at the start of a log, in which commands act that were given before it
+MOST_FOLDS = 5
 FEWEST_WINDOWS = 4  # of all logs, below which no error of them is told
 
 

@@ -16,9 +16,8 @@ from identification.progress import KeepGoing, without_end
 from identification.thresholds import CARRIES, CHANCE_LEVEL, SHOWN_FROM
 from identification.velocity.fit import ValveFit, fit, refined
 from identification.velocity.model import Valve
-from identification.velocity.record import SHORT_WINDOW, WINDOW, Record, folds
+from identification.velocity.record import MOST_FOLDS, SHORT_WINDOW, WINDOW, Record, folds
 
-MOST_FOLDS = 5
 FEWEST_FOLDS = 2
 Verdict = Literal["none", "effect", "inseparable", "unknown"]
 

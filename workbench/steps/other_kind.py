@@ -8,6 +8,7 @@ from identification.arrays import Array
 from identification.errors import UserError
 from identification.log import Log, Rig
 from identification.velocity.fit import fit
+from identification.velocity.model import Valve
 from identification.velocity.other_kind import body_squares
 from identification.velocity.record import WINDOW, Record, recorded
 from identification.velocity.rivals import HeldOut, clearly_better, held_out
@@ -18,12 +19,12 @@ from workbench.steps.predict import predict
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
 
 
-def looks_like_friction(record: Record, held: HeldOut) -> tuple[str, ...]:
+def looks_like_friction(record: Record, valve: Valve, held: HeldOut) -> tuple[str, ...]:
     """A line where a body that the command accelerates against friction predicts held-out windows
     clearly better than the valve."""
     if sum(len(run.y) for run in record.runs) > MOST_COMPARED:
         return ()
-    body = body_squares(record)
+    body = body_squares(record, valve)
     if not clearly_better(body, held.long)[0]:
         return ()
     return (
@@ -40,7 +41,7 @@ def looks_like_velocity(
     2 s of held-out position clearly better than friction does.
 
     model: with friction, of the same logs; the valve has to be better than it, and than a body of
-    six numbers. Only where the force is the command itself, or nothing else is logged.
+    seven numbers. Only where the force is the command itself, or nothing else is logged.
     """
     commanded = _commanded(logs, rig)
     if not commanded or sum(map(len, logs)) > MOST_COMPARED:
@@ -52,10 +53,11 @@ def looks_like_velocity(
     except UserError:
         return ()
     held = held_out(record, found.valve, found.free, None)
-    friction = [body_squares(record)]
-    if model is not None:
-        friction += _left_by_friction(model, logs, record)
-    if not all(clearly_better(held.long, one)[0] for one in friction):
+    friction = [] if model is None else _left_by_friction(model, logs, record)
+    if friction and not clearly_better(held.long, friction[0])[0]:
+        return ()
+    friction.append(body_squares(record, found.valve))  # last, as it takes longest
+    if not clearly_better(held.long, friction[-1])[0]:
         return ()
     best = min(friction, key=np.mean)
     return (
