@@ -16,11 +16,11 @@ from identification.arrays import Array
 from identification.errors import BadSpecification
 from identification.velocity.model import SHORTEST_LAG, Valve, flows
 
-DAMPED = 6.0  # k_p T_i: the integral's time over the loop's
+INTEGRAL_OVER_LOOP = 6.0  # k_p T_i: the integral's time over the loop's
 HALVINGS = 40
-GAINS = ("g_p", "g_n")
+BOTH_GAINS = ("g_p", "g_n")
 SLOW_END = "delay, lag, gains high"
-SETTLES, LONGEST_STEP = 8.0, 20_000  # time constants and periods of a step response
+SETTLES, LONGEST_RESPONSE = 8.0, 20_000  # time constants and periods of a step response
 NEAR = 10.0  # bands from the target, within which the integral works
 
 
@@ -106,7 +106,9 @@ def tuned(
 
     def keeps(k_p: float) -> bool:
         try:
-            found = margins(A, B, valve_rst(k_p, k_p**2 / DAMPED if integrator else 0.0, h))
+            found = margins(
+                A, B, valve_rst(k_p, k_p**2 / INTEGRAL_OVER_LOOP if integrator else 0.0, h)
+            )
         except BadSpecification:
             return False
         slow = found.delay_s is None or found.delay_s >= delay_samples * h
@@ -122,13 +124,13 @@ def tuned(
     for _ in range(HALVINGS):
         middle = float(np.sqrt(low * high))
         low, high = (middle, high) if keeps(middle) else (low, middle)
-    return low, low**2 / DAMPED if integrator else 0.0
+    return low, low**2 / INTEGRAL_OVER_LOOP if integrator else 0.0
 
 
 def step_overshoot(A: Array, B: Array, k_p: float) -> float:
     """Overshoot of the position's step, relative to it, under k_p [1/s] alone."""
     dies = int(np.ceil(SETTLES / (1.0 - float(np.max(np.abs(np.roots(add(A, k_p * B))))))))
-    y = lfilter(k_p * B, add(A, k_p * B), np.ones(min(dies, LONGEST_STEP)))
+    y = lfilter(k_p * B, add(A, k_p * B), np.ones(min(dies, LONGEST_RESPONSE)))
     return float(np.max(y)) - 1.0
 
 
@@ -195,7 +197,7 @@ def run_valve_loop(
 
 def at_edges(valve: Valve, low: Valve, high: Valve) -> dict[str, Valve]:
     """The valve with its dead zones, then delay, lag and gains, at the ends of their intervals."""
-    largest = {name: max((getattr(x, name) for x in (low, high)), key=abs) for name in GAINS}
+    largest = {name: max((getattr(x, name) for x in (low, high)), key=abs) for name in BOTH_GAINS}
     return {
         "dead zones narrow": replace(valve, d_p=low.d_p, d_n=low.d_n),
         "dead zones wide": replace(valve, d_p=high.d_p, d_n=high.d_n),

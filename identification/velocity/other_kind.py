@@ -11,11 +11,13 @@ from scipy.optimize import least_squares
 
 from identification.arrays import Array, BoolArray
 from identification.compiled import compiled
-from identification.velocity.fit import LONGEST_DELAY, STANDS_OUT
+from identification.velocity.fit import LATEST_OF_VALVE, OUTSTANDING_FROM
 from identification.velocity.model import Valve
-from identification.velocity.record import MOST_FOLDS, WINDOW, Record, chosen, folds
+from identification.velocity.record import AHEAD, MOST_FOLDS, Record, chosen, folds
 
-SLOPE = 0.05  # s to either side of a window's start, over which its first velocity is measured
+FIRST_SPEED_OVER = (
+    0.05  # s to either side of a window's start, over which its first velocity is measured
+)
 SHORTEST_OF_BODY = 1e-3  # s, of a lag
 STEP_OF_BODY = 1e-4  # of a number's scale
 GAINS_TRIED = (-10.0, -1.0, 1.0, 10.0)
@@ -41,10 +43,10 @@ def _errors(record: Record, x: Array) -> list[Array]:
     f_0, delay."""
     out = []
     for run in record.runs:
-        size, reach = round(WINDOW / run.h), max(1, round(SLOPE / run.h))
+        size, reach = round(AHEAD / run.h), max(1, round(FIRST_SPEED_OVER / run.h))
         late = np.interp(np.arange(len(run.u)) - x[6] / run.h, np.arange(len(run.u)), run.u)
         rows = []
-        for a in run.starts(WINDOW):
+        for a in run.starts(AHEAD):
             v = (run.y[a + reach] - run.y[a - reach]) / (2 * reach * run.h)
             rows.append(run.y[a : a + size] - _slides(late[a : a + size], run.h, v, x[:6]))
         out.append(np.array(rows))
@@ -90,7 +92,7 @@ def _fitted(record: Record, where: BoolArray, starts: Sequence[Array]) -> Array:
     speed = max(float(np.std(np.diff(run.y)) / run.h) for run in record.runs)
     unit = np.array([10.0 * speed / record.u_max, speed, speed, 1.0, 1.0, speed, 0.02])
     low = np.array([-np.inf, 0.0, 0.0, 0.0, 0.0, -np.inf, 0.0])
-    high = np.append(np.full(6, np.inf), LONGEST_DELAY / unit[6])
+    high = np.append(np.full(6, np.inf), LATEST_OF_VALVE / unit[6])
 
     def errors(x: Array) -> Array:
         parts = _errors(record, x * unit)
@@ -105,7 +107,7 @@ def _fitted(record: Record, where: BoolArray, starts: Sequence[Array]) -> Array:
         for _ in range(2):  # the second with the spread that the first leaves
             spread = 1.4826 * float(np.median(np.abs(errors(x)))) + 1e-3 * record.noise
             x = least_squares(
-                errors, x, bounds=(low, high), loss="soft_l1", f_scale=STANDS_OUT * spread,
+                errors, x, bounds=(low, high), loss="soft_l1", f_scale=OUTSTANDING_FROM * spread,
                 max_nfev=30, x_scale=np.maximum(np.abs(x), 0.1), diff_step=[STEP_OF_BODY] * 7,
             ).x  # fmt: skip
         left = float(np.mean(np.abs(errors(x))))

@@ -13,11 +13,11 @@ from identification.signals.differentiate import resolution
 from identification.signals.noise import local_noise
 from identification.velocity.model import Valve, moved
 
-WINDOW = 2.0  # s, over which a position is predicted
-SHORT_WINDOW = 0.2  # s, the same
+AHEAD = 2.0  # s, over which a position is predicted
+SOON = 0.2  # s, the same
 RUN_IN = 1.0  # s at the start of a log, in which commands act that were given before it
 MOST_FOLDS = 5
-FEWEST_WINDOWS = 4  # of all logs, below which no error of them is told
+FEWEST_AHEAD = 4  # of all logs, below which no error of them is told
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,8 @@ class Record:
 
     @cached_property
     def windows(self) -> int:
-        """Windows of `WINDOW` in all runs."""
-        return sum(len(run.starts(WINDOW)) for run in self.runs)
+        """Windows of `AHEAD` in all runs."""
+        return sum(len(run.starts(AHEAD)) for run in self.runs)
 
     def errors(self, valve: Valve) -> tuple[Array, ...]:
         """Measured less predicted position (n,) of each run, up to a constant [m]."""
@@ -67,8 +67,8 @@ class Record:
             out.append(e[run.starts(length)[:, np.newaxis] + np.arange(size)])
         return out
 
-    def squares(self, valve: Valve, length: float = WINDOW) -> Array:
-        """Mean square error [m²] of the position in each window of `WINDOW`, (windows,).
+    def squares(self, valve: Valve, length: float = AHEAD) -> Array:
+        """Mean square error [m²] of the position in each window of `AHEAD`, (windows,).
 
         The position is predicted over `length` [s] from where it is measured to be, then anew.
         """
@@ -76,9 +76,9 @@ class Record:
         out = []
         for run, rows in zip(self.runs, self.split(errors, length), strict=True):
             square = np.mean((rows - rows[:, :1]) ** 2, axis=1)
-            size = run.starts(WINDOW)[:, np.newaxis]
+            size = run.starts(AHEAD)[:, np.newaxis]
             inside = (run.starts(length) >= size) & (
-                run.starts(length) < size + round(WINDOW / run.h)
+                run.starts(length) < size + round(AHEAD / run.h)
             )
             out.append(inside @ square / np.maximum(inside.sum(axis=1), 1))
         return np.concatenate(out)
@@ -93,7 +93,7 @@ class Record:
         """The same with the place in the travel [m], as the valve predicts it in each window."""
         low, span, runs = travel[0], travel[1] - travel[0], list[Run]()
         for run, e in zip(self.runs, self.errors(valve), strict=True):
-            starts = run.starts(WINDOW)
+            starts = run.starts(AHEAD)
             at = np.searchsorted(starts, np.arange(len(run.y)), side="right") - 1
             anchor = e[starts[np.maximum(at, 0)]] if len(starts) else e
             runs.append(replace(run, z=(run.y - e + anchor - low) / span - 0.5))
@@ -112,11 +112,11 @@ def recorded(logs: Sequence[Log]) -> Record:
         max(float(np.max(np.abs(run.u))) for run in runs),
         max(_noise(run.y) for run in runs),
     )
-    if found.windows < FEWEST_WINDOWS:
+    if found.windows < FEWEST_AHEAD:
         last = sum(log.duration for log in logs)
         raise NotIdentifiable(
-            f"{runs[0].name}: lasts {last:.3g} s, at least {FEWEST_WINDOWS * WINDOW + RUN_IN:g} s"
-            f" needed ({FEWEST_WINDOWS} windows of {WINDOW:g} s); log for longer"
+            f"{runs[0].name}: lasts {last:.3g} s, at least {FEWEST_AHEAD * AHEAD + RUN_IN:g} s"
+            f" needed ({FEWEST_AHEAD} windows of {AHEAD:g} s); log for longer"
         )
     if not any(np.ptp(run.u) > 0.0 for run in runs):
         raise NotIdentifiable(
@@ -138,5 +138,5 @@ def folds(record: Record, count: int) -> IntArray:
 
 def chosen(record: Record, where: BoolArray) -> tuple[BoolArray, ...]:
     """The windows of each run among those `where` (windows,)."""
-    counts = np.cumsum([len(run.starts(WINDOW)) for run in record.runs])[:-1]
+    counts = np.cumsum([len(run.starts(AHEAD)) for run in record.runs])[:-1]
     return tuple(np.split(where, counts))

@@ -31,6 +31,10 @@ ROBUST_ONLY = (
     "draws", "probability", "staircase", "standstill", "tracking", "overshoot", "force", "machine",
     "where", "seed",
 )  # fmt: skip
+NOT_FOR_VELOCITY = (
+    *(name for name in ROBUST_ONLY if name != "overshoot"),
+    "robust", "poles", "auxiliary", "source", "card", "effects",
+)  # fmt: skip
 
 
 @click.command(
@@ -135,14 +139,9 @@ def command(
     from workbench.steps.present import with_card
 
     if is_velocity_model(model_file):
-        refused = [name for name in ROBUST_ONLY if name != "overshoot"]
-        refuse_for_velocity(
-            *refused, "poles", "auxiliary", "source", "robust", "probability", "card", "effects"
-        )
-        return _velocity(
-            model_file, Limits(modulus, delay, overshoot=overshoot), (integrator, design_period),
-            as_json, out,
-        )  # fmt: skip
+        refuse_for_velocity(*NOT_FOR_VELOCITY)
+        asked_of = Limits(modulus, delay, overshoot=overshoot)
+        return _velocity(model_file, asked_of, (integrator, design_period), as_json, out)
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)

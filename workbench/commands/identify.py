@@ -70,7 +70,6 @@ def command(
     from workbench.steps.identify_sources import Options, identify_sources
 
     if card_of_velocity(card):
-        refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
         _velocity(logs, card, budget, as_json, out)
         return
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
@@ -111,6 +110,7 @@ def _velocity(
 ) -> None:
     """The same of a rig whose velocity follows the command."""
     begun = time.monotonic()
+    refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
     from workbench.documents.velocity import velocity_document
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over

@@ -29,7 +29,7 @@ def read_result(path: Path, kind: type[Value], schema: str) -> Value:
         raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a {schema} file")
     found = raw.get("schema")
     if found != schema:
-        if isinstance(found, str) and found.startswith("velocity-"):
+        if str(found).startswith("velocity-") and not schema.startswith("velocity-"):
             raise BadModel(
                 f'{path}: of a rig of kind = "velocity", for which this is not offered; there are'
                 f" {OFFERED_FOR_VELOCITY}"

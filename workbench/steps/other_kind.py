@@ -10,7 +10,7 @@ from identification.log import Log, Rig
 from identification.velocity.fit import fit
 from identification.velocity.model import Valve
 from identification.velocity.other_kind import body_squares
-from identification.velocity.record import WINDOW, Record, recorded
+from identification.velocity.record import AHEAD, Record, recorded
 from identification.velocity.rivals import HeldOut, clearly_better, held_out
 from identification.velocity.told import told, units
 from workbench.documents.model import Model
@@ -80,11 +80,11 @@ def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list
     """Mean square errors [m²] of the model with friction in the windows of the record, which start
     anew each; none where it cannot be run."""
     try:
-        runs = [predict(model, log, window=WINDOW) for log in logs]
+        runs = [predict(model, log, window=AHEAD) for log in logs]
     except UserError:
         return []
     errors = tuple(one.position_measured - one.position_simulated for one in runs)
-    rows = [one for part in record.split(errors, WINDOW) for one in part]
+    rows = [one for part in record.split(errors, AHEAD) for one in part]
     squares = np.array([np.mean((one - one[0]) ** 2) for one in rows])
     return [squares] if np.all(np.isfinite(squares)) else []
 
