@@ -18,9 +18,9 @@ from identification.progress import KeepGoing, without_end
 from identification.velocity.model import NUMBERS, Valve, lagged
 from identification.velocity.record import AHEAD, Record, Run, chosen
 
-LATEST_OF_VALVE = 0.5  # s
+LONGEST_DEADTIME = 0.5  # s
 SCANNED_LAGS = (0.005, 0.03, 0.1, 0.3)  # s, that are scanned
-LONGEST_LAG_OF_VALVE = 20.0  # s; as long, the command sets the acceleration
+LONGEST_FOLLOWING = 20.0  # s; as long, the command sets the acceleration
 WIDEST_ZONE = 0.95  # of the largest command
 SCANNED_ZONES = 12  # dead zones scanned each way
 SCANNED_STEP = 0.02  # s between scanned delays
@@ -29,7 +29,7 @@ STARTS = 3
 STEP_OF_SLOPE = 1e-4  # of a number's scale
 OPEN_WAY = 1e-9  # of the largest curvature, below which numbers are not told from each other
 LOADED = 1e-3  # part of a number in such a combination
-OUTSTANDING_FROM = 3.0  # deviations, beyond which an error counts as its size
+OUTLYING = 3.0  # deviations, beyond which an error counts as its size
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def bounds_of(record: Record) -> Mapping[str, tuple[float, float]]:
     """Between what each number lies; gains have either sign."""
     zone = (0.0, WIDEST_ZONE * record.u_max)
     return {
-        "d_p": zone, "d_n": zone, "delay": (0.0, LATEST_OF_VALVE), "lag": (0.0, LONGEST_LAG_OF_VALVE),
+        "d_p": zone, "d_n": zone, "delay": (0.0, LONGEST_DEADTIME), "lag": (0.0, LONGEST_FOLLOWING),
         "second_lag": (0.0, 0.98), "lag_other": (-0.95, 20.0),
     }  # fmt: skip
 
@@ -79,7 +79,7 @@ def fit(record: Record, *, keep_going: KeepGoing = without_end) -> ValveFit:
     if best is None:
         raise NotIdentifiable(
             f"{record.runs[0].name}: the position does not follow the command at any delay up to"
-            f" {LATEST_OF_VALVE:g} s; check the columns of the card"
+            f" {LONGEST_DEADTIME:g} s; check the columns of the card"
         )
     return best
 
@@ -119,13 +119,13 @@ def refined(
     for _ in range(2):  # the second with the spread that the first leaves
         spread = max(1.4826 * float(np.median(np.abs(errors(x)))), 1e-3 * record.noise, 1e-12)
         found = least_squares(
-            errors, x, slopes, bounds=(low, high), loss="soft_l1", f_scale=OUTSTANDING_FROM * spread,
+            errors, x, slopes, bounds=(low, high), loss="soft_l1", f_scale=OUTLYING * spread,
             x_scale=1.0, max_nfev=60,
         )  # fmt: skip
         x = found.x
     # A time that is none is left out; a dead zone is not, which a gain may stand in for.
     inside = np.array([n[:2] == "d_" for n in names]) | (x > low + 1e-9) & (x < high - 1e-9)
-    weight = 1.0 / np.sqrt(1.0 + (found.fun / (OUTSTANDING_FROM * spread)) ** 2)
+    weight = 1.0 / np.sqrt(1.0 + (found.fun / (OUTLYING * spread)) ** 2)
     sizes = [rows.shape[1] for rows in _centred(record, valve(x), kept) for _ in rows]
     covariance = np.full((len(x), len(x)), np.nan)
     part = _jackknife(found.fun, slopes(x)[:, inside], weight, sizes)
@@ -181,7 +181,7 @@ def _scanned(record: Record) -> list[Valve]:
     """Starts, best first: of each delay and lag the best dead zones, gains by least squares."""
     zones = np.linspace(0.0, 0.8 * record.u_max, SCANNED_ZONES)
     step = max(SCANNED_STEP, min(run.h for run in record.runs))
-    delays = np.arange(0.0, LATEST_OF_VALVE, step)
+    delays = np.arange(0.0, LONGEST_DEADTIME, step)
     every = max(1, sum(len(run.y) for run in record.runs) // SCANNED_SAMPLES)
     runs = list(enumerate(record.runs))
     target = np.concatenate([_flat(run, run.y[:, np.newaxis], 0, every) for _, run in runs])[:, 0]

@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 
 from identification.arrays import Array, BoolArray
 from identification.compiled import compiled
-from identification.velocity.fit import LATEST_OF_VALVE, OUTSTANDING_FROM
+from identification.velocity.fit import LONGEST_DEADTIME, OUTLYING
 from identification.velocity.model import Valve
 from identification.velocity.record import AHEAD, MOST_FOLDS, Record, chosen, folds
 
@@ -92,7 +92,7 @@ def _fitted(record: Record, where: BoolArray, starts: Sequence[Array]) -> Array:
     speed = max(float(np.std(np.diff(run.y)) / run.h) for run in record.runs)
     unit = np.array([10.0 * speed / record.u_max, speed, speed, 1.0, 1.0, speed, 0.02])
     low = np.array([-np.inf, 0.0, 0.0, 0.0, 0.0, -np.inf, 0.0])
-    high = np.append(np.full(6, np.inf), LATEST_OF_VALVE / unit[6])
+    high = np.append(np.full(6, np.inf), LONGEST_DEADTIME / unit[6])
 
     def errors(x: Array) -> Array:
         parts = _errors(record, x * unit)
@@ -107,7 +107,7 @@ def _fitted(record: Record, where: BoolArray, starts: Sequence[Array]) -> Array:
         for _ in range(2):  # the second with the spread that the first leaves
             spread = 1.4826 * float(np.median(np.abs(errors(x)))) + 1e-3 * record.noise
             x = least_squares(
-                errors, x, bounds=(low, high), loss="soft_l1", f_scale=OUTSTANDING_FROM * spread,
+                errors, x, bounds=(low, high), loss="soft_l1", f_scale=OUTLYING * spread,
                 max_nfev=30, x_scale=np.maximum(np.abs(x), 0.1), diff_step=[STEP_OF_BODY] * 7,
             ).x  # fmt: skip
         left = float(np.mean(np.abs(errors(x))))

@@ -14,7 +14,7 @@ from identification.signals.noise import local_noise
 from identification.velocity.model import Valve, moved
 
 AHEAD = 2.0  # s, over which a position is predicted
-SOON = 0.2  # s, the same
+SHORTLY_AHEAD = 0.2  # s, the same
 RUN_IN = 1.0  # s at the start of a log, in which commands act that were given before it
 MOST_FOLDS = 5
 FEWEST_AHEAD = 4  # of all logs, below which no error of them is told

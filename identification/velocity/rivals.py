@@ -16,7 +16,7 @@ from identification.progress import KeepGoing, without_end
 from identification.thresholds import CARRIES, CHANCE_LEVEL, SHOWN_FROM
 from identification.velocity.fit import ValveFit, fit, refined
 from identification.velocity.model import Valve
-from identification.velocity.record import AHEAD, MOST_FOLDS, SOON, Record, folds
+from identification.velocity.record import AHEAD, MOST_FOLDS, SHORTLY_AHEAD, Record, folds
 
 FEWEST_FOLDS = 2
 Verdict = Literal["none", "effect", "inseparable", "unknown"]
@@ -94,14 +94,14 @@ def held_out(record: Record, whole: Valve, free: Sequence[str], test: Record | N
     the fit to the rest starts at `whole`.
     """
     if test is not None:
-        return HeldOut(test.squares(whole, AHEAD), test.squares(whole, SOON))
+        return HeldOut(test.squares(whole, AHEAD), test.squares(whole, SHORTLY_AHEAD))
     count = max(FEWEST_FOLDS, min(MOST_FOLDS, record.windows // 2))
     of = folds(record, count)
     long, short = np.empty(record.windows), np.empty(record.windows)
     for k in range(count):
         valve = refined(record, whole, free, of != k).valve
         long[of == k] = record.squares(valve, AHEAD)[of == k]
-        short[of == k] = record.squares(valve, SOON)[of == k]
+        short[of == k] = record.squares(valve, SHORTLY_AHEAD)[of == k]
     return HeldOut(long, short)
 
 

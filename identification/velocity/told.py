@@ -6,14 +6,16 @@ from dataclasses import asdict
 import numpy as np
 from scipy.stats import t as student
 
+from identification.arrays import BoolArray
 from identification.errors import NotIdentifiable
 from identification.estimation.estimates import NORMAL_95, told_estimate
 from identification.model.estimates import Estimate
+from identification.thresholds import EVENTS_NEEDED
 from identification.velocity.fit import WIDEST_ZONE, ValveFit, bounds_of
 from identification.velocity.model import NUMBERS, Valve
 from identification.velocity.record import Record
 
-SAMPLES_INSIDE = 10  # of a command in the dead zone, that tell where it ends
+BESIDE_ZONE = 0.05  # of the largest command, that counts as inside: a zone may be none
 WAYS = {"p": ("positive", 1.0), "n": ("negative", -1.0)}
 
 
@@ -63,6 +65,11 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
     return out
 
 
+def _entries(inside: BoolArray) -> int:
+    """How often a signal is inside for a while."""
+    return int(np.count_nonzero(np.diff(inside.astype(np.int8)) == 1)) + int(inside[0])
+
+
 def _together(name: str, record: Record) -> str:
     """Why a number is not told from another one."""
     if name not in ("g_p", "g_n", "d_p", "d_n"):
@@ -93,13 +100,14 @@ def _silent(name: str, record: Record, valve: Valve) -> str | None:
         )
     if not name.startswith("d_"):
         return None
+    near = BESIDE_ZONE * record.u_max
     inside = sum(
-        int(np.count_nonzero((run.u > -valve.d_n) & (run.u < valve.d_p))) for run in record.runs
+        _entries((run.u > -valve.d_n - near) & (run.u < valve.d_p + near)) for run in record.runs
     )
-    if inside < SAMPLES_INSIDE:
+    if inside < EVENTS_NEEDED:
         return (
-            f"{first}: {inside} samples of the command inside the dead zone, at least"
-            f" {SAMPLES_INSIDE} needed; add slow passages through 0"
+            f"{first}: {inside} passages of the command inside the dead zone, at least"
+            f" {EVENTS_NEEDED} needed; add slow ones through 0"
         )
     return None
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from identification.velocity.rivals import STRUCTURES
+from identification.velocity.rivals import STRUCTURES, is_noise
 from workbench.cards.readable import length, number
 from workbench.ending import Step, step
 from workbench.output import Row, written
@@ -102,7 +102,7 @@ def after_velocity(model: "VelocityModel", logs: Sequence[str], card: str, folde
     """Look for what is missing where more than noise is left; add a run; else design."""
     if any(not model.valve[name].known for name in ("g_p", "g_n", "d_p", "d_n")):
         return step("with a run that tells the rest added", "identify", *logs, "--card", card)
-    if model.fit.position_rms_2s > 2.0 * model.fit.noise_y:
+    if not is_noise(model.fit.position_rms_2s**2, model.fit.noise_y):
         return step("more than noise is left", "trace", *logs, "--card", card)
     return step("a controller for it", "design", folder / "model.json")
 

@@ -32,7 +32,7 @@ SHORTEST_STEP = 4.0  # s
 SMOOTH_OF_SPEED = 0.5  # of the fastest speed, that the smooth reference reaches
 SMOOTH_OF_LOOP = 0.1  # of k_p, that it turns with at most
 LESS_OVERSHOOT = 0.7  # of the limit, that a design takes: the integral and the sensor add to it
-NEEDED_OF_VALVE = ("g_p", "g_n", "d_p", "d_n")
+DESIGN_NEEDS = ("g_p", "g_n", "d_p", "d_n")
 
 
 def design_velocity(
@@ -45,7 +45,7 @@ def design_velocity(
     Raises NotIdentifiable where gains or dead zones are not told, BadSpecification where no gain
     keeps the margins.
     """
-    for name in NEEDED_OF_VALVE:
+    for name in DESIGN_NEEDS:
         if not model.valve[name].known:
             raise NotIdentifiable(
                 f"{name} is not told, without which there is no dead zone to compensate:"
@@ -102,7 +102,7 @@ def _numbers(law: ValveController, model: VelocityModel) -> dict[str, Estimate]:
     position = "rad" if model.rotary else "m"
     unit = {
         "k_p": "1/s", "k_i": "1/s^2", "h": "s", "smooth": f"{position}/s", "band": position,
-        "limit": model.rig.command_unit, **{name: model.valve[name].unit for name in NEEDED_OF_VALVE},
+        "limit": model.rig.command_unit, **{name: model.valve[name].unit for name in DESIGN_NEEDS},
     }  # fmt: skip
     return {name: Estimate(value, unit[name]) for name, value in asdict(law).items()}
 

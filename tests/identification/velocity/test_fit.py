@@ -95,6 +95,15 @@ def test_a_command_that_jumps_over_the_dead_zone_does_not_tell_it() -> None:
     assert "inside the dead zone" in str(found["d_p"].reason)
 
 
+@pytest.mark.parametrize(("passages", "known"), [(2, False), (3, True)])
+def test_so_many_passages_tell_a_dead_zone(passages: int, known: bool) -> None:
+    u = np.sign(np.sin(T)) * (2.5 + 1.5 * np.sin(7.0 * T) ** 2)
+    u[0] = 2.0
+    for k in range(passages):
+        u[400 + 500 * k : 500 + 500 * k] = 3.0 * np.sin(np.linspace(-1.5, 1.5, 100))
+    assert found_in(made(54, u=u))["d_p"].known == known
+
+
 @pytest.mark.parametrize(
     ("log", "said"),
     [
