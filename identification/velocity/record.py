@@ -17,6 +17,7 @@ AHEAD = 2.0  # s, over which a position is predicted
 SHORTLY_AHEAD = 0.2  # s, the same
 RUN_IN = 1.0  # s at the start of a log, in which commands act that were given before it
 MOST_FOLDS = 5
+SLOWEST_PERIOD = 0.2  # s, of which a window has ten
 FEWEST_AHEAD = 4  # of all logs, below which no error of them is told
 
 
@@ -103,9 +104,15 @@ class Record:
 def recorded(logs: Sequence[Log]) -> Record:
     """The record of logs on an even clock, with position `y` and command `u`.
 
-    Raises BadLog where a signal is missing, NotIdentifiable where they are too short, or the
-    command never changes.
+    Raises BadLog where a signal is missing, NotIdentifiable where they are too short, sampled too
+    slowly, or the command never changes.
     """
+    for log in logs:
+        if log.h > SLOWEST_PERIOD:
+            raise NotIdentifiable(
+                f"{log.name}: sampled every {log.h:.3g} s, at most {SLOWEST_PERIOD:g} s needed to"
+                " see how the velocity follows the command; log faster"
+            )
     runs = tuple(Run(log.name, log["y"], log["u"], log.h) for log in logs)
     found = Record(
         runs,

@@ -13,13 +13,14 @@ from identification.velocity.other_kind import body_squares
 from identification.velocity.record import AHEAD, Record, recorded
 from identification.velocity.rivals import HeldOut, clearly_better, held_out
 from identification.velocity.told import told, units
+from workbench.cards.readable import length
 from workbench.documents.model import Model
 from workbench.steps.predict import predict
 
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
 
 
-def looks_like_friction(record: Record, valve: Valve, held: HeldOut) -> tuple[str, ...]:
+def looks_like_friction(record: Record, valve: Valve, held: HeldOut, rig: Rig) -> tuple[str, ...]:
     """A line where a body that the command accelerates against friction predicts held-out windows
     clearly better than the valve."""
     if sum(len(run.y) for run in record.runs) > MOST_COMPARED:
@@ -29,8 +30,8 @@ def looks_like_friction(record: Record, valve: Valve, held: HeldOut) -> tuple[st
         return ()
     return (
         'the log looks like kind = "motor": a body that the command accelerates against friction'
-        f" predicts 2 s of held-out position within {_rms(body)}, the valve within"
-        f" {_rms(held.long)} (rms, SI)",
+        f" predicts 2 s of held-out position within {_rms(body, rig)}, the valve within"
+        f" {_rms(held.long, rig)} rms",
     )
 
 
@@ -62,8 +63,8 @@ def looks_like_velocity(
     best = min(friction, key=np.mean)
     return (
         'the log looks like kind = "velocity": the velocity follows the command (dead zone, gain,'
-        f" delay, lag), which predicts 2 s of held-out position within {_rms(held.long)}, friction"
-        f" within {_rms(best)} (rms, SI); set it under [rig] of the card",
+        f" delay, lag), which predicts 2 s of held-out position within {_rms(held.long, rig)}, friction"
+        f" within {_rms(best, rig)} rms; set it under [rig] of the card",
     )
 
 
@@ -89,5 +90,5 @@ def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list
     return [squares] if np.all(np.isfinite(squares)) else []
 
 
-def _rms(squares: Array) -> str:
-    return f"{np.sqrt(np.mean(squares)):.3g}"
+def _rms(squares: Array, rig: Rig) -> str:
+    return length(float(np.sqrt(np.mean(squares))), rig.motion == "rotary")

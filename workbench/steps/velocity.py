@@ -50,7 +50,7 @@ def identify_velocity(sources: Sources, *, keep_going: KeepGoing = without_end) 
     found = fit(record, keep_going=keep_going)
     numbers = told(record, found, _units(sources))
     held = held_out(record, found.valve, found.free, None)
-    other = looks_like_friction(record, found.valve, held) if keep_going() else ()
+    other = looks_like_friction(record, found.valve, held, sources.rig) if keep_going() else ()
     return _model(sources, numbers, held, record.noise, other)
 
 
