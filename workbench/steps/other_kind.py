@@ -63,8 +63,8 @@ def looks_like_velocity(
     best = min(friction, key=np.mean)
     return (
         'the log looks like kind = "velocity": the velocity follows the command (dead zone, gain,'
-        f" delay, lag), which predicts 2 s of held-out position within"
-        f" {_rms(held.long, rig)}, friction within {_rms(best, rig)} rms; set it under [rig] of the card",
+        f" delay, lag), which predicts 2 s of held-out position within {_rms(held.long, rig)},"
+        f" friction within {_rms(best, rig)} rms; set it under [rig] of the card",
     )
 
 
