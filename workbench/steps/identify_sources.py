@@ -77,7 +77,7 @@ def identify_sources(
     if walk is not None:
         model = replace(model, posterior=_posterior(walk, fit))
     remarks = (
-        *(looks_like_velocity(logs, sources.rig, model) if keep_going() else ()),
+        *looks_like_velocity(logs, sources.rig, model),
         *surrounding_lines(fit.surroundings, sources.rig),
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip

@@ -17,6 +17,7 @@ from workbench.cards.readable import length
 from workbench.documents.model import Model
 from workbench.steps.predict import predict
 
+COMPARED_EVERY = 0.01  # s, which is enough to tell a kind by and takes a second or two
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
 
 
@@ -45,10 +46,10 @@ def looks_like_velocity(
     seven numbers. Only where the force is the command itself, or nothing else is logged.
     """
     commanded = _commanded(logs, rig)
-    if not commanded or sum(map(len, logs)) > MOST_COMPARED:
+    if not commanded:
         return ()
     try:
-        record = recorded(commanded)
+        record = recorded([_slower(log) for log in commanded])
         found = fit(record)
         told(record, found, units(rig.motion, "1"))
     except UserError:
@@ -77,6 +78,20 @@ def _commanded(logs: Sequence[Log], rig: Rig) -> list[Log]:
     return [log.with_signals(u=log["F"]) for log in logs]
 
 
+def _every(log: Log) -> int:
+    """Every so manieth sample is compared."""
+    return max(1, round(COMPARED_EVERY / log.h))
+
+
+def _slower(log: Log) -> Log:
+    """The log at the samples compared, its command the mean until the next one."""
+    k = _every(log)
+    count = len(log) // k
+    mean = log["u"][: count * k].reshape(count, k).mean(axis=1)
+    taken = {name: log[name][: count * k : k] for name in ("t", "y")}
+    return Log(log.name, {**taken, "u": mean})
+
+
 def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list[Array]:
     """Mean square errors [m²] of the model with friction in the windows of the record, which start
     anew each; none where it cannot be run."""
@@ -84,7 +99,10 @@ def _left_by_friction(model: Model, logs: Sequence[Log], record: Record) -> list
         runs = [predict(model, log, window=AHEAD) for log in logs]
     except UserError:
         return []
-    errors = tuple(one.position_measured - one.position_simulated for one in runs)
+    errors = tuple(
+        (one.position_measured - one.position_simulated)[:: _every(log)]
+        for one, log in zip(runs, logs, strict=True)
+    )
     rows = [one for part in record.split(errors, AHEAD) for one in part]
     squares = np.array([np.mean((one - one[0]) ** 2) for one in rows])
     return [squares] if np.all(np.isfinite(squares)) else []
