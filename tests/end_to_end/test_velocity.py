@@ -118,6 +118,7 @@ def test_one_direction_carries_no_design(folder: Path, capsys: pytest.CaptureFix
         (("experiment", "m/model.json"), "this is not offered"),
         (("export", "d/design.json", "--to", "c"), "this is not offered"),
         (("simulate", "card.toml"), "has no friction"),
+        (("predict", "m/model.json", "a.csv", "--card", "motor.toml"), '"velocity" needed here'),
         (
             ("predict", "m/model.json", "a.csv", "--card", "card.toml", "--drive", "force"),
             "--drive",

@@ -53,8 +53,8 @@ class Recorded:
 def read_sources(names: Sequence[str], card_name: str, *, velocity: bool = False) -> Sources:
     """The runs of the log files `names`, each a path or a file of the card's set.
 
-    velocity: whether a rig whose velocity follows the command is taken too. Raises BadCard, BadLog;
-    also where the files are of different machines or one is named twice.
+    velocity: a rig whose velocity follows the command is taken, and no other. Raises BadCard,
+    BadLog; also where the files are of different machines or one is named twice.
     """
     card = load_card(card_path(card_name), with_recipe=False)
     return sources_of(names, card, velocity=velocity)
@@ -94,6 +94,11 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
                 f"{path.name}: the card gives it another rig than {first.name}; identify machines"
                 " one by one"
             )
+    if velocity and rigs[first].kind != "velocity":
+        raise BadLog(
+            f'{first.name}: the card {card.path} says kind = "{rigs[first].kind}",'
+            ' "velocity" needed here; give the card of that machine'
+        )
     remarks.extend(log_remarks([run.log for run in runs], rigs[first], card.signals))
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 
