@@ -11,7 +11,7 @@ import numpy as np
 from identification.arrays import Array, frozen
 from identification.errors import BadLog
 
-RigKind = Literal["electro-pneumatic", "force", "motor"]
+RigKind = Literal["electro-pneumatic", "force", "motor", "velocity"]
 
 
 @dataclass(frozen=True)

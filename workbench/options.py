@@ -112,6 +112,19 @@ def effects_option(command: Command) -> Command:
     )(command)
 
 
+def refuse_for_velocity(*options: str) -> None:
+    """Raises a usage error where one of these options, by the names of their values, is given: they
+    have no meaning for a rig whose velocity follows the command."""
+    context = click.get_current_context()
+    for option in context.command.params:
+        given = context.get_parameter_source(option.name or "")
+        if option.name in options and given is click.core.ParameterSource.COMMANDLINE:
+            raise click.UsageError(
+                f'{option.opts[0]} has no meaning for a rig of kind = "velocity"; leave it out.',
+                context,
+            )
+
+
 def registry_option(command: Command) -> Command:
     """The option `--registry`, where the registry is, as `where`."""
     return click.option(

@@ -216,9 +216,9 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     highest = int(min(2.0 * HIGHEST, 2.0 * np.pi / (speed * longest)))
     if highest < 2:
         return None
-    every = np.ones(sum(map(len, b)), dtype=bool)
+    counts: BoolArray = np.ones(sum(map(len, b)), dtype=bool)
     return _Turning(
-        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), every, highest
+        np.concatenate(b), np.vstack(X), np.concatenate(block), tuple(angles), counts, highest
     )  # fmt: skip
 
 

@@ -342,8 +342,11 @@ def applied_force(log: Log, rig: Rig) -> Array | None:
     """The applied force F_e [N] by the rig's kind, shape (n,); `None` where the rig cannot tell.
 
     "electro-pneumatic": S_p P_p - S_n P_n - (S_p - S_n) P_s. "force": F, plus S_p P_p and minus
-    S_n P_n for each chamber whose area and pressure are known. "motor": k_a u. Source: eq. (7).
+    S_n P_n for each chamber whose area and pressure are known. "motor": k_a u. "velocity": none.
+    Source: eq. (7).
     """
+    if rig.kind == "velocity":
+        return None
     if rig.kind == "motor":
         return None if rig.force_per_command is None else rig.force_per_command * log["u"]
     S_p, S_n = rig.area_p or 0.0, rig.area_n or 0.0

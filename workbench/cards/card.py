@@ -29,7 +29,9 @@ NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
     "electro-pneumatic": ("t", "y", "p_p", "p_n"),
     "force": ("t", "y", "F"),
     "motor": ("t", "y", "u"),
+    "velocity": ("t", "y", "u"),
 }
+OFFERED_FOR_VELOCITY = "doctor, identify, trace, predict, design and validate"
 
 
 _OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
@@ -56,6 +58,19 @@ class Card:
     def name(self) -> str:
         """The set's name, which is also its folder under WORKBENCH_DATA."""
         return self.about.name
+
+    @property
+    def of_velocity(self) -> bool:
+        """Whether the velocity follows the command on any rig of the card."""
+        return any(rig.kind == "velocity" for rig in self.rigs.values())
+
+    def refuse_velocity(self) -> None:
+        """Raises BadCard where the velocity follows the command: there is no friction to find."""
+        if self.of_velocity:
+            raise BadCard(
+                f'{self.path}: [rig] kind = "velocity" has no friction, which this needs; for such'
+                f" a rig there are {OFFERED_FOR_VELOCITY}"
+            )
 
     def rig(self, file: str = "") -> Rig:
         """The rig, with what `[[files]]` says of the file of that name."""

@@ -104,7 +104,7 @@ class RigSection(CardTable):
 
     kind: RigKind
     """how the force on the body is known: from two pressures, logged as F, or as force_per_command
-    times u"""
+    times u; or "velocity", where none is and the velocity follows u (a valve and cylinder)"""
     area_p_m2: Positive | None = None
     """piston area of the chamber that pushes towards +y, m²; with `force` given too, the pressures
     correct F"""
@@ -131,6 +131,10 @@ class RigSection(CardTable):
             for key in ("area_p_m2", "area_n_m2"):
                 if getattr(self, key) is None:
                     raise ValueError(f'kind = "electro-pneumatic" needs {key!r} for eq. (7)')
+        if self.kind == "velocity":
+            for key in ("area_p_m2", "area_n_m2", "supply_pressure_pa", "force_per_command"):
+                if getattr(self, key) is not None:
+                    raise ValueError(f'kind = "velocity" knows no force; leave {key!r} out')
         if self.stroke_m and self.stroke_m[0] >= self.stroke_m[1]:
             raise ValueError("stroke_m must be [low, high]")
         if self.control_limit is not None and self.control_limit_v is not None:
@@ -159,6 +163,8 @@ class RigSection(CardTable):
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
         """The unit of the command's column; a force where none is logged but its limit is told."""
+        if self.kind == "velocity" and "u" in signals and signals["u"].written_gain is None:
+            return signals["u"].unit.strip() or "1"  # as it is: no force is made of it
         if "u" in signals:
             return command_unit(signals["u"].unit, signals["u"].written_gain, self.motion)
         return "V" if self.control_limit is None else force_unit(self.motion)

@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand, refused_with, step
 from workbench.options import (
     POSITIVE,
     Finite,
     effects_option,
     motion_limits,
     present_card_option,
+    refuse_for_velocity,
 )
 from workbench.output import OutputFolder, emit, output_options, progress
 
@@ -29,6 +30,10 @@ if TYPE_CHECKING:
 ROBUST_ONLY = (
     "draws", "probability", "staircase", "standstill", "tracking", "overshoot", "force", "machine",
     "where", "seed",
+)  # fmt: skip
+NOT_FOR_VELOCITY = (
+    *(name for name in ROBUST_ONLY if name != "overshoot"),
+    "robust", "poles", "auxiliary", "source", "card", "effects",
 )  # fmt: skip
 
 
@@ -128,10 +133,15 @@ def command(
     from design.tune import Asked
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
+    from workbench.documents.velocity import is_velocity_model
     from workbench.options import parse_auxiliary, parse_poles
     from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
 
+    if is_velocity_model(model_file):
+        refuse_for_velocity(*NOT_FOR_VELOCITY)
+        asked_of = Limits(modulus, delay, overshoot=overshoot)
+        return _velocity(model_file, asked_of, (integrator, design_period), as_json, out)
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
@@ -177,6 +187,34 @@ def _nominal(
         after_design(found, model_file, asked.dominant is not None, kept),
     )
     return 1 if found.recommended == "none" else 0
+
+
+def _velocity(
+    model_file: Path, limits: "Limits", loop: tuple[bool, float | None], as_json: bool,
+    out: Path | None,
+) -> int:  # fmt: skip
+    """The same of a rig whose velocity follows the command; loop: integrator, and period [s]."""
+    from workbench.documents.velocity import read_velocity_model, velocity_document
+    from workbench.report.next_steps import without_design
+    from workbench.report.velocity import velocity_design_report, velocity_design_view
+    from workbench.steps.velocity_loop import design_velocity
+
+    model = read_velocity_model(model_file)
+    with (
+        refused_with(without_design(model, None)),
+        OutputFolder("design", out, now=datetime.now()) as folder,
+    ):
+        found = design_velocity(model, limits, integrator=loop[0], period=loop[1])
+        document = velocity_document(found)
+        folder.write_json("design.json", document)
+        folder.write_text("report.html", velocity_design_report(found))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: velocity_design_view(found, folder.final),
+        step("the loop in simulation", "validate", model_file, folder.final / "design.json"),
+    )
+    return 0
 
 
 def _only_robust(context: click.Context) -> None:

@@ -9,7 +9,13 @@ import click
 
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
-from workbench.options import POSITIVE, budget_option, card_option, complete_file
+from workbench.options import (
+    POSITIVE,
+    budget_option,
+    card_option,
+    complete_file,
+    refuse_for_velocity,
+)
 from workbench.output import OutputFolder, emit, output_options, progress
 from workbench.steps.stages import IDENTIFY_STAGES
 
@@ -56,13 +62,16 @@ def command(
     """
     begun = time.monotonic()
     from workbench.documents.model_file import model_document
-    from workbench.logs.sources import read_sources
+    from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.options import parse_orders
     from workbench.report.model_tables import model_view
     from workbench.report.next_steps import after_identify, looked_over
     from workbench.report.reports import identification_report
     from workbench.steps.identify_sources import Options, identify_sources
 
+    if card_of_velocity(card):
+        _velocity(logs, card, budget, as_json, out)
+        return
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
     with (
         refused_with(looked_over(logs, card)),
@@ -93,4 +102,34 @@ def command(
         as_json,
         lambda: model_view(found.model, found.remarks, folder.final),
         after_identify(found.model, logs, card, folder.final),
+    )
+
+
+def _velocity(
+    logs: tuple[str, ...], card: str, budget: float, as_json: bool, out: Path | None
+) -> None:
+    """The same of a rig whose velocity follows the command."""
+    begun = time.monotonic()
+    refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
+    from workbench.documents.velocity import velocity_document
+    from workbench.logs.sources import read_sources
+    from workbench.report.next_steps import looked_over
+    from workbench.report.velocity import after_velocity, velocity_model_view, velocity_report
+    from workbench.steps.velocity import identify_velocity
+
+    with (
+        refused_with(looked_over(logs, card)),
+        OutputFolder("identify", out, now=datetime.now()) as folder,
+    ):
+        with progress("identifying", as_json=as_json):
+            sources = read_sources(logs, card, velocity=True)
+            model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)
+        document = velocity_document(model)
+        folder.write_json("model.json", document)
+        folder.write_text("report.html", velocity_report(model))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: velocity_model_view(model, folder.final),
+        after_velocity(model, logs, card, folder.final),
     )

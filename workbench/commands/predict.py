@@ -7,7 +7,13 @@ from typing import Literal
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import POSITIVE, card_option, complete_file, effects_option
+from workbench.options import (
+    POSITIVE,
+    card_option,
+    complete_file,
+    effects_option,
+    refuse_for_velocity,
+)
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
@@ -47,10 +53,15 @@ def command(
     """
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
+    from workbench.documents.velocity import is_velocity_model
     from workbench.logs.sources import read_sources
     from workbench.report.prediction import prediction_view
     from workbench.steps.predict import predict_sources, prediction_csv
 
+    if is_velocity_model(model_file):
+        refuse_for_velocity("drive", "effects")
+        _velocity(model_file, (log, card), window, as_json, out)
+        return
     model = read_model(model_file, library(effects))
     sources = read_sources([log], card)
     with OutputFolder("predict", out, now=datetime.now()) as folder:
@@ -61,4 +72,28 @@ def command(
         {**found.summary, "out": folder.final},
         as_json,
         lambda: prediction_view(found, model.rotary, log, card, folder.final),
+    )
+
+
+def _velocity(
+    model_file: Path, given: tuple[str, str], window: float | None, as_json: bool,
+    out: Path | None,
+) -> None:  # fmt: skip
+    """The same of a rig whose velocity follows the command; given: log and card."""
+    from workbench.documents.velocity import read_velocity_model
+    from workbench.logs.sources import read_sources
+    from workbench.report.velocity import velocity_csv, velocity_prediction_view
+    from workbench.steps.velocity import predict_velocity, prediction_summary
+
+    log, card = given
+    model = read_velocity_model(model_file)
+    sources = read_sources([log], card, velocity=True)
+    with OutputFolder("predict", out, now=datetime.now()) as folder:
+        runs = predict_velocity(model, sources, window)
+        folder.write_text("prediction.csv", velocity_csv(runs))
+    summary = prediction_summary(runs, window)
+    emit(
+        {**summary, "out": folder.final},
+        as_json,
+        lambda: velocity_prediction_view(summary, model.rotary, folder.final),
     )

@@ -48,6 +48,7 @@ def command(
     from workbench.steps.simulate import as_columns, record, truth
 
     card = load_card(card_path(card_name), library(effects))
+    card.refuse_velocity()
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
     with OutputFolder("simulate", out, now=datetime.now()) as folder:

@@ -8,7 +8,13 @@ import click
 
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand, refused_with
-from workbench.options import budget_option, card_option, complete_file, effects_option
+from workbench.options import (
+    budget_option,
+    card_option,
+    complete_file,
+    effects_option,
+    refuse_for_velocity,
+)
 from workbench.output import OutputFolder, emit, output_options, progress
 from workbench.steps.stages import TRACE_STAGES
 
@@ -53,12 +59,16 @@ def command(
     begun = time.monotonic()
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import model_document
-    from workbench.logs.sources import read_sources
+    from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.report.next_steps import looked_over
     from workbench.report.trace import trace_report
     from workbench.report.trace_tables import trace_view
     from workbench.steps.trace import named_logs, trace_document, trace_sources
 
+    if card_of_velocity(card):
+        refuse_for_velocity("effects", "seed")
+        _velocity((logs, tests), card, budget, as_json, out)
+        return
     known = library(effects)
     with (
         refused_with(looked_over([*logs, *tests], card)),
@@ -79,3 +89,36 @@ def command(
         folder.write_json("model.json", model_document(found.model))
         folder.write_text("report.html", trace_report(found))
     emit({**document, "out": folder.final}, as_json, lambda: trace_view(found, folder.final))
+
+
+def _velocity(
+    given: tuple[tuple[str, ...], tuple[str, ...]], card: str, budget: float, as_json: bool,
+    out: Path | None,
+) -> None:  # fmt: skip
+    """The same of a rig whose velocity follows the command; given: logs, held-out logs."""
+    begun = time.monotonic()
+    from workbench.documents.velocity import velocity_document
+    from workbench.logs.sources import read_sources
+    from workbench.report.next_steps import looked_over
+    from workbench.report.velocity import velocity_trace_report, velocity_trace_view
+    from workbench.steps.trace import named_logs
+    from workbench.steps.velocity import trace_velocity, velocity_trace_document
+
+    with (
+        refused_with(looked_over([*given[0], *given[1]], card)),
+        OutputFolder("trace", out, now=datetime.now()) as folder,
+    ):
+        with progress("trace", as_json=as_json):
+            names, held_out = named_logs(*given, card)
+            train = read_sources(names, card, velocity=True)
+            test = read_sources(held_out, card, velocity=True) if held_out else None
+            found = trace_velocity(
+                train, test, keep_going=lambda: time.monotonic() - begun < budget
+            )
+        document = velocity_trace_document(found)
+        folder.write_json("trace.json", document)
+        folder.write_json("model.json", velocity_document(found.model))
+        folder.write_text("report.html", velocity_trace_report(found))
+    emit(
+        {**document, "out": folder.final}, as_json, lambda: velocity_trace_view(found, folder.final)
+    )

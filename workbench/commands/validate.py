@@ -2,12 +2,22 @@
 
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import POSITIVE, effects_option, motion_limits, present_card_option
+from workbench.options import (
+    POSITIVE,
+    effects_option,
+    motion_limits,
+    present_card_option,
+    refuse_for_velocity,
+)
 from workbench.output import OutputFolder, emit, output_options, progress
+
+if TYPE_CHECKING:
+    from workbench.steps.loop_figures import Limits
 
 
 @click.command(
@@ -62,6 +72,7 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.design_read import read_design
     from workbench.documents.model_file import read_model
+    from workbench.documents.velocity import is_velocity_model
     from workbench.report.next_steps import after_validate
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
@@ -69,6 +80,10 @@ def command(
     from workbench.steps.present import with_card
     from workbench.steps.validate import validate, validation_document
 
+    if is_velocity_model(model_file):
+        refuse_for_velocity("force", "card", "effects")
+        limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
+        return _velocity((model_file, design_file, plant_file), limits, seed, as_json, out)
     known = library(effects)
     model, found = with_card(read_model(model_file, known), card), read_design(design_file)
     plant = read_model(plant_file, known) if plant_file else None
@@ -87,3 +102,36 @@ def command(
         after_validate(result, found, model, model_file, plant_file, card),
     )
     return 0 if result.passed else 1
+
+
+def _velocity(
+    files: tuple[Path, Path, Path | None], limits: "Limits", seed: int, as_json: bool,
+    out: Path | None,
+) -> int:  # fmt: skip
+    """The same of a rig whose velocity follows the command; files: model, design, plant."""
+    import numpy as np
+
+    from workbench.documents.velocity import read_velocity_design, read_velocity_model
+    from workbench.report.velocity import (
+        after_velocity_validation,
+        velocity_validation_report,
+        velocity_validation_view,
+    )
+    from workbench.steps.velocity_loop import validate_velocity, velocity_validation_document
+
+    model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
+    plant = read_velocity_model(files[2]) if files[2] else None
+    with OutputFolder("validate", out, now=datetime.now()) as folder:
+        with progress("simulating the loop", as_json=as_json):
+            rng = np.random.default_rng(seed)
+            found = validate_velocity(model, design, rng, limits, plant)
+        document = velocity_validation_document(found)
+        folder.write_json("validation.json", document)
+        folder.write_text("report.html", velocity_validation_report(found))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: velocity_validation_view(found, folder.final),
+        after_velocity_validation(found, files[0]),
+    )
+    return 0 if found.passed else 1

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from identification.errors import BadModel
+from workbench.cards.card import OFFERED_FOR_VELOCITY
 from workbench.cards.nearest import nearest
 from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 from workbench.links import broken_link
@@ -28,6 +29,11 @@ def read_result(path: Path, kind: type[Value], schema: str) -> Value:
         raise BadModel(f"{path}: holds {_shown(raw)}, a JSON object needed; give a {schema} file")
     found = raw.get("schema")
     if found != schema:
+        if str(found).startswith("velocity-") and not schema.startswith("velocity-"):
+            raise BadModel(
+                f'{path}: of a rig of kind = "velocity", for which this is not offered; there are'
+                f" {OFFERED_FOR_VELOCITY}"
+            )
         said = "no 'schema'" if found is None else f"schema {_shown(found)}"
         raise BadModel(f"{path}: {said}, {schema!r} needed; give the file that command writes")
     unknown = _unknown(raw, kind, "")

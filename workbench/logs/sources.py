@@ -50,16 +50,25 @@ class Recorded:
     sha256: str
 
 
-def read_sources(names: Sequence[str], card_name: str) -> Sources:
+def read_sources(names: Sequence[str], card_name: str, *, velocity: bool = False) -> Sources:
     """The runs of the log files `names`, each a path or a file of the card's set.
 
-    Raises BadCard, BadLog; also where the files are of different machines or one is named twice.
+    velocity: a rig whose velocity follows the command is taken, and no other. Raises BadCard,
+    BadLog; also where the files are of different machines or one is named twice.
     """
-    return sources_of(names, load_card(card_path(card_name), with_recipe=False))
+    card = load_card(card_path(card_name), with_recipe=False)
+    return sources_of(names, card, velocity=velocity)
 
 
-def sources_of(logs: Sequence[str | Recorded], card: Card) -> Sources:
+def card_of_velocity(card_name: str) -> bool:
+    """Whether the card is of a rig whose velocity follows the command; raises BadCard."""
+    return load_card(card_path(card_name), with_recipe=False).of_velocity
+
+
+def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = False) -> Sources:
     """As `read_sources`, of a card that is read, and of logs that may be no files."""
+    if not velocity:
+        card.refuse_velocity()
     found: list[tuple[Path, Source]] = []
     remarks, bad = list[str](), list[BadSamples]()
     rigs: dict[Path, Rig] = {}
@@ -85,6 +94,11 @@ def sources_of(logs: Sequence[str | Recorded], card: Card) -> Sources:
                 f"{path.name}: the card gives it another rig than {first.name}; identify machines"
                 " one by one"
             )
+    if velocity and rigs[first].kind != "velocity":
+        raise BadLog(
+            f'{first.name}: the card {card.path} says kind = "{rigs[first].kind}",'
+            ' "velocity" needed here; give the card of that machine'
+        )
     remarks.extend(log_remarks([run.log for run in runs], rigs[first], card.signals))
     return Sources(card, rigs[first], tuple(runs), tuple(remarks), tuple(bad))
 

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from identification.model.karnopp import NAMES
 from identification.remarks import Aside
 from workbench.cards.readable import number
 from workbench.cards.units import si_unit
@@ -90,12 +89,12 @@ def _within(one: Told) -> str:
 def _verdict(found: Examined) -> str:
     if found.refused:
         return "cannot be identified as it is (see refused)"
+    what = "six numbers of the valve" if found.rig.kind == "velocity" else "nine parameters"
     if found.verdict == "nothing":
-        return "tells none of the nine parameters"
-    nine = [one for one in found.told if one.name in NAMES]
-    can = sum(one.can for one in nine)
-    many = "all of" if can == len(nine) else f"{can} of"
-    return f"can be identified; {many} the nine parameters can be told from it"
+        return f"tells none of the {what}"
+    can = sum(one.can for one in found.main)
+    many = "all of" if can == len(found.main) else f"{can} of"
+    return f"can be identified; {many} the {what} can be told from it"
 
 
 def _then(found: Examined) -> str:

@@ -43,17 +43,19 @@ def parameter_rows(model: Model) -> list[Row]:
     found = {**model.friction, **(model.actuator or {})}
     meaning = ROTARY_MEANING if model.rotary else MEANING
     rows: list[Row] = [
-        (name, *_cells(value), meaning.get(name, "")) for name, value in found.items()
+        (name, *estimate_cells(value), meaning.get(name, "")) for name, value in found.items()
     ]
     for key, own in model.effects.items():
         params = {p.name: p for p in known_effect(key, model.library).params}
         rows += [
-            (f"{key.replace('_', ' ')} {name}", *_cells(value), params[name].meaning)
+            (f"{key.replace('_', ' ')} {name}", *estimate_cells(value), params[name].meaning)
             for name, value in own.items()
             if not (params[name].held(used(value)) or is_left_out(params[name], value))
         ]
     if model.lag is not None:
-        rows.append(("lag", *_cells(model.lag), "of the position behind the force of its row"))
+        rows.append(
+            ("lag", *estimate_cells(model.lag), "of the position behind the force of its row")
+        )
     return rows
 
 
@@ -62,7 +64,8 @@ def is_left_out(param: Param, estimate: Estimate) -> bool:
     return param.spare and estimate.value == 0.0 and estimate.sd is None
 
 
-def _cells(estimate: Estimate) -> tuple[str, str, str]:
+def estimate_cells(estimate: Estimate) -> tuple[str, str, str]:
+    """Value, unit, and 95 % interval or why there is none, of a parameter."""
     estimate = as_shown(estimate)
     if estimate.value is None:
         return "-", estimate.unit, f"not identified: {estimate.reason}"

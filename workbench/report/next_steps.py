@@ -11,6 +11,7 @@ from workbench.files import CARD_FILE, shipped_cards
 if TYPE_CHECKING:
     from workbench.documents.design import Controller, Design
     from workbench.documents.model import Model
+    from workbench.documents.velocity import VelocityModel
     from workbench.steps.demo import Demonstration
     from workbench.steps.doctor import Examined
     from workbench.steps.drift import Drifted
@@ -42,12 +43,12 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
     return step("a controller for it", "design", folder / "model.json")
 
 
-def without_design(model: "Model", card: str | None) -> Callable[[str], Step]:
+def without_design(model: "Model | VelocityModel", card: str | None) -> Callable[[str], Step]:
     """After a refusal to design: look over the log that the model is of."""
     return looked_over([one.file for one in model.log], _card_of(model, card))
 
 
-def _card_of(model: "Model", card: str | None) -> str:
+def _card_of(model: "Model | VelocityModel", card: str | None) -> str:
     """The card by which the model's logs are read: given, shipped, or where it is likely to lie."""
     if card is not None or model.card in shipped_cards():
         return card or model.card

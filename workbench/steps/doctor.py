@@ -106,11 +106,17 @@ class Examined:
     effects: Mapping[str, float] | None = None
 
     @property
+    def main(self) -> tuple[Told, ...]:
+        """What is told of the nine, or of all numbers of a rig that has no friction."""
+        of_valve = self.rig.kind == "velocity"
+        return tuple(one for one in self.told if of_valve or one.name in NAMES)
+
+    @property
     def verdict(self) -> str:
         """ "refused", "ready" (all nine can be told), "in part", or "nothing" (none can)."""
         if self.refused:
             return "refused"
-        can = [one.can for one in self.told if one.name in NAMES]
+        can = [one.can for one in self.main]
         return "ready" if all(can) else "in part" if any(can) else "nothing"
 
 

@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from identification.errors import NotIdentifiable
 from identification.estimation.estimates import NORMAL_95, told_estimate
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
@@ -14,6 +15,7 @@ from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
 from workbench.steps.identify import Options, Progress, identify
+from workbench.steps.other_kind import looks_like_velocity
 from workbench.steps.present import present_of_card
 from workbench.steps.runs_tell import runs_tell
 from workbench.steps.surrounding_lines import surrounding_lines
@@ -53,16 +55,21 @@ def identify_sources(
     Raises NotIdentifiable where the logs tell nothing, BadLog where a signal is missing.
     """
     options = options or Options()
-    gate = runs_tell([source.log for source in sources.runs], sources.rig, options.drive)
-    model, fit = identify(
-        sources.runs,
-        np.random.default_rng(seed),
-        card=sources.card.name,
-        rig=sources.rig,
-        options=options,
-        on_progress=on_progress,
-        keep_going=keep_going,
-    )
+    logs = [source.log for source in sources.runs]
+    gate = runs_tell(logs, sources.rig, options.drive)
+    try:
+        model, fit = identify(
+            sources.runs,
+            np.random.default_rng(seed),
+            card=sources.card.name,
+            rig=sources.rig,
+            options=options,
+            on_progress=on_progress,
+            keep_going=keep_going,
+        )
+    except NotIdentifiable as error:
+        said = looks_like_velocity(logs, sources.rig)
+        raise NotIdentifiable("; ".join([str(error), *said])) from error
     now = present_of_card(sources.card, sources.rig, model.period)
     bad = (*sources.bad, *fit.bad)
     model = replace(model, bad_samples=bad, controller=now, identifiability=gate.told)
@@ -70,6 +77,7 @@ def identify_sources(
     if walk is not None:
         model = replace(model, posterior=_posterior(walk, fit))
     remarks = (
+        *looks_like_velocity(logs, sources.rig, model),
         *surrounding_lines(fit.surroundings, sources.rig),
         *sources.remarks, *model_remarks(model), *broken_promises(model),
     )  # fmt: skip

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
+from identification.estimation.estimates import NORMAL_95
 from identification.estimation.recorded_logs import (
     RecordedLogs,
     commanded,
@@ -22,6 +23,9 @@ from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
 from identification.thresholds import LINEAR_ACTUATOR
+from identification.velocity.fit import fit
+from identification.velocity.record import recorded
+from identification.velocity.told import told, units
 from workbench.documents.model import Told
 from workbench.steps.surrounding_lines import surrounding_lines
 from workbench.steps.told_by_log import Ways, told_by, ways_of
@@ -53,6 +57,8 @@ def runs_tell(
     """
     log = max(runs, key=len)
     motion = differentiate(log["y"], log.h)
+    if rig.kind == "velocity":
+        return _valve_tells(runs, rig, motion)
     try:
         if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
@@ -67,7 +73,7 @@ def runs_tell(
     rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
     ways = ways_of(recorded.logs, events, rests)
     try:
-        told = told_by(
+        seen = told_by(
             recorded, ways, imposed=led_by_rig(recorded), actuator=_actuator_follows(recorded)
         )
     except NotIdentifiable as error:
@@ -76,7 +82,21 @@ def runs_tell(
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
     said = surrounding_lines(around, rig)
-    return RunsTell(motion, ways, told, remarks=said, effects=shown, surroundings=around)
+    return RunsTell(motion, ways, seen, remarks=said, effects=shown, surroundings=around)
+
+
+def _valve_tells(runs: Sequence[Log], rig: Rig, motion: Motion) -> RunsTell:
+    """The same of a rig whose velocity follows the command, by its fit, which is quick."""
+    try:
+        record = recorded(runs)
+        found = told(record, fit(record), units(rig.motion, rig.command_unit))
+    except NotIdentifiable as error:
+        return RunsTell(motion, reason=str(error))
+    half = {n: NORMAL_95 * e.sd / abs(e.value) for n, e in found.items() if e.value and e.sd}
+    return RunsTell(
+        motion,
+        told=tuple(Told(n, e.known, e.reason or "", within=half.get(n)) for n, e in found.items()),
+    )
 
 
 def _actuator_follows(recorded: RecordedLogs) -> bool | None:

@@ -24,7 +24,7 @@ def log_of(y: Array, cogging: dict[float, float], gravity: float = 0.0, seed: in
     force = 0.02 * np.gradient(v, H) + 0.15 * np.sign(v) + 0.03 * v + gravity * np.sin(y)
     force += sum((size * np.sin(n * y + 0.3 * n) for n, size in cogging.items()), np.zeros(len(y)))
     noise = rng.standard_normal((2, len(y)))
-    return Log("turn", {"t": T, "y": y + 2e-4 * noise[0], "F": force + 0.01 * noise[1]})
+    return Log("turn", {"t": T, "y": np.asarray(y + 2e-4 * noise[0]), "F": force + 0.01 * noise[1]})
 
 
 def sizes(y: Array, cogging: dict[float, float], gravity: float = 0.0) -> dict[int, float]:

@@ -1,0 +1,1 @@
+"""A valve and cylinder whose velocity follows the command: model, fit, rivals."""

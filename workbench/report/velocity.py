@@ -1,0 +1,268 @@
+"""Results of a rig whose velocity follows the command: one screen each, and a report."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from identification.velocity.rivals import STRUCTURES, is_noise
+from workbench.cards.readable import length, number
+from workbench.ending import Step, step
+from workbench.output import Row, written
+from workbench.report.model_tables import MODEL_HEAD, estimate_cells
+from workbench.report.notes import notes
+from workbench.report.page import Section, page
+from workbench.report.templating import render
+from workbench.screen import Screen, screen, tabled
+
+if TYPE_CHECKING:
+    from workbench.documents.velocity import VelocityDesign, VelocityModel
+    from workbench.steps.velocity import VelocityPrediction, VelocityTraced
+    from workbench.steps.velocity_loop import VelocityValidation
+
+VALVE_MEANING = {
+    "g_p": "gain, positive direction",
+    "g_n": "gain, negative direction",
+    "d_p": "dead zone, positive direction",
+    "d_n": "dead zone, negative direction",
+    "delay": "of the command",
+    "lag": "of the velocity",
+    "curve_p": "of the gain at the largest command, positive direction",
+    "curve_n": "of the gain at the largest command, negative direction",
+    "lag_other": "lag of the negative direction over the positive, less 1",
+    "second_lag": "over the first lag",
+    "creep": "velocity that no command gives",
+    "place": "of the gain along the travel",
+}
+LAW_MEANING = {
+    "k_p": "of the error",
+    "k_i": "of its integral",
+    "h": "period",
+    "smooth": "speed up to which the dead zone's offset grows",
+    "band": "error within which the integral rests",
+    "limit": "of the command",
+}
+WHAT_LAW = (
+    "law: v = k_p e + k_i int(e) + dr/dt, e = r - y; u = v/g_p + d_p min(|v|/smooth, 1) where"
+    " v/g_p > 0, else u = v/g_n - d_n min(|v|/smooth, 1)"
+)
+SLOWER_MODULUS, MOST_MODULUS = 1.3, 0.9  # asked for next; times the one before
+RIVAL_ROWS = ("rival", "held out, 2 s", "0.2 s", "chance", "clearly better")
+
+
+def valve_rows(model: "VelocityModel") -> list[Row]:
+    """Number, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
+    every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
+    return [
+        (name, *estimate_cells(one), VALVE_MEANING.get(name, "")) for name, one in every.items()
+    ]
+
+
+def _errors(model: "VelocityModel") -> str:
+    fit, rotary = model.fit, model.rotary
+    return (
+        f"position predicted by the command alone, on stretches that no fit has seen: within"
+        f" {length(fit.position_rms_2s, rotary)} rms over 2 s,"
+        f" {length(fit.position_rms_02s, rotary)} over 0.2 s (sensor's noise"
+        f" {length(fit.noise_y, rotary)})"
+    )
+
+
+def _summary(model: "VelocityModel") -> str:
+    known = [name for name, one in model.valve.items() if one.known]
+    lost = [name for name in model.valve if name not in known]
+    many = "All six" if not lost else f"{len(known)} of the six"
+    said = f"{many} numbers of the valve are told (the velocity follows the command; no friction)."
+    return f"{said} Not told: {', '.join(lost)}." if lost else said
+
+
+def _logs(model: "VelocityModel") -> tuple[str, ...]:
+    return tuple(dict.fromkeys(entry.file for entry in model.log))
+
+
+def velocity_model_view(model: "VelocityModel", folder: Path) -> Screen:
+    """The six numbers, what they predict, and remarks."""
+    return screen(
+        _summary(model),
+        tabled(MODEL_HEAD, [row[:4] for row in valve_rows(model)]),
+        _errors(model),
+        notes(model.remarks, _logs(model)),
+        written(folder, "model.json", "report.html"),
+    )
+
+
+def velocity_report(model: "VelocityModel") -> str:
+    """HTML: the numbers, what they predict, remarks."""
+    table = render("table", head=(*MODEL_HEAD, "meaning"), rows=valve_rows(model), lines=())
+    lines = render("lines", lines=[_errors(model), *model.remarks])
+    sections = (Section("The valve", table), Section("In words", lines))
+    return page(f"Identification of {model.card}", _summary(model), sections)
+
+
+def after_velocity(model: "VelocityModel", logs: Sequence[str], card: str, folder: Path) -> Step:
+    """Look for what is missing where more than noise is left; add a run; else design."""
+    if any(not model.valve[name].known for name in ("g_p", "g_n", "d_p", "d_n")):
+        return step("with a run that tells the rest added", "identify", *logs, "--card", card)
+    if not is_noise(model.fit.position_rms_2s**2, model.fit.noise_y):
+        return step("more than noise is left", "trace", *logs, "--card", card)
+    return step("a controller for it", "design", folder / "model.json")
+
+
+def _verdict(found: "VelocityTraced") -> str:
+    left, rotary = found.left, found.model.rotary
+    over = f"{length(left.held.rms[0], rotary)} rms of held-out position over 2 s"
+    match left.verdict:
+        case "none":
+            return f"none: the valve leaves {over}, which is no more than the sensor's noise"
+        case "effect":
+            best = next(one for one in left.rivals if one.key == left.named)
+            whole = "what is left is noise" if left.complete else "more than noise is left"
+            return (
+                f"effect: {STRUCTURES[best.key].words} ({best.key}): {over} ->"
+                f" {length(best.left.rms[0], rotary)}; {whole}"
+            )
+        case "inseparable":
+            able = ", ".join(one.key for one in left.rivals if one.better)
+            return f"inseparable: {able} explain what is left alike; before, {over}"
+        case _:
+            return f"unknown: {over}, and no richer structure predicts it clearly better"
+
+
+def velocity_trace_view(found: "VelocityTraced", folder: Path) -> Screen:
+    """The verdict, the rivals, and the numbers."""
+    rotary = found.model.rotary
+    rows = [
+        (one.key, length(one.left.rms[0], rotary), length(one.left.rms[1], rotary),
+         number(one.p_value, 2), "yes" if one.better else "no")
+        for one in found.left.rivals
+    ]  # fmt: skip
+    return screen(
+        _verdict(found),
+        tabled(RIVAL_ROWS, rows, (1, 2, 3)),
+        tabled(MODEL_HEAD, [row[:4] for row in valve_rows(found.model)]),
+        notes(
+            [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else [],
+        ),
+        notes(found.model.remarks, _logs(found.model)),
+        written(folder, "trace.json", "model.json", "report.html"),
+    )
+
+
+def velocity_trace_report(found: "VelocityTraced") -> str:
+    """HTML: the verdict, the rivals, the numbers."""
+    shown = velocity_trace_view(found, Path()).text(verbose=True)
+    table = render("table", head=(*MODEL_HEAD, "meaning"), rows=valve_rows(found.model), lines=())
+    lines = render("lines", lines=[one for one in shown.splitlines() if one.strip()])
+    sections = (Section("The valve", table), Section("In words", lines))
+    return page(f"Trace of {found.model.card}", _verdict(found), sections)
+
+
+def velocity_csv(runs: "Sequence[VelocityPrediction]") -> str:
+    """prediction.csv: time [s], measured and simulated position [m (rad)]."""
+    lines = ["t,position_measured,position_simulated"]
+    for one in runs:
+        columns = (one.t, one.measured, one.simulated)
+        rows = zip(*(x.tolist() for x in columns), strict=True)
+        lines += [",".join(f"{x:.9g}" for x in row) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def velocity_prediction_view(
+    summary: "Mapping[str, float | int | None]", rotary: bool, folder: Path
+) -> Screen:
+    """How far the simulated position is from the measured one."""
+    window = summary["window"]
+    anew = f", anew every {window:g} s" if window else " from the first sample on"
+    off, worst = (
+        length(float(summary[k] or 0.0), rotary) for k in ("position_rms", "position_worst")
+    )
+    return screen(
+        f"position by the command alone{anew}: within {off} rms, {worst} at most",
+        written(folder, "prediction.csv"),
+    )
+
+
+def _margins(margins: "dict[str, float | None]") -> str:
+    def said(name: str, unit: str) -> str:
+        value = margins.get(name)
+        return "none needed" if value is None else f"{number(value)}{unit}"
+
+    return (
+        f"margins: gain {said('gain', '')}, phase {said('phase_deg', ' deg')}, modulus"
+        f" {said('modulus', '')}, delay {said('delay_s', ' s')}"
+    )
+
+
+def design_lines(found: "VelocityDesign") -> list[str]:
+    """The controller in words and numbers."""
+    meaning = {**VALVE_MEANING, **LAW_MEANING}
+    numbers = [
+        f"  {name} = {number(one.value or 0.0, 4)} {one.unit}: {meaning.get(name, '')}"
+        for name, one in found.controller.items()
+    ]
+    return [
+        f"{found.law} position controller with speed feedforward, dead zones compensated",
+        WHAT_LAW,
+        *numbers,
+        _margins(dict(found.margins)),
+    ]
+
+
+def velocity_design_view(found: "VelocityDesign", folder: Path) -> Screen:
+    """The controller and its margins."""
+    return screen(
+        *design_lines(found), notes(found.remarks), written(folder, "design.json", "report.html")
+    )
+
+
+def velocity_design_report(found: "VelocityDesign") -> str:
+    """HTML: the controller and its margins."""
+    first, *rest = design_lines(found)
+    lines = render("lines", lines=[*rest, *found.remarks])
+    return page(f"Design for {found.card}", first, [Section("The controller", lines)])
+
+
+VALIDATED = ("plant", "standstill", "overshoot", "tracking", "modulus", "delay", "misses")
+
+
+def _validation_rows(found: "VelocityValidation") -> list[Row]:
+    rows = []
+    for place, one in found.figures.items():
+        m = one.margins or {}
+        shown = [
+            "-" if m.get(key) is None else number(float(m[key] or 0.0)) + unit
+            for key, unit in (("modulus", ""), ("delay_s", " s"))
+        ]
+        shares = [f"{100 * value:.2g} %" for value in (one.standstill, one.overshoot, one.tracking)]
+        rows.append((place, *shares, *shown, "; ".join(one.misses) or "nothing"))
+    return rows
+
+
+def _passed(found: "VelocityValidation") -> str:
+    many = len(found.figures)
+    if found.passed:
+        return f"Passed: the loop keeps every limit on {many} plants."
+    failed = sum(bool(one.misses) for one in found.figures.values())
+    return f"Not passed: on {failed} of {many} plants a limit is missed."
+
+
+def velocity_validation_view(found: "VelocityValidation", folder: Path) -> Screen:
+    """Whether the loop keeps its limits, on each plant."""
+    return screen(
+        _passed(found),
+        tabled(VALIDATED, _validation_rows(found), (1, 2, 3, 4, 5)),
+        written(folder, "validation.json", "report.html"),
+    )
+
+
+def velocity_validation_report(found: "VelocityValidation") -> str:
+    """HTML: the same."""
+    table = render("table", head=VALIDATED, rows=_validation_rows(found), lines=())
+    return page(f"Validation for {found.card}", _passed(found), [Section("The loop", table)])
+
+
+def after_velocity_validation(found: "VelocityValidation", model_file: Path) -> Step | None:
+    """A slower loop where a limit is missed."""
+    if found.passed:
+        return None
+    modulus = min(SLOWER_MODULUS * found.limits.modulus, MOST_MODULUS)
+    return step("a slower loop", "design", model_file, "--modulus", f"{modulus:.2g}")

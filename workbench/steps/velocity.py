@@ -1,0 +1,203 @@
+"""Logs of a rig whose velocity follows the command -> model, trace and prediction."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import BadLog, BadModel
+from identification.log import Log
+from identification.model.estimates import Estimate
+from identification.progress import KeepGoing, without_end
+from identification.velocity.fit import fit
+from identification.velocity.record import recorded
+from identification.velocity.rivals import (
+    STRUCTURES,
+    HeldOut,
+    Left,
+    held_out,
+    left_by_valve,
+)
+from identification.velocity.told import told, told_beside, units
+from workbench.documents.plain import as_number
+from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
+from workbench.documents.versions import versions
+from workbench.logs.sources import Source, Sources
+from workbench.steps.other_kind import looks_like_friction
+
+
+@dataclass(frozen=True)
+class VelocityTraced:
+    """What the plain model leaves, the model after it, and the runs of both kinds."""
+
+    left: Left
+    model: VelocityModel
+    train: tuple[Source, ...]
+    test: tuple[Source, ...]
+    noise: float
+
+
+def logs_of_runs(sources: Sources) -> list[Log]:
+    """The logs of the runs."""
+    return [source.log for source in sources.runs]
+
+
+def identify_velocity(sources: Sources, *, keep_going: KeepGoing = without_end) -> VelocityModel:
+    """The model of the rig from its runs; raises NotIdentifiable where they tell no gain."""
+    record = recorded(logs_of_runs(sources))
+    found = fit(record, keep_going=keep_going)
+    numbers = told(record, found, _units(sources))
+    held = held_out(record, found.valve, found.free, None)
+    other = looks_like_friction(record, found.valve, held, sources.rig) if keep_going() else ()
+    return _model(sources, numbers, held, record.noise, other)
+
+
+def trace_velocity(
+    train: Sources, test: Sources | None, *, keep_going: KeepGoing = without_end
+) -> VelocityTraced:
+    """Whether structure is left, by test runs or else by stretches left out in turn.
+
+    Raises BadLog where a test log is a training log, NotIdentifiable as `identify_velocity`.
+    """
+    seen = {source.sha256: source.file for source in train.runs}
+    for source in test.runs if test else ():
+        if source.sha256 in seen:
+            raise BadLog(
+                f"--test {source.file}: the same bytes as the training log {seen[source.sha256]};"
+                " test on a log that the fit has not seen"
+            )
+    record = recorded(logs_of_runs(train))
+    unseen = recorded(logs_of_runs(test)) if test else None
+    if unseen is not None:
+        unseen = replace(unseen, u_max=record.u_max)
+    left = left_by_valve(record, unseen, keep_going=keep_going)
+    numbers = told(record, left.fitted, _units(train))
+    named = next((one for one in left.rivals if one.key == left.named), None)
+    noise = (unseen or record).noise
+    model = _model(train, numbers, named.left if named else left.held, noise, ())
+    if left.named is not None:
+        beside = told_beside(left.fitted, STRUCTURES[left.named].adds, _units(train))
+        model = replace(model, effects={left.named: beside})
+    return VelocityTraced(left, model, train.runs, test.runs if test else (), noise)
+
+
+def _units(sources: Sources) -> Mapping[str, str]:
+    return units(sources.rig.motion, sources.rig.command_unit)
+
+
+def _model(
+    sources: Sources, numbers: Mapping[str, Estimate], held: HeldOut, noise: float,
+    remarks: Sequence[str],
+) -> VelocityModel:  # fmt: skip
+    long, short = held.rms
+    return VelocityModel(
+        card=sources.card.name,
+        rig=sources.rig,
+        valve=numbers,
+        fit=PredictionErrors(long, short, len(held.long), noise),
+        log=tuple(_entry(source) for source in sources.runs),
+        remarks=(*remarks, *sources.remarks),
+        versions=versions(),
+    )
+
+
+def _entry(source: Source) -> VelocityLog:
+    log = source.log
+    return VelocityLog(
+        file=source.file,
+        sha256=source.sha256,
+        rows=source.rows,
+        duration=log.duration,
+        h=log.h,
+        travel=(float(np.min(log["y"])), float(np.max(log["y"]))),
+        command_peak=float(np.max(np.abs(log["u"]))),
+    )
+
+
+def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
+    """trace.json of such a rig: verdicts as in the contract, errors of the position [m]."""
+    left = found.left
+    after = next((one.left for one in left.rivals if one.key == left.named), left.held)
+    return {
+        "schema": "velocity-trace/1",
+        "kind": "velocity",
+        "card": found.model.card,
+        "log": [_fingerprint(one) for one in found.train],
+        "test_log": [_fingerprint(one) for one in found.test],
+        "verdict": left.verdict,
+        "complete": left.complete,
+        "before": _errors(left.held),
+        "after": _errors(after),
+        "noise_floor": {"position_rms": found.noise},
+        "effects": [
+            {"key": key, "words": STRUCTURES[key].words,
+             "params": {name: as_number(one) for name, one in own.items()}}
+            for key, own in found.model.effects.items()
+        ],
+        "rivals": [
+            {"key": one.key, **_errors(one.left), "p_value": one.p_value, "better": one.better}
+            for one in left.rivals
+        ],
+        "not_tried": list(left.not_tried),
+        "parameters": {name: as_number(one) for name, one in found.model.valve.items()},
+        "remarks": list(found.model.remarks),
+        "versions": versions(),
+    }  # fmt: skip
+
+
+def _errors(held: HeldOut) -> dict[str, float]:
+    long, short = held.rms
+    return {"position_rms_2s": long, "position_rms_02s": short}
+
+
+def _fingerprint(source: Source) -> dict[str, Any]:
+    return {"file": source.file, "sha256": source.sha256, "rows": source.rows}
+
+
+@dataclass(frozen=True)
+class VelocityPrediction:
+    """Measured and simulated position [m] of a run at its times t [s], each (n,)."""
+
+    t: Array
+    measured: Array
+    simulated: Array
+
+
+def predict_velocity(
+    model: VelocityModel, sources: Sources, window: float | None = None
+) -> tuple[VelocityPrediction, ...]:
+    """The position of each run by its command, from where it is measured to be, anew after each
+    `window` [s]; raises BadModel where model and card are of unlike machines."""
+    same = ("motion", "command_unit")
+    for key in same:
+        if getattr(sources.rig, key) != getattr(model.rig, key):
+            raise BadModel(
+                f"the model has {key} = {getattr(model.rig, key)!r}, {sources.card.path}"
+                f" {getattr(sources.rig, key)!r}; give the model and the card of one machine"
+            )
+    valve, out = model.simulated, []
+    record = replace(recorded(logs_of_runs(sources)), u_max=model.command_peak)
+    if valve.place:
+        record = record.placed(replace(valve, place=0.0), model.travel)
+    for log, e in zip(logs_of_runs(sources), record.errors(valve), strict=True):
+        if window is not None and window < 2.0 * log.h:
+            raise BadModel(f"window {window:g} s, at least 2 samples ({2 * log.h:g} s) needed")
+        size = len(e) if window is None else round(window / log.h)
+        anchors = e[size * (np.arange(len(e)) // size)]
+        out.append(VelocityPrediction(log["t"], log["y"], log["y"] - e + anchors))
+    return tuple(out)
+
+
+def prediction_summary(
+    runs: Sequence[VelocityPrediction], window: float | None
+) -> dict[str, float | int | None]:
+    """Error of the position [m] over all runs, as `--json` prints it."""
+    off = np.concatenate([one.measured - one.simulated for one in runs])
+    return {
+        "samples": len(off),
+        "window": window,
+        "position_rms": float(np.sqrt(np.mean(off**2))),
+        "position_worst": float(np.max(np.abs(off))),
+    }
