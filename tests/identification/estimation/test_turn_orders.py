@@ -13,7 +13,7 @@ from identification.model.surroundings import Surroundings
 
 H, N = 2e-3, 15_000
 RIG = Rig("force", motion="rotary")
-T = H * np.arange(N)
+T: Array = np.asarray(H * np.arange(N), dtype=np.float64)
 BOTH_WAYS = 4.0 * np.sin(0.5 * T) + 0.6 * np.sin(2.3 * T)
 ONE_WAY = 1.3 * T + 0.4 * np.sin(2.0 * T)
 
@@ -24,7 +24,9 @@ def log_of(y: Array, cogging: dict[float, float], gravity: float = 0.0, seed: in
     force = 0.02 * np.gradient(v, H) + 0.15 * np.sign(v) + 0.03 * v + gravity * np.sin(y)
     force += sum((size * np.sin(n * y + 0.3 * n) for n, size in cogging.items()), np.zeros(len(y)))
     noise = rng.standard_normal((2, len(y)))
-    return Log("turn", {"t": T, "y": np.asarray(y + 2e-4 * noise[0]), "F": force + 0.01 * noise[1]})
+    shown = np.asarray(y + 2e-4 * noise[0], dtype=np.float64)
+    measured = np.asarray(force + 0.01 * noise[1], dtype=np.float64)
+    return Log("turn", {"t": T, "y": shown, "F": measured})
 
 
 def sizes(y: Array, cogging: dict[float, float], gravity: float = 0.0) -> dict[int, float]:
