@@ -63,6 +63,8 @@ WORSE_PREDICTION = 1.1  # times the plain model's error of the held-out position
 DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
 DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
 DRIFT_LEAST = 0.01  # of its value, that it changes
+FOLLOWS_AS_WELL = 1.5  # times the usual error of whole runs, up to which one is followed as usual
+LEVELS_LEAVE = 0.5  # of a run's error, left at most by Coulomb levels fitted before it
 
 # What a test of a new log must be able to see, or it does not judge (drift.py: coarse).
 SEEN = 0.05  # of a Coulomb level, the change that it sees

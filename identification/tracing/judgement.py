@@ -12,6 +12,7 @@ from identification.remarks import Aside
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
+from identification.tracing.levels_refitted import levels_refitted
 from identification.tracing.model_errors import (
     carries,
     errors_of,
@@ -83,6 +84,11 @@ def judgement(
         left = NOTHING if of_place else strongest(choice, after, logs, rows.drive)
         if choice.steps and not left.depends_on:  # of all that is missing
             left = remaining_structure(without_effects(chosen.plain, choice), plain, any_size=True)
+    if verdict == "unknown" and seen and not choice.steps and not after.imposed:
+        told = plain.plant.friction if after.fit is None else after.fit.friction
+        levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
+        verdict, changed = ("drift", levels) if levels else (verdict, changed)
+        doubts = (*doubts, how) if levels else doubts
     said = (
         *_remarks(choice, after, left, logs, seen, rig),
         *doubts,

@@ -90,6 +90,7 @@ from identification.tracing.free_run.backward_elimination import (
 )
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
+from identification.tracing.levels_refitted import explains_the_day, follows_worse
 from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
 from identification.tracing.predictive_check import is_worse
@@ -843,6 +844,15 @@ def test_orders_leave() -> None:
 
 def test_sure_of_order() -> None:
     assert is_sure(0.6, 0.1) and not is_sure(0.4, 0.1)
+
+
+def test_follows_as_well() -> None:
+    assert follows_worse(1.6, 1.0) and not follows_worse(1.4, 1.0)
+
+
+def test_levels_leave() -> None:
+    assert explains_the_day(2.0, 0.9, 1.0) and not explains_the_day(2.0, 1.1, 1.0)
+    assert not explains_the_day(4.0, 1.6, 1.0)
 
 
 def test_every_threshold_has_a_test() -> None:
