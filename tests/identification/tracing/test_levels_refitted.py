@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog, motion_log
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
@@ -19,7 +20,8 @@ LAW = Karnopp(2.0, 5.0, 6.0, 20.0, 25.0, 1e-3, -1e-3, 5.5, -6.5)
 
 def run_of(law: Karnopp, seed: int, noise: float = 1e-6) -> MotionLog:
     """A run of that law under a slow wave of the command."""
-    rng, t = np.random.default_rng(seed), H * np.arange(N)
+    rng = np.random.default_rng(seed)
+    t: Array = np.asarray(H * np.arange(N), dtype=np.float64)
     u = 9.0 * np.sin(2.0 * np.pi * 0.4 * t + seed) + 4.0 * np.sin(2.0 * np.pi * 1.1 * t)
     blank = Log("run", {"t": t, "y": np.zeros(N), "F": u, "u": u})
     run = free_run(Plant(law, Motor(1.0)), blank, (0.0, 0.0, float(u[0])), "command")
