@@ -201,10 +201,10 @@ def read_header(text: str, unit_below: str = "") -> Header:
     if unit_below.strip():
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
-    words = _words(name)
+    words = words_of(name)
     if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
         words = ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
-    means = _meanings(words, " ".join(_words(plain)))
+    means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
     elif doubtful and unit and unit.quantity != "position":  # time_s, but not y_m: measured
@@ -255,7 +255,7 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     return text, None, False
 
 
-def _words(name: str) -> list[str]:
+def words_of(name: str) -> list[str]:
     """The words of a name in small letters: at case, digits and signs it is parted."""
     parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
     parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
@@ -263,6 +263,17 @@ def _words(name: str) -> list[str]:
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
         small = small.replace(umlaut, two)
     return [one for one in re.split(r"[\W_]+", small) if one]
+
+
+def tells_purpose(word: str) -> bool:
+    """Whether a word tells what a signal is for (soll, actual, cmd), not what it is."""
+    parts = any(one in word for one in (*_REFERENCE, *_MEASURED, *_MODEL))
+    return parts or word in (*_REFERENCE_SHORT, *_MEASURED_SHORT, *_MODEL_SHORT, "command")
+
+
+def meaning(word: str) -> Mapping[Quantity, float]:
+    """Weight of each quantity that a word means by itself."""
+    return _meanings([word], word)
 
 
 def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:

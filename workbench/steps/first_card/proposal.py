@@ -109,7 +109,7 @@ def proposed(path: Path, name: str | None = None) -> Proposal:
     Raises BadLog, one line, where no clock is found, or no column that moves as a driven body.
     """
     columns = columns_of(read_unknown(path))
-    roles = told_roles(columns)
+    roles = told_roles(columns.signals)
     if roles is None:
         there = ", ".join(one.shown for one in columns.signals) or "none"
         raise BadLog(

@@ -4,15 +4,16 @@ All numbers are by hand, chosen on the seeds that `benchmarks/init_files.py` nam
 sure". A word may be wrong and so may a regression; the sum decides.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from identification.arrays import Array
-from identification.signals.relations import ForceLaw, derivative, lead
+from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
+from workbench.steps.first_card.axes import stem
 from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.pairs import Pairs, Seen
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
@@ -37,29 +38,48 @@ SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
+SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
+SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
+ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
+STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
+NEVER = -9.0
+OF_A_MODEL = -5.0  # for what another model says, beside what is measured
+LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
 
 def said(one: Column, role: str) -> float:
-    """Log-odds of a role by the header alone."""
+    """Log-odds of a role by the header, and by the few values that a column takes."""
     head = one.header
     total = 0.0
     for quantity, weight in head.means.items():
         if role in ROLES_OF[quantity]:
             total = max(total, weight if role != "r" else 0.5 * weight)
     if head.means and total == 0.0:
-        total -= 1.5
+        total -= 0.5 + max(head.means.values())
     if head.unit is not None:
         total += _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
-    if head.purpose == "reference":
-        total += {"r": 4.0, "y": -5.0, "F": -4.0, "p": -4.0, "v": -3.0}.get(role, 0.0)
-    elif head.purpose == "measured":
-        total += {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5}.get(role, 0.0)
-    elif head.purpose == "error":
-        total -= 6.0
+    total += _by_purpose(one, role)
     if one.bits is not None:
         total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
+    if one.flag:
+        switched = role == "r" and head.purpose == "reference"
+        driven = role == "u" and "command" in head.means
+        total += 0.0 if switched or driven else NEVER
     return total
+
+
+def _by_purpose(one: Column, role: str) -> float:
+    """What "target", "actual", "error" or "predicted" in a header makes of a role."""
+    purpose, means = one.header.purpose, one.header.means
+    if purpose == "reference":
+        other = means and "position" not in means
+        return {"r": -3.0 if other else 4.0, "y": -5.0, "F": -4.0, "p": -4.0, "v": -3.0}.get(
+            role, 0.0
+        )
+    if purpose == "measured":
+        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
+    return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
 
 
 def _by_unit(one: Column, role: str) -> float:
@@ -73,23 +93,41 @@ def _by_unit(one: Column, role: str) -> float:
     return BY_UNIT if role in ROLES_OF[quantity] else AGAINST_UNIT
 
 
+def together(one: Column, other: Column) -> float:
+    """Log-odds of two columns in one card, by the axes that their headers name."""
+    if not (one.axis and other.axis):
+        return 0.0
+    return SAME_AXIS if one.axis == other.axis else OTHER_AXIS
+
+
 def moves_like_a_body(y: Column) -> float:
     """Log-odds of a position by its own course: a body's velocity is far above its noise."""
     assert y.motion is not None
     v_noise = max(y.motion.v_noise, 1e-300)
     clear = float(np.std(y.motion.v)) / v_noise
-    levels = len(np.unique(y.x))
-    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if levels < 20 else 0.0)
+    few = len(y.levels) < 20
+    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
-def in_one_unit(one: Column, other: Column) -> tuple[Array, Array]:
-    """Two pressures [Pa] where both headers give units of pressure, else as they are."""
+def among_derivatives(pairs: Pairs, k: int) -> float:
+    """Log-odds of a position by what it is the derivative of, and what is its own."""
+    bodies = [i for i, one in enumerate(pairs.signals) if said(one, "y") > -4.0]
+    of_others = max((pairs.rate[i, k] for i in bodies if i != k), default=0.0)
+    own = max(
+        (pairs.rate[k, j] for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0),
+        default=0.0,
+    )
+    return (-4.0 if of_others > ALL_VELOCITY else 0.0) + (1.0 if own > ALL_VELOCITY else 0.0)
+
+
+def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
+    """Factors of two pressures to [Pa] where both headers give units of pressure, else 1."""
     units = [column.header.unit for column in (one, other)]
     if any(unit is None or unit.quantity != "pressure" for unit in units):
-        return one.x, other.x
+        return 1.0, 1.0
     factors = [conversion(unit.card, "Pa") for unit in units if unit is not None]
     first, second = (1.0 if of is None else of.factor for of in factors)
-    return first * one.x, second * other.x
+    return first, second
 
 
 def of_a_motor(one: Column) -> float:
@@ -97,8 +135,16 @@ def of_a_motor(one: Column) -> float:
     finite = one.values[np.isfinite(one.values)]
     low, high = float(finite.min()), float(finite.max())
     limited = low == -high and np.sum(finite == high) > 2
-    one_way = -3.0 if low * high > 0.0 else 0.0
-    return one_way + (1.5 if limited else 0.0) + (1.0 if max(-low, high) <= 12.0 else -0.5)
+    return (1.5 if limited else 0.0) + (1.0 if max(-low, high) <= 12.0 else -0.5)
+
+
+def acts(pairs: Pairs, k: int) -> float:
+    """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
+    x = pairs.signals[k].x
+    steady = abs(float(x.mean())) > STEADY * float(x.std())
+    one_way = -3.0 if x.min() * x.max() > 0.0 else 0.0
+    place = BEFORE_LIMIT if k in pairs.limited else ACTS if k in pairs.limited.values() else 0.0
+    return one_way + place - (3.0 if steady and one_way else 0.0)
 
 
 def turned(law: ForceLaw) -> ForceLaw:
@@ -110,46 +156,55 @@ def turned(law: ForceLaw) -> ForceLaw:
     )
 
 
-def driving(y: Column, f: Array, law: ForceLaw) -> float:
-    """Log-odds that a signal drives the body, by what of it is inertia and friction."""
-    assert y.motion is not None
+def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
+    """Log-odds that a signal drives the body, by what of it is inertia and friction.
+
+    v_share: of it that is the velocity alone; less_way: whether it goes less than the position.
+    """
     score = 6.0 * float(np.clip((law.share - 0.3) / 0.65, -0.7, 1.0)) + 2.0 * abs(law.work)
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
-    if law.friction < LITTLE_FRICTION and derivative(y.motion, f).share > ALL_VELOCITY:
+    if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
         score -= 8.0
     elif law.friction < NO_FRICTION:
         score -= 3.0
     if law.way < 0.0:
         score -= 1.0
-    if _way_gone(f) < LEAST_WAY * _way_gone(y.x):
-        score -= 3.0
-    return score
+    return score - (3.0 if less_way else 0.0)
 
 
-def _way_gone(x: Array) -> float:
-    """The way that a signal goes, in units of its range."""
-    size = max(1, len(x) // 2000)
-    count = len(x) // size
-    means = x[: count * size].reshape(count, size).mean(axis=1)
-    width = float(np.ptp(means))
-    return float(np.sum(np.abs(np.diff(means)))) / width if width > 0 else 0.0
+def less_way(y: Column, one: Column) -> bool:
+    """Whether a signal goes less way than the position, which no force on it does."""
+    return one.way_gone < LEAST_WAY * y.way_gone
 
 
-def ahead_of(y: Column, one: Column) -> float:
+def ahead_of(seen: Seen, k: int) -> float:
     """Log-odds that a column is the position's reference: alike, ahead of it, without noise."""
-    assert y.motion is not None
-    found = lead(one.x, y.x)
+    y, one = seen.y, seen.pairs.signals[k]
+    if abs(seen.pairs.alike[seen.at, k]) < LEAST_ALIKE:
+        return -3.0
+    found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
     score = 4.0 * found.likeness - 2.0
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
-    if derivative(y.motion, one.x).share > ALL_VELOCITY:
+    if seen.v_share[k] > ALL_VELOCITY:
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
-    return score + (1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0)
+    score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
+    return score + _named_for(one, y, seen.pairs.signals)
+
+
+def _named_for(reference: Column, y: Column, others: Sequence[Column]) -> float:
+    """Log-odds that a reference is that of y, where its header repeats a position's name."""
+    own = stem(reference.header)
+    if not own:
+        return 0.0
+    if own == stem(y.header):
+        return SAME_STEM
+    return OTHER_STEM if any(own == stem(x.header) for x in others if x is not reference) else 0.0
