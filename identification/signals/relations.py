@@ -109,15 +109,19 @@ def force_laws(motion: Motion, y: Array, f: Array, smooth: Array) -> list[ForceL
     share, theta = _explained(X, b)
     without, _ = _explained(X[:, [0, 1, 3]], b)
     work = [work_share(y, one) or 0.0 for one in f.T]
+    onwards = np.zeros(f.shape[1]) if both else float(np.sign(motion.v[sure].mean())) * b.mean(0)
     return [
-        _law(share[k], share[k] - without[k] if both else None, theta[:, k], work[k])
+        _law(share[k], share[k] - without[k] if both else None, theta[:, k], work[k], onwards[k])
         for k in range(f.shape[1])
     ]
 
 
-def _law(share: float, friction: float | None, theta: Array, work: float) -> ForceLaw:
-    if abs(work) > TELLS_SIGN:
-        way = float(np.sign(work))
+def _law(
+    share: float, friction: float | None, theta: Array, work: float, onwards: float
+) -> ForceLaw:
+    """onwards: the mean of a signal along a motion that goes one way only, else 0."""
+    if abs(work) > TELLS_SIGN or onwards != 0.0:
+        way = float(np.sign(work if abs(work) > TELLS_SIGN else onwards))
     else:
         way = float(np.sign(theta[2])) or float(np.sign(theta[1])) or 1.0
     balance, coulomb, m = float(theta[3]), float(theta[2]), float(theta[0])
@@ -199,7 +203,8 @@ def _explained(X: Array, b: Array) -> tuple[Any, Array]:
     theta = (np.linalg.lstsq(X / size, b, rcond=1e-10)[0].T / size).T
     spread = np.var(b, axis=0)
     left = np.var(b - X @ theta, axis=0)
-    return np.where(spread > 0.0, np.maximum(0.0, 1.0 - left / np.where(spread > 0.0, spread, 1.0)), 0.0), theta
+    share = np.maximum(0.0, 1.0 - left / np.where(spread > 0.0, spread, 1.0))
+    return np.where(spread > 0.0, share, 0.0), theta
 
 
 def command_lag(target: Array, others: Array, u: Array, longest: int) -> tuple[float, float]:

@@ -33,7 +33,8 @@ class Header:
     that its words mean with their weight, what the signal is for ("model": what another model
     says), and whether it speaks of an angle.
 
-    doubtful: the unit may as well belong to the name, as the m of "y_m".
+    doubtful: the unit may as well belong to the name, as the m of "y_m"; turning: log-odds of a
+    machine that turns, by words that others have too.
     """
 
     text: str
@@ -43,6 +44,7 @@ class Header:
     purpose: Purpose
     angle: bool
     doubtful: bool = False
+    turning: float = 0.0
 
 
 _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
@@ -104,7 +106,7 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     " 荷重 推力",
     "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧",
     "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
-    " ansteuerung aussteuerung 電圧 操作量 指令 current strom courant corrente 電流 motor",
+    " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom courant corrente 電流 motor",
     "temperature": "temperatur temper temp thermo 温度",
     "count": "index idx sample counter scan zaehler lfd row 番号 連番",
     "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
@@ -174,11 +176,12 @@ _SHORT: Mapping[str, Mapping[Quantity, float]] = {  # whole words of up to three
     "out": {"command": 1.0},
 }
 _ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque",
-           "トルク", "moment", "drehzahl", "omega", "rpm", "alpha", "elbow", "knee", "hip", "wrist",
-           "shoulder", "pendulum", "pendel", "tau", "関節", "pivot", "rotor", "yaw", "pitch",
-           "couple")  # fmt: skip
-# Currents of the field and torque axes are those of machines that turn, nearly always.
-_OF_A_ROTOR = ("iq", "isq", "uq", "vq", "id", "isd")
+           "トルク", "drehmoment", "motormoment", "drehzahl", "omega", "rpm", "elbow", "knee",
+           "wrist", "shoulder", "pendulum", "pendel", "関節")  # fmt: skip
+# Words that machines which turn use more than others: currents of a rotor's axes, Greek letters.
+_MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5, "alpha": 1.0,
+             "beta": 1.0, "psi": 1.0, "q": 0.5, "qd": 0.5, "hip": 1.5, "yaw": 1.5, "moment": 1.0,
+             "phase": 0.5, "steering": 1.0, "axle": 1.0, "arm": 0.5}  # fmt: skip
 _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
               "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
               "planned")  # fmt: skip
@@ -219,8 +222,8 @@ def read_header(text: str, unit_below: str = "") -> Header:
     elif purpose == "reference" and not means:
         means = {"position": 1.5}
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
-    angle |= bool({*_OF_A_ROTOR, "q"} & set(words))
-    return Header(text, name, unit, means, purpose, angle, doubtful)
+    turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
+    return Header(text, name, unit, means, purpose, angle, doubtful, turning)
 
 
 def written_unit(text: str) -> WrittenUnit | None:

@@ -26,6 +26,7 @@ FEW_LEVELS = 8  # values at most, of a flag, mode or state
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
+FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
 FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 
@@ -121,10 +122,15 @@ class Columns:
     read: tuple[Column, ...]
     scalars: tuple[Column, ...] = field(default=())
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that the headers name, where there are several."""
+        return tuple(sorted({one.axis for one in self.signals if one.axis}))
+
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    read = [_signed(_column(one)) for one in log.columns]
+    read = [_signed(one) for one in _told_units([_column(one) for one in log.columns])]
     usable = [one for one in read if not _unusable(one)]
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
@@ -144,6 +150,14 @@ def columns_of(log: UnknownLog) -> Columns:
 
 def _column(raw: RawColumn) -> Column:
     return Column(raw, read_header(raw.header, raw.unit_below), raw.values, raw.values)
+
+
+def _told_units(columns: Sequence[Column]) -> list[Column]:
+    """The columns, their doubtful units believed where others' headers end in units too."""
+    plain = [one for one in columns if one.header.unit and not one.header.doubtful]
+    if len(plain) < FEWEST_WITH_UNITS:
+        return list(columns)
+    return [replace(one, header=replace(one.header, doubtful=False)) for one in columns]
 
 
 def _unusable(one: Column) -> str:

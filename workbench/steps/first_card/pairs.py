@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
+from itertools import permutations
 
 import numpy as np
 
@@ -18,9 +19,11 @@ from workbench.steps.first_card.axes import correlation
 from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
-FEWEST_AT_LIMIT = 20  # samples at which a limited command stands at its limit
-WITHIN_LIMIT = 1e-3  # of its range, that a limited command is off the one before the limiter
-MAYBE_LIMITED = 0.5  # correlation of the two, at least
+FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
+ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
+MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
+ROUNDED, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
 class Pairs:
@@ -35,16 +38,20 @@ class Pairs:
         self.alike = correlation(self.x)
         self.rate = _rates(self.x)
 
-    @cached_property
-    def limited(self) -> dict[int, int]:
-        """Columns that a limiter has behind it, by their place: the place of what stands behind."""
+    def behind(self, commands: Sequence[int]) -> dict[int, int]:
+        """Commands before a limiter or a sum, by their place: the place of what comes out of it.
+
+        commands: places of the columns that may be such.
+        """
         out = {}
-        for j, behind in enumerate(self.signals):
-            for i, before in enumerate(self.signals):
-                if i == j or behind.flag or abs(self.alike[i, j]) < MAYBE_LIMITED:
-                    continue
-                if _clipped(before, behind):
-                    out[i] = j
+        for i, j in permutations(commands, 2):
+            if abs(self.alike[i, j]) < MAYBE_ONE or self.signals[j].flag:
+                continue
+            before, after = self.signals[i], self.signals[j]
+            if _clipped(before, after):
+                out[i] = j
+            elif i not in out and (part := _added(self.signals, i, j)) is not None:
+                out |= {i: j, part: j}
         return out
 
 
@@ -66,19 +73,49 @@ def _rates(x: Array) -> Array:
 
 
 def _clipped(before: Column, behind: Column) -> bool:
-    """Whether a column is another one but where it stands at its limits, which that one passes."""
-    a, b = before.values[:MOST_ROWS_LOOKED_AT], behind.values[:MOST_ROWS_LOOKED_AT]
-    both = np.isfinite(a) & np.isfinite(b)
-    a, b = a[both], b[both]
+    """Whether a column is another one, mostly, but where it stands at limits which that passes.
+
+    Mostly: a feed-forward may be added between the two. They are in one unit.
+    """
+    a, b = _both(before, behind)
     low, high = float(b.min()), float(b.max())
-    width = high - low
-    inside = (b > low + WITHIN_LIMIT * width) & (b < high - WITHIN_LIMIT * width)
-    if min(np.sum(~inside), np.sum(inside)) < FEWEST_AT_LIMIT:
+    above, below = b == high, b == low
+    at = above | below
+    if max(np.sum(above), np.sum(below)) < FEWEST_AT_LIMIT or np.sum(~at) < FEWEST_AT_LIMIT:
         return False
-    X = np.column_stack([a, np.ones(len(a))])
-    slope, *_ = np.linalg.lstsq(X[inside], b[inside], rcond=None)
-    off, beyond = np.abs(X @ slope - b), np.max(np.abs((X @ slope - b)[~inside]))
-    return bool(np.max(off[inside]) < 2 * WITHIN_LIMIT * width < beyond)
+    slope, shift = np.polyfit(a[~at], b[~at], 1) if np.ptp(a[~at]) > 0.0 else (0.0, 0.0)
+    fitted = slope * a + shift
+    left = float(np.var(b[~at] - fitted[~at]))
+    past = np.sum(fitted[above] > high) + np.sum(fitted[below] < low)
+    return (
+        abs(slope - 1.0) < ONE_UNIT
+        and left < MOST_ADDED * float(np.var(b[~at]))
+        and bool(past > MOSTLY_PAST * np.sum(at))
+        and float(np.ptp(a)) > PASSES * (high - low)
+    )
+
+
+def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
+    """The place of the column that, added to one, makes the other; None where there is none."""
+    a, b = _both(signals[i], signals[j])
+    width = float(np.ptp(b))
+    for k, part in enumerate(signals):
+        if k in (i, j) or part.flag or len(part.values) != len(signals[i].values):
+            continue
+        c = part.values[:MOST_ROWS_LOOKED_AT]
+        if len(c) != len(a) or float(np.ptp(c)) > width:
+            continue
+        same = np.abs(b - a - c) < ROUNDED * width
+        if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > ROUNDED * width) > SELDOM:
+            return k
+    return None
+
+
+def _both(one: Column, other: Column) -> tuple[Array, Array]:
+    """The rows looked at in which both have a number."""
+    a, b = one.values[:MOST_ROWS_LOOKED_AT], other.values[:MOST_ROWS_LOOKED_AT]
+    both = np.isfinite(a) & np.isfinite(b)
+    return a[both], b[both]
 
 
 class Seen:

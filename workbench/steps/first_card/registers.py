@@ -16,13 +16,12 @@ SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once
 class Register(NamedTuple):
     """A column as its register means it: bits of two's complement, or the bit of its sign.
 
-    jump, row: the size of the first leap in the column, and its row of data from 1.
+    row: where it first leaps, a row of data from 1.
     """
 
     values: Array
     bits: int | None
     sign_bit: int | None = None
-    jump: float = 0.0
     row: int = 0
 
 
@@ -55,4 +54,4 @@ def _sign_and_magnitude(x: Array) -> Register | None:
     size = np.maximum(np.abs(read[leaps]), np.abs(read[leaps + 1]))
     if np.nanmedian(size) > NEAR_ZERO * float(np.nanmax(np.abs(read))):
         return None
-    return Register(read, None, bit, float(step[leaps[0]]), int(leaps[0]) + 2)
+    return Register(read, None, bit, int(leaps[0]) + 2)

@@ -31,6 +31,7 @@ from workbench.steps.first_card.weights import (
     driving,
     in_one_unit,
     less_way,
+    limits,
     moves_like_a_body,
     of_a_motor,
     said,
@@ -40,6 +41,7 @@ from workbench.steps.first_card.weights import (
 
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
+TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
@@ -107,7 +109,9 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
     if len(signals) < 2:
         return None
     pairs = Pairs(signals)
-    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own)]
+    behind = limits(pairs)
+    acting = [acts(pairs, k, behind) for k in range(len(signals))]
+    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, acting)]
     if not ways:
         return None
     ways.sort(key=lambda one: -_with_reference(one))
@@ -141,7 +145,7 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     return [(Seen(pairs, k), score) for score, k in likely]
 
 
-def _ways(seen: Seen, own: float) -> Iterator[_Way]:
+def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
     """What may drive the body: a force, the difference of two pressures, or the command itself."""
     laws, y, pairs = seen.laws, seen.y, seen.pairs
     for k, law in enumerate(laws):
@@ -152,12 +156,12 @@ def _ways(seen: Seen, own: float) -> Iterator[_Way]:
         if max(as_force, as_command) <= -3.0:
             continue
         physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
-        physics += own + acts(pairs, k)
+        physics += own
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics)
         if as_command > -3.0:
-            score = as_command + physics + of_a_motor(one)
+            score = as_command + physics + of_a_motor(one) + acting[k]
             yield _Way(seen, "motor", {"u": one}, law, force, score)
     if laws:
         yield from _chambers(seen, own)
@@ -271,7 +275,7 @@ def _signs(best: _Choice) -> dict[str, Sign]:
     out = dict.fromkeys(best.columns, 1.0)
     if way.kind != "electro-pneumatic":
         (name,) = way.columns
-        out[name] = way.law.way
+        out[name] = way.law.way if way.law.share > TELLS_SIGN or name == "F" else 1.0
     if "u" in best.others:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]

@@ -34,6 +34,7 @@ AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are 
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
+AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
@@ -41,8 +42,11 @@ MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite 
 SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
+MOST_COMMANDS = 12  # among which a limiter is looked for
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 NEVER = -9.0
+FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
+AS_FAR = 0.25  # of its range, that a reference of few levels is off the position's at most
 OF_A_MODEL = -5.0  # for what another model says, beside what is measured
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
@@ -63,9 +67,8 @@ def said(one: Column, role: str) -> float:
     if one.bits is not None:
         total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
     if one.flag:
-        switched = role == "r" and head.purpose == "reference"
         driven = role == "u" and "command" in head.means
-        total += 0.0 if switched or driven else NEVER
+        total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else NEVER
     return total
 
 
@@ -138,12 +141,19 @@ def of_a_motor(one: Column) -> float:
     return (1.5 if limited else 0.0) + (1.0 if max(-low, high) <= 12.0 else -0.5)
 
 
-def acts(pairs: Pairs, k: int) -> float:
+def limits(pairs: Pairs) -> dict[int, int]:
+    """Commands before a limiter or a sum: what comes out of it, each by its place."""
+    likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
+    likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
+    return pairs.behind(sorted(k for _, k in likely))
+
+
+def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
     """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
     x = pairs.signals[k].x
     steady = abs(float(x.mean())) > STEADY * float(x.std())
     one_way = -3.0 if x.min() * x.max() > 0.0 else 0.0
-    place = BEFORE_LIMIT if k in pairs.limited else ACTS if k in pairs.limited.values() else 0.0
+    place = BEFORE_LIMIT if k in behind else ACTS if k in behind.values() else 0.0
     return one_way + place - (3.0 if steady and one_way else 0.0)
 
 
@@ -195,6 +205,9 @@ def ahead_of(seen: Seen, k: int) -> float:
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
+    if one.flag and found.likeness > AS_LIKE:
+        far = float(np.ptp(one.x)) / float(np.diff(np.quantile(y.x, (0.02, 0.98)))[0])
+        score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
     score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
     return score + _named_for(one, y, seen.pairs.signals)
