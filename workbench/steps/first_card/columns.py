@@ -86,7 +86,7 @@ class Column:
     def flag(self) -> bool:
         """Whether it holds a few whole numbers: a switch, a mode or a state."""
         few = self.levels
-        whole = len(few) <= FEW_LEVELS and bool(np.all(few == np.round(few)))
+        whole = 1 < len(few) <= FEW_LEVELS and bool(np.all(few == np.round(few)))
         return whole and (few[0] >= 0.0 or bool(np.all(np.abs(few) <= 1.0)))
 
     @cached_property

@@ -43,6 +43,7 @@ SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their hea
 SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
+A_VELOCITY = -12.0  # for a drive that is the velocity alone
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 NEVER = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
@@ -178,7 +179,7 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
     if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
-        score -= 8.0
+        score += A_VELOCITY
     elif law.friction < NO_FRICTION:
         score -= 3.0
     if law.way < 0.0:
@@ -201,7 +202,7 @@ def ahead_of(seen: Seen, k: int) -> float:
         return -3.0
     score = 4.0 * found.likeness - 2.0
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
-    if seen.v_share[k] > ALL_VELOCITY:
+    if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
