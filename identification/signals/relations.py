@@ -176,23 +176,26 @@ def actuator_share(F: Array, v: Array, u: Array, cutoff: float) -> tuple[float, 
 
     cutoff: of the smoothing that `v` has had, in samples.
     """
-    both = np.column_stack([low_pass(F, 1.0, cutoff), low_pass(u, 1.0, cutoff)])
-    share = actuator_shares(both, v)[0, 1]
+    F, u = low_pass(F, 1.0, cutoff), low_pass(u, 1.0, cutoff)
+    share = changed_by(F[:, None], beside(u[:, None], v), v)[0, 0]
     return float(abs(share)), float(np.sign(share)) or 1.0
 
 
-def actuator_shares(smooth: Array, v: Array) -> Array:
-    """How much of the change of each signal (row) is k1 times each other (column), (k, k).
+def beside(x: Array, v: Array) -> Array:
+    """What of signals (n, k) is neither v (n,) nor constant."""
+    base, _ = np.linalg.qr(np.column_stack([v, np.ones(len(v))]))
+    return np.asarray(x - base @ (base.T @ x))
 
-    Beside k2 v + const, with the sign of k1; smooth: signals (n, k) as smooth as v (n,).
+
+def changed_by(F: Array, u: Array, v: Array) -> Array:
+    """How much of the change of each signal of F (n, j) is k1 u, with the sign of k1, (j, k).
+
+    u (n, k): what of the commands is neither v (n,) nor constant; beside them k2 v + const.
     """
-    base = np.column_stack([v, np.ones(len(v))])
-    base, _ = np.linalg.qr(base)
-    rate = np.gradient(smooth, axis=0)
+    rate = np.gradient(F, axis=0)
     spread = np.maximum(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0), 1e-300)
-    rate, x = rate - base @ (base.T @ rate), smooth - base @ (base.T @ smooth)
-    size = np.maximum(np.sum(x**2, axis=0), 1e-12 * np.sum(smooth**2, axis=0) + 1e-300)
-    together = rate.T @ x
+    size = np.maximum(np.sum(u**2, axis=0), 1e-300)
+    together = beside(rate, v).T @ u
     return np.asarray(np.sign(together) * together**2 / size / spread[:, None])
 
 
@@ -200,7 +203,7 @@ def _explained(X: Array, b: Array) -> tuple[Any, Array]:
     """Share of the variance of b (r,) or (r, j) that the columns (r, k) explain, and how."""
     size = np.sqrt(np.mean(X**2, axis=0))
     size[size == 0.0] = 1.0
-    theta = (np.linalg.lstsq(X / size, b, rcond=1e-10)[0].T / size).T
+    theta = ((np.linalg.pinv(X / size, rcond=1e-10) @ b).T / size).T
     spread = np.var(b, axis=0)
     left = np.var(b - X @ theta, axis=0)
     share = np.maximum(0.0, 1.0 - left / np.where(spread > 0.0, spread, 1.0))

@@ -11,11 +11,12 @@ from identification.signals.differentiate import Motion, low_pass
 from identification.signals.relations import (
     ForceLaw,
     Lead,
-    actuator_shares,
+    beside,
+    changed_by,
     force_laws,
     lead,
 )
-from workbench.steps.first_card.axes import correlation
+from workbench.steps.first_card.axes import correlation, stem
 from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
@@ -37,6 +38,7 @@ class Pairs:
         self.x = np.column_stack([one.x for one in signals])
         self.alike = correlation(self.x)
         self.rate = _rates(self.x)
+        self.stems = [stem(one.header) for one in signals]
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:
         """Commands before a limiter or a sum, by their place: the place of what comes out of it.
@@ -63,13 +65,20 @@ def _rates(x: Array) -> Array:
     for size in STRETCHES:
         if 4 * size > len(x):
             break
-        change, total = mean[size:] - mean[:-size], summed[size:] - summed[:-size]
-        k = x.shape[1]
-        found = correlation(np.hstack([change, total]))[:k, k:]
+        every = max(1, size // 4)
+        change = (mean[size:] - mean[:-size])[::every]
+        found = _normed(change).T @ _normed((summed[size:] - summed[:-size])[::every])
         share = np.sign(found) * found**2
         best = np.where(np.abs(share) > np.abs(best), share, best)
     np.fill_diagonal(best, 0.0)
     return best
+
+
+def _normed(x: Array) -> Array:
+    """Columns (n, k) without their mean, of length one."""
+    a = x - x.mean(axis=0)
+    size = np.sqrt(np.sum(a**2, axis=0))
+    return np.asarray(a / np.where(size > 0.0, size, 1.0))
 
 
 def _clipped(before: Column, behind: Column) -> bool:
@@ -136,6 +145,7 @@ class Seen:
         self.v_factor = together / square
         self.v_share = together**2 / square / np.maximum(np.sum(f**2, axis=0), 1e-300)
         self._leads = dict[int, Lead]()
+        self.as_reference = dict[int, float]()
 
     @cached_property
     def laws(self) -> list[ForceLaw]:
@@ -152,7 +162,21 @@ class Seen:
             self._leads[k] = lead(self.pairs.x[:, k], self.y.x)
         return self._leads[k]
 
+    @cached_property
+    def _beside(self) -> Array:
+        return beside(self.smooth, self.motion.v)
+
+    @cached_property
+    def _rates(self) -> Array:
+        """The change of each column, its share of the velocity taken out, over its spread."""
+        rate = np.gradient(self.smooth, axis=0)
+        spread = np.sqrt(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0))
+        return beside(rate, self.motion.v) / np.maximum(spread, 1e-300)
+
     def moves(self, F: Array) -> Array:
         """How much more the change of F (n,), smoothed, follows each column than its follows F."""
-        both = actuator_shares(np.column_stack([F, self.smooth]), self.motion.v)
-        return np.asarray(np.abs(both[0, 1:]) - np.abs(both[1:, 0]))
+        v = self.motion.v
+        there = np.abs(changed_by(F[:, None], self._beside, v)[0])
+        own = beside(F[:, None], v)[:, 0]
+        back = (own @ self._rates) ** 2 / max(float(own @ own), 1e-300)
+        return np.asarray(there - back)

@@ -134,12 +134,13 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
 def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     """The columns that may be the position, likeliest first, with their log-odds so far."""
     found = []
+    derived = among_derivatives(pairs)
     for k, one in enumerate(pairs.signals):
         head = said(one, "y")
         if (only is not None and one is not only) or (head <= -4.0 and one is not only):
             continue
         if one.motion is not None:
-            found.append((head + moves_like_a_body(one) + among_derivatives(pairs, k), k))
+            found.append((head + moves_like_a_body(one) + derived[k], k))
     found.sort(reverse=True)
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
     return [(Seen(pairs, k), score) for score, k in likely]
@@ -217,11 +218,13 @@ def _with_reference(way: _Way) -> float:
 
 
 def _gain_of_reference(seen: Seen, k: int) -> float:
-    one = seen.pairs.signals[k]
-    head = said(one, "r")
-    if head < -3.0:
-        return head
-    return head + ahead_of(seen, k) + together(seen.y, one)
+    """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
+    if k not in seen.as_reference:
+        one = seen.pairs.signals[k]
+        head = said(one, "r")
+        more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
+        seen.as_reference[k] = head + more
+    return seen.as_reference[k]
 
 
 def _filled(way: _Way) -> _Choice:
@@ -255,7 +258,7 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
     moved: how much more the force's change follows it than the other way round.
     """
     seen, one = way.seen, way.seen.pairs.signals[k]
-    head = said(one, role) + (0.0 if role == "temperature" else together(seen.y, one))
+    head = said(one, role) + together(seen.y, one)
     if role == "r":
         return _gain_of_reference(seen, k)
     if role in ("u", "v", "a") and head < -3.0:

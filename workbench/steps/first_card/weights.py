@@ -4,14 +4,14 @@ All numbers are by hand, chosen on the seeds that `benchmarks/init_files.py` nam
 sure". A word may be wrong and so may a regression; the sum decides.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
-from workbench.steps.first_card.axes import stem
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
 
@@ -113,15 +113,13 @@ def moves_like_a_body(y: Column) -> float:
     return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
-def among_derivatives(pairs: Pairs, k: int) -> float:
-    """Log-odds of a position by what it is the derivative of, and what is its own."""
+def among_derivatives(pairs: Pairs) -> Array:
+    """Log-odds of each column as a position, by what it is the derivative of, and what its own."""
     bodies = [i for i, one in enumerate(pairs.signals) if said(one, "y") > -4.0]
-    of_others = max((pairs.rate[i, k] for i in bodies if i != k), default=0.0)
-    own = max(
-        (pairs.rate[k, j] for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0),
-        default=0.0,
-    )
-    return (-4.0 if of_others > ALL_VELOCITY else 0.0) + (1.0 if own > ALL_VELOCITY else 0.0)
+    speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
+    of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
+    own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
+    return np.where(of_others > ALL_VELOCITY, -4.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
 
 
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
@@ -211,14 +209,14 @@ def ahead_of(seen: Seen, k: int) -> float:
         score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
     score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
-    return score + _named_for(one, y, seen.pairs.signals)
+    return score + _named_for(seen, k)
 
 
-def _named_for(reference: Column, y: Column, others: Sequence[Column]) -> float:
+def _named_for(seen: Seen, k: int) -> float:
     """Log-odds that a reference is that of y, where its header repeats a position's name."""
-    own = stem(reference.header)
-    if not own:
+    stems = seen.pairs.stems
+    if not stems[k]:
         return 0.0
-    if own == stem(y.header):
+    if stems[k] == stems[seen.at]:
         return SAME_STEM
-    return OTHER_STEM if any(own == stem(x.header) for x in others if x is not reference) else 0.0
+    return OTHER_STEM if stems.count(stems[k]) > 1 else 0.0
