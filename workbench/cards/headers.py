@@ -15,7 +15,7 @@ Quantity = Literal[
     "time", "position", "velocity", "acceleration", "force", "pressure", "command", "temperature",
     "count", "other",
 ]  # fmt: skip
-Purpose = Literal["reference", "measured", "error", "model", ""]
+Purpose = Literal["reference", "demand", "measured", "error", "model", ""]
 
 
 @dataclass(frozen=True)
@@ -185,11 +185,11 @@ _MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5,
 _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
               "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
               "planned")  # fmt: skip
-_REFERENCE_SHORT = ("r", "w", "ref", "sp", "set", "des", "cmd", "tgt")
-_MEASURED = ("actual", "measured", "feedback", "gemessen", "実", "現在", "測定", "messwert",
+_REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
+_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定", "messwert",
              "encoder")  # fmt: skip
 _MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
-_MODEL = ("predict", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
+_MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
           "推定", "vorhersage")  # fmt: skip
 _MODEL_SHORT = ("pred", "hat", "sim", "mdl", "nn", "mlp", "lstm", "net", "modell")
 _ERRORS = ("error", "abweichung", "differenz", "schleppfehler", "偏差", "deviation", "following")
@@ -218,7 +218,7 @@ def read_header(text: str, unit_below: str = "") -> Header:
     if lengths and "command" in words and not purpose:
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
-        purpose = ""  # a voltage or current that is asked for is the command
+        purpose = "demand"  # a voltage or current that is asked for is the command
     elif purpose == "reference" and not means:
         means = {"position": 1.5}
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)

@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from identification.arrays import Array
+from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.roles import Roles
@@ -13,6 +14,9 @@ WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a wh
 TURNS = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
+COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
+CURRENTS = ("current", "strom", "電流", "courant", "corrente", " iq ", " i q ", " isq ", " ia ",
+            " i a ", " amp")  # fmt: skip
 ROTOR = 1.5  # the same of words that speak of a motor's own shaft
 
 
@@ -50,11 +54,33 @@ def told_motion(roles: Roles) -> MotionGuess:
     turn = unit_by_turn(roles.columns["y"])
     if turn is not None:
         return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
+    if _counted_shaft(roles):
+        why = "counts of an encoder beside a motor's current are mostly those of a shaft"
+        return MotionGuess("rotary", why, False, rotor)
     if sum(weak.values()) >= TURNING:
         most = roles.columns[max(weak, key=lambda one: weak[one])]
         why = f"machines that turn have names like {most.shown} more often"
         return MotionGuess("rotary", why, False, rotor)
     return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
+
+
+def _counted_shaft(roles: Roles) -> bool:
+    """Whether a position in counts is driven by a current."""
+    return "u" in roles.columns and is_count(roles.columns["y"]) and is_current(roles.columns["u"])
+
+
+def is_count(y: Column) -> bool:
+    """Whether a position has whole numbers of an encoder, by its unit or by its values."""
+    unit = y.header.unit
+    return unit.quantity == "count" if unit else y.whole and len(y.levels) > COUNTED_LEVELS
+
+
+def is_current(u: Column) -> bool:
+    """Whether a command is a current, by its unit or by its name."""
+    text = f" {' '.join(words_of(u.header.name))} "
+    if u.header.unit is not None:
+        return u.header.unit.card in ("A", "mA")
+    return any(one in text for one in CURRENTS)
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:

@@ -40,6 +40,7 @@ from workbench.steps.first_card.weights import (
 )
 
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
+FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
@@ -141,7 +142,12 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
             continue
         if one.motion is not None:
             found.append((head + moves_like_a_body(one) + derived[k], k))
-    found.sort(reverse=True)
+    first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
+    found = sorted(
+        ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)
+         for own, k in found),
+        reverse=True,
+    )  # fmt: skip
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
     return [(Seen(pairs, k), score) for score, k in likely]
 

@@ -8,11 +8,10 @@ from identification.arrays import Array
 from identification.signals.relations import derivative, lead
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column, Columns
-from workbench.steps.first_card.motion_guess import counts_per_turn
+from workbench.steps.first_card.motion_guess import counts_per_turn, is_count
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre
 
-COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
 ABOUT = 0.05  # that a round gain is off what the log shows
@@ -71,9 +70,7 @@ def _by_velocity(
 def is_output(column: Column) -> bool:
     """Whether a position is what a sensor gives: counts, volts, or whole numbers without a unit."""
     unit = column.header.unit
-    if unit is not None:
-        return unit.quantity in SENSOR_OUTPUTS
-    return column.whole and len(column.levels) > COUNTED_LEVELS
+    return is_count(column) or (unit is not None and unit.quantity in SENSOR_OUTPUTS)
 
 
 def _slow_ratio(y: Array, r: Array) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.signals.relations import derivative
 from workbench.steps.first_card.columns import Column, Columns
-from workbench.steps.first_card.motion_guess import MotionGuess, unit_by_turn
+from workbench.steps.first_card.motion_guess import MotionGuess, is_current, unit_by_turn
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sensor_gain import by_reference, by_sample_number, counts_samples
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
@@ -30,6 +30,7 @@ OFF_RATE = 0.05  # relative error from which clock and velocity contradict each 
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
+SHARES = ("pwm", "duty", "tastgrad")
 USUAL_COMMANDS = {"V": "A", "A": "V", "1": "%", "%": "1"}  # and what it is otherwise
 
 Units = dict[str, UnitGuess]
@@ -212,10 +213,10 @@ def _of_command(column: Column) -> UnitGuess:
     """Volts, amperes, percent or a share, by words and limits."""
     finite = column.values[np.isfinite(column.values)]
     peak = float(np.max(np.abs(finite)))
-    text = f" {' '.join(column.header.name.casefold().replace('_', ' ').split())} "
+    text = column.header.name.casefold()
     if column.bits is not None:
         return UnitGuess("1", None, False, "a register: its full scale is in no log")
-    if any(one in text for one in CURRENTS):
+    if is_current(column):
         return _command("A", "the header speaks of a current")
     if any(one in text for one in SHARES) or 0.9 <= peak <= 1.0:
         return _command("1" if peak <= 1.0 else "%", "by its size: a share of all")
@@ -226,7 +227,3 @@ def _of_command(column: Column) -> UnitGuess:
 
 def _command(unit: str, why: str) -> UnitGuess:
     return UnitGuess(unit, None, False, why, USUAL_COMMANDS[unit])
-
-
-CURRENTS = ("current", "strom", "電流", "courant", "corrente", "i q ", "iq", "i a ", " ia ", " amp")
-SHARES = ("pwm", "duty", "tastgrad")

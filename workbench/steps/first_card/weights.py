@@ -48,7 +48,8 @@ STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which
 NEVER = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
 AS_FAR = 0.25  # of its range, that a reference of few levels is off the position's at most
-OF_A_MODEL = -5.0  # for what another model says, beside what is measured
+OF_A_MODEL = -9.0  # for what another model says, beside what is measured
+ALIKE, MOST_ALIKE = 1.5, 3.5  # for each decade by which a reference is nearer to the position
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -83,6 +84,8 @@ def _by_purpose(one: Column, role: str) -> float:
         )
     if purpose == "measured":
         return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
+    if purpose == "demand":  # what is measured beside it acts
+        return -1.0 if role == "u" else 0.0
     return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
 
 
@@ -198,7 +201,7 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    score = 4.0 * found.likeness - 2.0
+    score = min(-ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
