@@ -72,7 +72,7 @@ def machine(rng: np.random.Generator, t: Array, kind: Kind) -> dict[str, Array]:
         y += h * v
         for name, x in (("y", y), ("v", v), ("u0", u0), ("u", u), ("F", drive)):
             out[name][k] = x
-    step = size * 2.0 * np.pi / 2 ** rng.integers(13, 17)
+    step = 2.0 * np.pi / 2.0 ** rng.integers(13, 17) if kind.rotary else 1e-6
     noisy = out["y"] + 0.2 * step * rng.standard_normal(len(t))
     y = step * np.round(noisy / step)
     late = np.concatenate([np.full(8, y[0]), y[:-8]])

@@ -122,7 +122,7 @@ def among_derivatives(pairs: Pairs) -> Array:
     speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
     of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
     own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
-    return np.where(of_others > ALL_VELOCITY, -4.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
+    return np.where(of_others > ALL_VELOCITY, -6.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
 
 
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
