@@ -18,7 +18,7 @@ import argparse
 import sys
 import tempfile
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -81,7 +81,7 @@ def machine(rng: np.random.Generator, t: Array, kind: Kind) -> dict[str, Array]:
         "v": out["v"] + 0.01 * np.std(out["v"]) * rng.standard_normal(len(t)),
         "F": out["F"] + 0.01 * limit * rng.standard_normal(len(t)),
         "a": np.gradient(out["v"], h), "e": r - y,
-        "pred": np.convolve(late, np.ones(5) / 5, "same") + 0.3 * step * rng.standard_normal(len(t)),
+        "pred": np.convolve(late, np.ones(5) / 5, "same") + 0.3 * step * rng.normal(size=len(t)),
         "id": 0.05 * limit * rng.standard_normal(len(t)),
     }  # fmt: skip
 

@@ -106,7 +106,8 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     " 荷重 推力",
     "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧",
     "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
-    " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom courant corrente 電流 motor",
+    " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
+    " courant corrente 電流 motor",
     "temperature": "temperatur temper temp thermo 温度",
     "count": "index idx sample counter scan zaehler lfd row 番号 連番",
     "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
@@ -186,8 +187,8 @@ _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "
               "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
               "planned")  # fmt: skip
 _REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
-_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定", "messwert",
-             "encoder")  # fmt: skip
+_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定",
+             "messwert", "encoder")  # fmt: skip
 _MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
 _MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
           "推定", "vorhersage")  # fmt: skip

@@ -103,7 +103,9 @@ def _read_mat(path: Path, spec: FileSpec) -> Table:
         if isinstance(inner, np.ndarray):
             return of_matrix(path, inner, spec)
         found = {name: getattr(inner, name) for name in inner._fieldnames}
-    return of_vectors({name: np.atleast_1d(np.asarray(value)) for name, value in found.items()}, spec)
+    return of_vectors(
+        {name: np.atleast_1d(np.asarray(value)) for name, value in found.items()}, spec
+    )
 
 
 def _read_hdf5(path: Path, spec: FileSpec) -> Table:

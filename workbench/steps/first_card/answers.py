@@ -13,7 +13,15 @@ from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, 
 
 LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
-OTHER_MOTION = {"m": "rad", "mm": "deg", "rad": "m", "deg": "mm", "turn": "mm", "N": "N m", "N m": "N"}
+OTHER_MOTION = {
+    "m": "rad",
+    "mm": "deg",
+    "rad": "m",
+    "deg": "mm",
+    "turn": "mm",
+    "N": "N m",
+    "N m": "N",
+}
 GAIN = re.compile(r"[\d.]+ \S+/\S+")
 
 
