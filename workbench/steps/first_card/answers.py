@@ -13,15 +13,9 @@ from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, 
 
 LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
-OTHER_MOTION = {
-    "m": "rad",
-    "mm": "deg",
-    "rad": "m",
-    "deg": "mm",
-    "turn": "mm",
-    "N": "N m",
-    "N m": "N",
-}
+OTHER_MOTION = {"m": "rad", "mm": "deg", "um": "deg", "rad": "m", "deg": "mm", "turn": "mm",
+                "N": "N m", "kN": "N m", "mN": "mN m", "N m": "N", "mN m": "N"}  # fmt: skip
+OTHER_GAIN = {"mm": "turn", "turn": "mm"}
 GAIN = re.compile(r"[\d.]+ \S+/\S+")
 
 
@@ -90,7 +84,7 @@ def _turned(one: SignalGuess) -> SignalGuess:
     if isinstance(gain, str):
         number, _, per = gain.partition(" ")
         above, _, below = per.partition("/")
-        gain = f"{number} {above}/{OTHER_MOTION.get(below, below)}"
+        gain = f"{number} {above}/{OTHER_GAIN.get(below, OTHER_MOTION.get(below, below))}"
     return replace(one, unit=OTHER_MOTION.get(one.unit, one.unit), gain=gain, rival="")
 
 

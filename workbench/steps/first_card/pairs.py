@@ -171,7 +171,7 @@ class Seen:
         """The change of each column, its share of the velocity taken out, over its spread."""
         rate = np.gradient(self.smooth, axis=0)
         spread = np.sqrt(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0))
-        return beside(rate, self.motion.v) / np.maximum(spread, 1e-300)
+        return np.asarray(beside(rate, self.motion.v) / np.maximum(spread, 1e-300))
 
     def moves(self, F: Array) -> Array:
         """How much more the change of F (n,), smoothed, follows each column than its follows F."""

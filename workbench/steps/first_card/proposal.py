@@ -140,7 +140,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         motion=motion.motion,
         spec=columns.spec,
         signals=tuple(_signals(columns, roles, units)),
-        rig=tuple(one for one in rig if one is not None),
+        rig=tuple(rig),
         unused=_unused(columns, roles),
         columns=tuple(
             FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
