@@ -107,7 +107,7 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
         except (TypeError, ValueError):
             if str(text).strip().lower() not in ("true", "false"):
                 shown = repr(str(text).strip()[:20])
-                alone = len(set(raw.tolist())) == 1
+                alone = len(set(raw.tolist())) == 1 and not str(text).strip().isalnum()
                 return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
             out[k] = float(str(text).strip().lower() == "true")
     return out, ""
