@@ -129,7 +129,7 @@ def make_table(seed: int, part: str, folder: Path) -> Table:
     kind = KINDS[part][seed % len(KINDS[part])]
     words = LANGUAGES[part][str(rng.choice(list(LANGUAGES[part])))]
     h = float(rng.choice([1e-3, 2e-3, 4e-3, 5e-3]))
-    t = h * np.arange(int(rng.integers(4000, 8000)))
+    t: Array = h * np.arange(int(rng.integers(4000, 8000)), dtype=np.float64)
     axes = [str(k) for k in kind.axes] or [""]
     style = str(rng.choice(STYLES)) if rng.random() < kind.units else ""
     clock = str(rng.choice(["s", "ms"])) if style else "s"
@@ -189,7 +189,7 @@ def _write(
 ) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     if kind.suffix == ".npz":
-        np.savez(path, **{name.replace("/", "_"): x for name, x in columns})
+        np.savez(path, **{name.replace("/", "_"): x for name, x in columns})  # type: ignore[arg-type]
         return
     names, table = [name for name, _ in columns], np.column_stack([x for _, x in columns])
     gap = ", " if rng.random() < 0.2 else ","

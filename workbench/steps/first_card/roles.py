@@ -142,6 +142,10 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
             continue
         if one.motion is not None:
             found.append((head + moves_like_a_body(one) + derived[k], k))
+    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_TELLS]
+    if named:  # beside a position that is called one no reference or model is any
+        beside = ("reference", "model")
+        found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
     first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
     found = sorted(
         ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)

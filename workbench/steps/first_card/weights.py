@@ -79,7 +79,7 @@ def _by_purpose(one: Column, role: str) -> float:
     purpose, means = one.header.purpose, one.header.means
     if purpose == "reference":
         other = means and "position" not in means
-        return {"r": -3.0 if other else 4.0, "y": -5.0, "F": -4.0, "p": -4.0, "v": -3.0}.get(
+        return {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0}.get(
             role, 0.0
         )
     if purpose == "measured":
