@@ -11,7 +11,9 @@ of "|". Machines are simulated here: mass, Coulomb and viscous friction, a loop.
 
 Right at first: kind of rig, motion and each signal equal in SI to the original, up to a common sign
 and offsets. With the other: as many lines put right by the answer "+". Kinds and languages of the
-part "choose" served to choose weights; those of "judge" judge.
+part "choose" served to choose weights; those of "judge" judge. After its first run three words of a
+header were added (measured, predicted and demanded, abbreviated or in French), and counts beside a
+current made a shaft.
 """
 
 import argparse
