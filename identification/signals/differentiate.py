@@ -146,7 +146,7 @@ def low_pass(x: Array, h: float, cutoff: float, order: int = ORDER) -> Array:
     if cutoff * h >= 0.5:
         return np.array(x, dtype=np.float64)
     sections = signal.butter(order, cutoff, fs=1.0 / h, output="sos")
-    pad = min(len(x) - 1, int(np.ceil(FILTER_SETTLED / (cutoff * h))))
+    pad = min(np.shape(x)[-1] - 1, int(np.ceil(FILTER_SETTLED / (cutoff * h))))
     return np.asarray(signal.sosfiltfilt(sections, x, padlen=pad), dtype=np.float64)
 
 

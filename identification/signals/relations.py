@@ -5,7 +5,7 @@ body and is eaten up by friction; a velocity is the position's derivative; a com
 or is one; a reference is ahead of the position.
 """
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -89,25 +89,44 @@ def derivative(motion: Motion, x: Array) -> Derivative:
 
 def force_law(motion: Motion, y: Array, f: Array) -> ForceLaw | None:
     """How far f (n,) is the force that moves a body at y (n,); None where too little moves."""
+    smooth = low_pass(f, 1.0, motion.cutoff)
+    return next(iter(force_laws(motion, y, f[:, None], smooth[:, None])), None)
+
+
+def force_laws(motion: Motion, y: Array, f: Array, smooth: Array) -> list[ForceLaw]:
+    """As `force_law`, of the columns of f (n, k) and the same as smooth as the motion is, (n, k).
+
+    Empty where too little moves.
+    """
     sure = moving(motion)
     if np.sum(sure) < FEWEST_MOVING:
-        return None
+        return []
     up = motion.v[sure] > 0
     both = min(np.sum(up), np.sum(~up)) >= FEWEST_OF_A_WAY
-    smooth = low_pass(f, 1.0, motion.cutoff)
     step = np.sign(motion.v) if both else np.zeros(len(y))
     X = np.column_stack([motion.a, motion.v, step, np.ones(len(y))])[sure]
     b = smooth[sure]
     share, theta = _explained(X, b)
     without, _ = _explained(X[:, [0, 1, 3]], b)
-    work = work_share(y, f) or 0.0
-    if abs(work) > TELLS_SIGN:
-        way = float(np.sign(work))
+    work = [work_share(y, one) or 0.0 for one in f.T]
+    onwards = np.zeros(f.shape[1]) if both else float(np.sign(motion.v[sure].mean())) * b.mean(0)
+    return [
+        _law(share[k], share[k] - without[k] if both else None, theta[:, k], work[k], onwards[k])
+        for k in range(f.shape[1])
+    ]
+
+
+def _law(
+    share: float, friction: float | None, theta: Array, work: float, onwards: float
+) -> ForceLaw:
+    """onwards: the mean of a signal along a motion that goes one way only, else 0."""
+    if abs(work) > TELLS_SIGN or onwards != 0.0:
+        way = float(np.sign(work if abs(work) > TELLS_SIGN else onwards))
     else:
         way = float(np.sign(theta[2])) or float(np.sign(theta[1])) or 1.0
-    friction = share - without if both else None
     balance, coulomb, m = float(theta[3]), float(theta[2]), float(theta[0])
-    return ForceLaw(share, friction, way, work, balance, coulomb, m)
+    step = None if friction is None else float(friction)
+    return ForceLaw(float(share), step, way, work, balance, coulomb, m)
 
 
 def lead(first: Array, second: Array) -> Lead:
@@ -157,22 +176,38 @@ def actuator_share(F: Array, v: Array, u: Array, cutoff: float) -> tuple[float, 
 
     cutoff: of the smoothing that `v` has had, in samples.
     """
-    rate = np.gradient(low_pass(F, 1.0, cutoff))
-    X = np.column_stack([low_pass(u, 1.0, cutoff), v, np.ones(len(v))])
-    share, theta = _explained(X, rate)
-    without, _ = _explained(X[:, 1:], rate)
-    return share - without, float(np.sign(theta[0])) or 1.0
+    F, u = low_pass(F, 1.0, cutoff), low_pass(u, 1.0, cutoff)
+    share = changed_by(F[:, None], beside(u[:, None], v), v)[0, 0]
+    return float(abs(share)), float(np.sign(share)) or 1.0
 
 
-def _explained(X: Array, b: Array) -> tuple[float, Array]:
-    """Share of the variance of b (r,) that the columns (r, k) explain, and the coefficients."""
+def beside(x: Array, v: Array) -> Array:
+    """What of signals (n, k) is neither v (n,) nor constant."""
+    base, _ = np.linalg.qr(np.column_stack([v, np.ones(len(v))]))
+    return np.asarray(x - base @ (base.T @ x))
+
+
+def changed_by(F: Array, u: Array, v: Array) -> Array:
+    """How much of the change of each signal of F (n, j) is k1 u, with the sign of k1, (j, k).
+
+    u (n, k): what of the commands is neither v (n,) nor constant; beside them k2 v + const.
+    """
+    rate = np.gradient(F, axis=0)
+    spread = np.maximum(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0), 1e-300)
+    size = np.maximum(np.sum(u**2, axis=0), 1e-300)
+    together = beside(rate, v).T @ u
+    return np.asarray(np.sign(together) * together**2 / size / spread[:, None])
+
+
+def _explained(X: Array, b: Array) -> tuple[Any, Array]:
+    """Share of the variance of b (r,) or (r, j) that the columns (r, k) explain, and how."""
     size = np.sqrt(np.mean(X**2, axis=0))
     size[size == 0.0] = 1.0
-    theta = np.linalg.lstsq(X / size, b, rcond=1e-10)[0] / size
-    spread = float(np.var(b))
-    if spread == 0.0:
-        return 0.0, theta
-    return max(0.0, 1.0 - float(np.var(b - X @ theta)) / spread), theta
+    theta = ((np.linalg.pinv(X / size, rcond=1e-10) @ b).T / size).T
+    spread = np.var(b, axis=0)
+    left = np.var(b - X @ theta, axis=0)
+    share = np.maximum(0.0, 1.0 - left / np.where(spread > 0.0, spread, 1.0))
+    return np.where(spread > 0.0, share, 0.0), theta
 
 
 def command_lag(target: Array, others: Array, u: Array, longest: int) -> tuple[float, float]:

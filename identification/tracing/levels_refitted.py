@@ -26,7 +26,7 @@ from identification.tracing.result import Change
 
 BEGIN = 0.25  # of a test log, on which the levels are fitted
 LONGEST_STEP = 0.2  # of a level, with which a search for the nearest minimum begins
-GRID = np.linspace(-0.2, 0.4, 7)  # of a level, from where it begins
+SHIFTS = np.linspace(-0.2, 0.4, 7)  # of a level, from where it begins
 ROUNDS = 80  # of a search
 LENGTH = {"linear": "m", "rotary": "rad"}
 NOTHING: tuple[tuple[Change, ...], str] = ((), "")
@@ -90,7 +90,7 @@ def _fitted(plant: Plant, logs: Sequence[Log], drive: Drive) -> Array:
     def cost(x: Array) -> float:
         return _rms(_with(plant, x * scale), logs, drive)
 
-    start = min(((a, b) for a in GRID for b in GRID), key=lambda x: cost(np.array(x)))
+    start = min(((a, b) for a in SHIFTS for b in SHIFTS), key=lambda x: cost(np.array(x)))
     simplex = np.array(start) + LONGEST_STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     options: Any = {"initial_simplex": simplex, "maxiter": ROUNDS, "xatol": 1e-4, "fatol": 0.0}
     return np.asarray(

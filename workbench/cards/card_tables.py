@@ -19,7 +19,9 @@ from workbench.cards.sensors import column_scale, command_unit, parse_gain
 from workbench.cards.table import CardTable, Positive
 from workbench.cards.units import LONGEST_UNIT, Scale, force_unit
 
-Format = Literal["csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel"]
+Format = Literal[
+    "csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel", "npy",
+]  # fmt: skip
 
 
 class About(CardTable):

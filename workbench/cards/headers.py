@@ -15,7 +15,7 @@ Quantity = Literal[
     "time", "position", "velocity", "acceleration", "force", "pressure", "command", "temperature",
     "count", "other",
 ]  # fmt: skip
-Purpose = Literal["reference", "measured", "error", ""]
+Purpose = Literal["reference", "demand", "measured", "error", "model", ""]
 
 
 @dataclass(frozen=True)
@@ -30,10 +30,11 @@ class WrittenUnit:
 @dataclass(frozen=True)
 class Header:
     """A header read: its text, the name without the unit, the unit (None: none), the quantities
-    that its words mean with their weight, what the signal is for, and whether it speaks of an
-    angle.
+    that its words mean with their weight, what the signal is for ("model": what another model
+    says), and whether it speaks of an angle.
 
-    doubtful: the unit may as well belong to the name, as the m of "y_m".
+    doubtful: the unit may as well belong to the name, as the m of "y_m"; turning: log-odds of a
+    machine that turns, by words that others have too.
     """
 
     text: str
@@ -43,6 +44,7 @@ class Header:
     purpose: Purpose
     angle: bool
     doubtful: bool = False
+    turning: float = 0.0
 
 
 _SPELT: Mapping[Quantity, str] = {  # card's unit: spellings
@@ -104,11 +106,16 @@ _WORDS: Mapping[Quantity, str] = {  # parts of words, long ones first where they
     " 荷重 推力",
     "pressure": "pressure pression presion pressione press druck chamber kammer 圧力 圧",
     "command": "command cmd valve ventil stell control ctrl pwm duty voltage spannung dac output"
-    " ansteuerung aussteuerung 電圧 操作量 指令 current strom courant corrente 電流 motor",
+    " ansteuerung aussteuerung 電圧 操作量 指令 制御 入力 出力 current strom"
+    " courant corrente 電流 motor",
     "temperature": "temperatur temper temp thermo 温度",
     "count": "index idx sample counter scan zaehler lfd row 番号 連番",
     "other": "status enable flag state mode alarm freigabe error err abweichung differenz"
-    " schleppfehler 偏差 supply versorgung input_volts 電源",
+    " schleppfehler 偏差 supply versorgung input_volts 電源 saturation saturated sättigung"
+    " saettigung activated active aktiv fault warning warnung valid betriebsart zustand state"
+    " battery batterie akku vbus vbat vdc vcc udc zwischenkreis power leistung energy energie"
+    " i2t gain trigger 状態 異常 電力 trust feedforward vorsteuerung humidity frequency frequenz"
+    " load_cycle checksum crc latency",
 }
 _SHORT: Mapping[str, Mapping[Quantity, float]] = {  # whole words of up to three letters
     "t": {"time": 3.0, "temperature": 0.5},
@@ -136,17 +143,58 @@ _SHORT: Mapping[str, Mapping[Quantity, float]] = {  # whole words of up to three
     "tau": {"force": 2.0},
     "mot": {"command": 1.0},
     "dt": {"time": 1.0},
+    "iq": {"command": 3.0},
+    "isq": {"command": 3.0},
+    "ia": {"command": 2.5},
+    "im": {"command": 2.0},
+    "amp": {"command": 2.0},
+    "uq": {"command": 2.0},
+    "vq": {"command": 2.0},
+    "ua": {"command": 2.0},
+    "id": {"other": 2.0},
+    "isd": {"other": 2.0},
+    "ud": {"other": 2.0},
+    "vd": {"other": 2.0},
+    "kp": {"other": 2.0},
+    "ki": {"other": 2.0},
+    "kd": {"other": 2.0},
+    "ff": {"other": 1.5},
+    "qd": {"velocity": 2.0},
+    "dq": {"velocity": 2.0},
+    "dx": {"velocity": 2.0},
+    "dy": {"velocity": 2.0},
+    "qdd": {"acceleration": 2.0},
+    "ddq": {"acceleration": 2.0},
+    "acc": {"acceleration": 3.0},
+    "rpm": {"velocity": 3.0},
+    "enc": {"position": 2.0},
+    "alpha": {"position": 1.5},
+    "beta": {"position": 1.5},
+    "psi": {"position": 1.5},
+    "trq": {"force": 3.0},
+    "tor": {"force": 2.0},
+    "in": {"command": 1.0},
+    "out": {"command": 1.0},
 }
-_ANGLES = ("angle", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque", "トルク",
-           "drehmoment", "drehzahl", "omega")  # fmt: skip
+_ANGLES = ("angle", "angul", "winkel", "theta", "phi", "角度", "回転", "joint", "gelenk", "torque",
+           "トルク", "drehmoment", "motormoment", "drehzahl", "omega", "rpm", "elbow", "knee",
+           "wrist", "shoulder", "pendulum", "pendel", "関節")  # fmt: skip
+# Words that machines which turn use more than others: currents of a rotor's axes, Greek letters.
+_MAY_TURN = {"iq": 1.5, "isq": 1.5, "uq": 1.5, "vq": 1.5, "id": 1.0, "tau": 1.5, "alpha": 1.0,
+             "beta": 1.0, "psi": 1.0, "q": 0.5, "qd": 0.5, "hip": 1.5, "yaw": 1.5, "moment": 1.0,
+             "phase": 0.5, "steering": 1.0, "axle": 1.0, "arm": 0.5}  # fmt: skip
 _REFERENCE = ("soll", "setpoint", "sollwert", "reference", "target", "demand", "desired", "goal",
               "vorgabe", "consigne", "fuehrung", "führung", "目標", "指令", "rif", "trajectory",
               "planned")  # fmt: skip
-_REFERENCE_SHORT = ("r", "w", "ref", "sp", "set", "des", "cmd", "tgt")
-_MEASURED = ("actual", "measured", "feedback", "gemessen", "実", "現在", "測定", "messwert",
-             "encoder")  # fmt: skip
+_REFERENCE_SHORT = ("r", "w", "ref", "dem", "sp", "set", "des", "cmd", "tgt")
+_MEASURED = ("actual", "measured", "mesur", "feedback", "gemessen", "実", "現在", "測定",
+             "messwert", "encoder")  # fmt: skip
 _MEASURED_SHORT = ("ist", "act", "meas", "mes", "fb", "fbk", "m")
+_MODEL = ("predi", "model", "simul", "virtual", "expected", "observer", "kalman", "予測",
+          "推定", "vorhersage")  # fmt: skip
+_MODEL_SHORT = ("pred", "hat", "sim", "mdl", "nn", "mlp", "lstm", "net", "modell")
 _ERRORS = ("error", "abweichung", "differenz", "schleppfehler", "偏差", "deviation", "following")
+_SUPPLIES = ("input volt", "supply", "batter", "dc link", "v bus", "present voltage")
 _TWO_WEIGHTS = 3.0  # of a word that says what a column is
 
 
@@ -157,18 +205,26 @@ def read_header(text: str, unit_below: str = "") -> Header:
     if unit_below.strip():
         below = written_unit(unit_below.strip().strip("[](){}<> "))
         name, unit, doubtful = (plain, below, False) if below else (name, unit, doubtful)
-    words = _words(name)
-    means = _meanings(words, " ".join(_words(plain)))
+    words = words_of(name)
+    if words[:1] == ["i"] and len(words) > 1 and words[1] in ("a", "q", "m", "mot"):
+        words = ["iq" if words[1] == "q" else "ia", *words[2:]]  # "I_a" is no ampere
+    means = _meanings(words, " ".join(words_of(plain)))
     if doubtful and unit and means and unit.quantity not in means:
         name, unit, doubtful = plain, None, False
+    elif doubtful and unit and unit.quantity != "position":  # time_s, but not y_m: measured
+        doubtful = not means or not plain.endswith(unit.card)
     whole = " ".join(words)
     purpose = _purpose(words, whole, means)
+    lengths = unit is not None and unit.quantity == "position"
+    if lengths and "command" in words and not purpose:
+        means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
-        purpose = ""  # a voltage or current that is asked for is the command
+        purpose = "demand"  # a voltage or current that is asked for is the command
     elif purpose == "reference" and not means:
         means = {"position": 1.5}
     angle = any(one in whole for one in _ANGLES) or bool(unit and unit.rotary)
-    return Header(text, name, unit, means, purpose, angle, doubtful)
+    turning = max((_MAY_TURN.get(word, 0.0) for word in words), default=0.0)
+    return Header(text, name, unit, means, purpose, angle, doubtful, turning)
 
 
 def written_unit(text: str) -> WrittenUnit | None:
@@ -203,7 +259,7 @@ def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     return text, None, False
 
 
-def _words(name: str) -> list[str]:
+def words_of(name: str) -> list[str]:
     """The words of a name in small letters: at case, digits and signs it is parted."""
     parted = re.sub(r"(?<=[a-zäöüß])(?=[A-Z])", " ", name)
     parted = re.sub(r"(?<=\D)(?=\d)|(?<=\d)(?=\D)", " ", parted)
@@ -211,6 +267,17 @@ def _words(name: str) -> list[str]:
     for umlaut, two in (("ä", "ae"), ("ö", "oe"), ("ü", "ue"), ("é", "e"), ("à", "a"), ("ó", "o")):
         small = small.replace(umlaut, two)
     return [one for one in re.split(r"[\W_]+", small) if one]
+
+
+def tells_purpose(word: str) -> bool:
+    """Whether a word tells what a signal is for (soll, actual, cmd), not what it is."""
+    parts = any(one in word for one in (*_REFERENCE, *_MEASURED, *_MODEL))
+    return parts or word in (*_REFERENCE_SHORT, *_MEASURED_SHORT, *_MODEL_SHORT, "command")
+
+
+def meaning(word: str) -> Mapping[Quantity, float]:
+    """Weight of each quantity that a word means by itself."""
+    return _meanings([word], word)
 
 
 def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
@@ -228,16 +295,29 @@ def _meanings(words: list[str], whole: str) -> dict[Quantity, float]:
                     best = (len(part), quantity)
         if best is not None:
             found[best[1]] = max(found.get(best[1], 0.0), _TWO_WEIGHTS)
-    if "input volts" in whole or "supply" in whole or "bus" in words:
+    wrong = any(one in whole for one in _ERRORS) or {"err", "e"} & set(words)
+    if ("other" in found and not wrong) or any(one in whole for one in _SUPPLIES) or "bus" in words:
         return {"other": _TWO_WEIGHTS}
+    if found.get("temperature", 0.0) >= _TWO_WEIGHTS:
+        return {"temperature": _TWO_WEIGHTS}
     if "load" in words:
         found["force"] = max(found.get("force", 0.0), 1.0)
+    if "input" in words and not found:
+        found["command"] = 2.0
+    if any(one.startswith(("ddot", "dotdot")) or one.endswith("ddot") for one in words):
+        return {"acceleration": _TWO_WEIGHTS}
+    if any(one == "dot" or (one.endswith("dot") and len(one) < 9) for one in words):
+        return {"velocity": _TWO_WEIGHTS}
+    if words[:1] == ["current"] and "position" in found:  # the present position
+        found.pop("command", None)
     return found
 
 
 def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> Purpose:
     if any(one in whole for one in _ERRORS) or {"err", "e"} & set(words):
         return "error"
+    if any(one in whole for one in _MODEL) or any(one in _MODEL_SHORT for one in words):
+        return "model"
     if any(one in whole for one in _REFERENCE) or any(one in _REFERENCE_SHORT for one in words):
         return "reference"
     if "command" in words and "position" in means:

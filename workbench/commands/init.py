@@ -24,20 +24,23 @@ CARD = "card.toml"
     help="The card, or a folder for it.  [default: card.toml]",
 )
 @click.option("--name", help="Name of the machine.  [default: that of the log]")
+@click.option("--axis", metavar="NAME", help="Which of several axes or joints in the log.")
 @click.option("--force", is_flag=True, help="Replace a card that is there.")
 @click.option("--yes", is_flag=True, help="Ask nothing; take the guesses.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON; ask nothing.")
 @verbose_option
 @click.option("--debug", is_flag=True, expose_value=False, hidden=True)
 def command(
-    log: Path, out: Path | None, name: str | None, force: bool, yes: bool, as_json: bool
-) -> None:
+    log: Path, out: Path | None, name: str | None, axis: str | None,
+    force: bool, yes: bool, as_json: bool,
+) -> None:  # fmt: skip
     """Propose a card for a log that has none: which column is what, in which unit, and the rig.
 
     It looks at the headers, and at how the columns hang together: a force accelerates the body and
-    is eaten up by friction, a reference is ahead of the position, a speed is its derivative. On a
-    terminal it asks about each guess; else the card is written with a remark on each line, "sure"
-    or "guess", and why. A card that is there is replaced only with --force or your yes.
+    is eaten up by friction, a reference is ahead of the position, a speed is its derivative, what
+    comes out of a limiter acts. On a terminal it asks about each guess; else the card is written
+    with a remark on each line, "sure" or "guess", why, and what it would be otherwise. Of several
+    axes --axis names the one. A card that is there is replaced only with --force or your yes.
     """
     from workbench.report.first_card import proposal_view
     from workbench.steps.first_card.proposal import proposed
@@ -47,7 +50,7 @@ def command(
     asking = not (yes or as_json) and sys.stdin.isatty() and sys.stdout.isatty()
     _refuse_existing(card, force, asking)
     with progress("looking", as_json=as_json):
-        found = proposed(log, name)
+        found = proposed(log, name, axis)
     if asking:
         found = _asked(found)
     text = written(found, asked=asking)
@@ -75,33 +78,50 @@ def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
 
 def _asked(of: "Proposal") -> "Proposal":
     """The proposal after questions on its guesses; Enter takes one as it is."""
-    from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
-
     click.echo(
         f"rig: {of.kind}, {of.motion}; columns: {', '.join(one.shown for one in of.columns)}"
     )
-    click.echo("For each guess: Enter if it is right, else a column, a unit, or both ('x3 mm');"
-               " '-' leaves it out.")  # fmt: skip
+    click.echo("For each guess: Enter if it is right, '+' for the other, else a column, a unit, or"
+               " both ('x3 mm'); '-' leaves it out.")  # fmt: skip
+    keys = [guess.key for guess in of.rig if not guess.sure]
+    for key in (key for key in keys if key == "motion"):  # the units hang on it
+        of = _asked_rig(of, key)
     for name in [one.name for one in of.signals if not one.sure]:
-        while True:
-            one = of.signal(name)
-            assert one is not None
-            gain = "" if one.gain is None else f", gain {one.gain}"
-            said = f"{name}: column {one.shown} in {one.unit}{gain} ({one.why})"
-            try:
-                of = with_signal(of, name, click.prompt(said, default="", show_default=False))
-                break
-            except BadAnswer as error:
-                click.echo(f"  {error}", err=True)
-    for key in [guess.key for guess in of.rig if not guess.sure]:
-        while True:
-            guess = next(guess for guess in of.rig if guess.key == key)
-            value = "nothing" if guess.value is None else guess.value
-            unit = f" {guess.unit}" if guess.value is not None and guess.unit else ""
-            said = f"{key}: {value}{unit} ({guess.why})"
-            try:
-                of = with_rig(of, key, click.prompt(said, default="", show_default=False))
-                break
-            except BadAnswer as error:
-                click.echo(f"  {error}", err=True)
+        of = _asked_signal(of, name)
+    for key in (key for key in keys if key != "motion"):
+        of = _asked_rig(of, key)
     return of
+
+
+def _asked_signal(of: "Proposal", name: str) -> "Proposal":
+    """The proposal after a question on one of its signals, asked until the answer can be one."""
+    from workbench.steps.first_card.answers import BadAnswer, with_signal
+
+    one = of.signal(name)
+    assert one is not None
+    gain = "" if one.gain is None else f", gain {one.gain}"
+    said = f"{name}: column {one.shown} in {one.unit}{gain} ({one.why}{_other(one.rival)})"
+    while True:
+        try:
+            return with_signal(of, name, click.prompt(said, default="", show_default=False))
+        except BadAnswer as error:
+            click.echo(f"  {error}", err=True)
+
+
+def _asked_rig(of: "Proposal", key: str) -> "Proposal":
+    """The proposal after a question on a value of its rig, asked until the answer can be one."""
+    from workbench.steps.first_card.answers import BadAnswer, with_rig
+
+    guess = next(one for one in of.rig if one.key == key)
+    value = "nothing" if guess.value is None else guess.value
+    unit = f" {guess.unit}" if guess.value is not None and guess.unit else ""
+    said = f"{key}: {value}{unit} ({guess.why}{_other(guess.rival)})"
+    while True:
+        try:
+            return with_rig(of, key, click.prompt(said, default="", show_default=False))
+        except BadAnswer as error:
+            click.echo(f"  {error}", err=True)
+
+
+def _other(rival: str) -> str:
+    return f"; + for {rival}" if rival else ""

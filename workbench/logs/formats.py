@@ -28,6 +28,7 @@ _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
     "mdf": (b"MDF     ", b"UnFinMF "),
     "mcap": (b"\x89MCAP0\r\n",),
     "ulog": (b"ULog\x01\x12\x35",),
+    "npy": (b"\x93NUMPY",),
 }
 _SUFFIXES: Mapping[str, Format] = {
     ".parquet": "parquet",
@@ -45,6 +46,8 @@ _SUFFIXES: Mapping[str, Format] = {
     ".xlsb": "excel",
     ".xls": "excel",
     ".ods": "excel",
+    ".npy": "npy",
+    ".npz": "npy",
 }
 
 
@@ -106,6 +109,7 @@ def _check_magic(path: Path, form: Format, head: bytes, spec: FileSpec) -> None:
         "hdf5": HDF5_MAGIC not in head,
         "json": head.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["),
         "excel": not head.startswith((_ZIP, _OLE)),
+        "npy": not head.startswith((*_MAGIC["npy"], _ZIP)),
     }
     if wrong.get(form, form in _MAGIC and not head.startswith(_MAGIC[form])):
         advice = "; copy it again or rename it"

@@ -1,6 +1,6 @@
 """A file as named columns, which its reader hands out one by one."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,6 +8,8 @@ from typing import Any
 from numpy.typing import NDArray
 
 from identification.errors import BadLog
+from identification.signals.check import SHORTEST_LOG
+from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 
 RawColumn = NDArray[Any]
@@ -81,6 +83,27 @@ class Table:
             f"columns {which} (counted from 0) are all named {key!r}; name the right one by its"
             " number in the card"
         )
+
+
+def of_vectors(found: Mapping[str, RawColumn], spec: FileSpec) -> Table:
+    """A table of named vectors; a scalar stays one value, which the caller may spread."""
+
+    def fetch(number: int) -> RawColumn:
+        values = list(found.values())[number].ravel()
+        return values[spec.skip_rows :] if values.size > 1 else values
+
+    return Table(tuple(found), fetch, 1 + spec.skip_rows)
+
+
+def of_matrix(path: Path, values: RawColumn, spec: FileSpec) -> Table:
+    """A table of a matrix, a column a signal; one of a few long rows has a row a signal."""
+    if values.ndim != 2:
+        what = repr(spec.rows) if spec.rows else "the array"
+        raise BadLog(f"{path}: {what} has the shape {values.shape}, rows and columns needed")
+    if values.shape[0] < SHORTEST_LOG <= values.shape[1]:
+        values = values.T
+    names = tuple(str(number) for number in range(values.shape[1]))
+    return Table(names, lambda k: values[spec.skip_rows :, k], 1 + spec.skip_rows, headed=False)
 
 
 def refuse_long(path: Path, rows: int) -> None:

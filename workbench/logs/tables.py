@@ -20,7 +20,16 @@ from workbench.logs.formats import HDF5_MAGIC, checked_format, head_of
 from workbench.logs.mat import tags_are_sound
 from workbench.logs.mcap import read_mcap
 from workbench.logs.mdf import read_mdf
-from workbench.logs.table import BINARY_BYTES, RawColumn, Table, damaged, refuse_long
+from workbench.logs.numpy_files import read_numpy
+from workbench.logs.table import (
+    BINARY_BYTES,
+    RawColumn,
+    Table,
+    damaged,
+    of_matrix,
+    of_vectors,
+    refuse_long,
+)
 from workbench.logs.tdms import read_tdms
 from workbench.logs.text import read_text_table
 from workbench.logs.ulog import read_ulog
@@ -43,6 +52,7 @@ def read_table(path: Path, spec: FileSpec) -> Table:
         "mcap": read_mcap,
         "ulog": read_ulog,
         "excel": read_excel,
+        "npy": read_numpy,
     }
     try:
         return readers[form](path, spec)
@@ -91,9 +101,11 @@ def _read_mat(path: Path, spec: FileSpec) -> Table:
             raise BadLog(f"{path}: no variable {spec.rows!r}{nearest(key, found)}")
         inner = found[key]
         if isinstance(inner, np.ndarray):
-            return _matrix(path, inner, spec)
+            return of_matrix(path, inner, spec)
         found = {name: getattr(inner, name) for name in inner._fieldnames}
-    return _vectors({name: np.atleast_1d(np.asarray(value)) for name, value in found.items()}, spec)
+    return of_vectors(
+        {name: np.atleast_1d(np.asarray(value)) for name, value in found.items()}, spec
+    )
 
 
 def _read_hdf5(path: Path, spec: FileSpec) -> Table:
@@ -108,8 +120,8 @@ def _read_hdf5(path: Path, spec: FileSpec) -> Table:
             refuse_long(path, max(root.shape, default=0))
             values = root[()]
             if values.dtype.names:
-                return _vectors({name: values[name] for name in values.dtype.names}, spec)
-            return _matrix(path, values.T if matlab else values, spec)
+                return of_vectors({name: values[name] for name in values.dtype.names}, spec)
+            return of_matrix(path, values.T if matlab else values, spec)
         names: list[str] = []
         if matlab and all(_OBJECT_MARK in item.attrs for item in _variables(root)):
             raise BadLog(_objects(path))
@@ -157,7 +169,7 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
             raise BadLog(f"{path}: no key {spec.rows!r} for the rows{nearest(key, there)}")
         rows = rows[key]
     if isinstance(rows, dict):
-        return _vectors({name: np.atleast_1d(np.asarray(v)) for name, v in rows.items()}, spec)
+        return of_vectors({name: np.atleast_1d(np.asarray(v)) for name, v in rows.items()}, spec)
     if not isinstance(rows, list) or not rows:
         raise BadLog(f"{path}: holds no list of rows; name its key in the card, [file] rows")
     scalars = {k: np.asarray([v]) for k, v in outer.items() if not isinstance(v, list | dict)}
@@ -168,25 +180,8 @@ def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: F
     if isinstance(rows[0], dict):
         names = [str(name) for name in rows[0]]
         columns = {name: np.asarray([row.get(name) for row in rows]) for name in names}
-        return _vectors({**columns, **scalars}, spec)
+        return of_vectors({**columns, **scalars}, spec)
     for number, row in enumerate(rows, start=1):
         if not isinstance(row, list) or len(row) != len(rows[0]):
             raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")
-    return _matrix(path, np.asarray(rows), spec)
-
-
-def _vectors(found: Mapping[str, RawColumn], spec: FileSpec) -> Table:
-    """A table of named vectors; a scalar stays one value, which the caller may spread."""
-
-    def fetch(number: int) -> RawColumn:
-        values = list(found.values())[number].ravel()
-        return values[spec.skip_rows :] if values.size > 1 else values
-
-    return Table(tuple(found), fetch, 1 + spec.skip_rows)
-
-
-def _matrix(path: Path, values: RawColumn, spec: FileSpec) -> Table:
-    if values.ndim != 2:
-        raise BadLog(f"{path}: {spec.rows!r} has the shape {values.shape}, rows and columns needed")
-    names = tuple(str(number) for number in range(values.shape[1]))
-    return Table(names, lambda k: values[spec.skip_rows :, k], 1 + spec.skip_rows, headed=False)
+    return of_matrix(path, np.asarray(rows), spec)

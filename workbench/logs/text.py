@@ -2,7 +2,7 @@
 
 import csv
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,8 @@ from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.table import Table
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
+_WHOLE = re.compile(r"[+-]?\d+")
+_FEW_ROWS = 3
 _DELIMITERS = (";", "\t", ",", " ", "|")
 _COMPARED = 40  # lines of which the delimiter is told
 _END = "EOF"  # the last line of some scopes'
@@ -49,6 +51,8 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     looked = [line for line in lines[1:] if not _skipped(line, spec.comment)]
     marks = _marks(looked[-_COMPARED:], spec)
     fields = [[] if _skipped(line, spec.comment) else _split(line, marks) for line in lines]
+    if spec.decimal is None and marks.delimiter == ",":
+        refuse_comma_as_both(path, fields)
     found = find_layout(fields) if spec.header is None else None
     if found is None:
         found = _first_line_layout(path, lines, fields, spec)
@@ -86,7 +90,27 @@ def first_lines(path: Path, spec: FileSpec) -> list[list[str]]:
     lines = text[:_LOOK].splitlines()
     lines = lines if len(text) <= _LOOK else lines[:-1]
     marks = _marks([line for line in lines[-40:] if not _skipped(line, spec.comment)], spec)
-    return [_split(line, marks) for line in lines]
+    rows = [_split(line, marks) for line in lines]
+    if spec.decimal is None and marks.delimiter == ",":
+        refuse_comma_as_both(path, rows)
+    return rows
+
+
+def refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
+    """Raises BadLog where a comma both parts the columns and is the decimal sign of all numbers.
+
+    Each row then has twice the fields of the header, all of them whole numbers.
+    """
+    header, *body = [row for row in rows if any(row)][:_COMPARED] or [()]
+    width = len(header)
+    if width < 2 or len(body) < _FEW_ROWS or any(map(is_number, header)):
+        return
+    if all(len(row) == 2 * width and all(map(_WHOLE.fullmatch, row)) for row in body):
+        raise BadLog(
+            f"{path}: a comma both parts the columns and is the decimal sign ({width} names,"
+            f" {2 * width} fields a row); export it with ';' between the columns, or with decimal"
+            " points"
+        )
 
 
 def _head(path: Path, encoding: str) -> str:
@@ -211,7 +235,7 @@ def _parse(
 
     def load(kind: Any, wanted: list[str]) -> Any:
         convert = arrow.ConvertOptions(
-            column_types=dict.fromkeys(names, kind),
+            column_types=dict.fromkeys(wanted, kind),
             decimal_point=marks.decimal,
             include_columns=wanted,
         )
@@ -232,12 +256,17 @@ def _parse(
 
     try:
         numbers = load(pa.float64(), names)
-    except pa.ArrowInvalid:
-        numbers = None
+    except pa.ArrowInvalid:  # some hold text: the others are read at once all the same
+        plain = [names[k] for k in _plain(content, marks, width)]
+        try:
+            numbers = load(pa.float64(), plain) if plain else None
+        except pa.ArrowInvalid:
+            numbers = None
+    told = set() if numbers is None else set(numbers.column_names)
 
     def fetch(number: int) -> NDArray[Any]:
-        if numbers is not None:
-            return np.asarray(numbers.column(number).to_numpy())
+        if numbers is not None and names[number] in told:
+            return np.asarray(numbers.column(names[number]).to_numpy())
         try:
             return np.asarray(load(pa.float64(), [names[number]]).column(0).to_numpy())
         except pa.ArrowInvalid:
@@ -247,3 +276,14 @@ def _parse(
         return np.asarray(column, dtype=object)
 
     return fetch
+
+
+def _plain(content: bytes, marks: _Marks, width: int) -> list[int]:
+    """The columns that hold numbers alone, by the first and the last rows."""
+    head, tail = content[:_LOOK].splitlines()[:-1], content[-_LOOK:].splitlines()[1:]
+    rows = [
+        _split(line.decode("utf-8", "replace"), marks)
+        for line in (*head[:_COMPARED], *tail[-_COMPARED:])
+    ]
+    rows = [row for row in rows if len(row) == width]
+    return [k for k in range(width) if all(is_number(row[k]) for row in rows)]

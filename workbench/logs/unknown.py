@@ -19,6 +19,7 @@ from workbench.logs.layout import is_number
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, read_table
 from workbench.logs.text import TEXT_BYTES, first_lines
+from workbench.logs.times import seconds
 
 _BELOW = 5  # rows of numbers by which the first of them is known
 _MOSTLY = 0.5  # share of a row's fields, that are numbers where it is data, or units
@@ -60,6 +61,8 @@ def read_unknown(path: Path) -> UnknownLog:
     table = read_table(path, spec)
     headed = table.headed and not names
     texts, full = names or table.names, table.full_names()
+    if form == "csv" and (rows := len(table.fetch(0))) < SHORTEST_LOG:
+        raise BadLog(_too_short(path, f"{rows} row" + ("s" if rows != 1 else "")))
     found, scalars = list[RawColumn](), list[RawColumn]()
     for number in range(len(table.names)):
         text = texts[number] if number < len(texts) and (table.headed or names) else ""
@@ -67,17 +70,23 @@ def read_unknown(path: Path) -> UnknownLog:
         key = full[number] if headed and text and not twice else number
         below = units[number] if number < len(units) else ""
         values, why = _numbers(table, number)
+        if why.startswith("text") and (times := _times(table, number, path)) is not None:
+            values, why, below = times, "", "s"
         one = RawColumn(number, key, text, below, values, why)
         (scalars if len(values) == 1 else found).append(one)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)
     if longest < SHORTEST_LOG:
         many = f"{longest} rows of numbers" if longest else "no column of numbers"
-        raise BadLog(
-            f"{path}: {many}, at least {SHORTEST_LOG} rows needed; give a log of one run, a column"
-            " a signal"
-        )
+        raise BadLog(_too_short(path, many))
     same = [one for one in found if len(one.values) == longest]
     return UnknownLog(path, spec, tuple(same), tuple(scalars))
+
+
+def _too_short(path: Path, found: str) -> str:
+    return (
+        f"{path}: {found}, at least {SHORTEST_LOG} rows needed; give a log of one run, a column a"
+        " signal"
+    )
 
 
 def _numbers(table: Table, number: int) -> tuple[Array, str]:
@@ -97,9 +106,19 @@ def _numbers(table: Table, number: int) -> tuple[Array, str]:
                 out[k] = float(text)
         except (TypeError, ValueError):
             if str(text).strip().lower() not in ("true", "false"):
-                return np.full(len(raw), np.nan), f"text ({str(text)[:20]!r})"
+                shown = repr(str(text).strip()[:20])
+                alone = len(set(raw.tolist())) == 1 and not str(text).strip().isalnum()
+                return np.full(len(raw), np.nan), f"{shown} alone" if alone else f"text ({shown})"
             out[k] = float(str(text).strip().lower() == "true")
     return out, ""
+
+
+def _times(table: Table, number: int, path: Path) -> Array | None:
+    """The column as times of day, dates or durations [s]; None where it holds none."""
+    try:
+        return seconds(np.asarray(table.fetch(number)), str(path), table.first_row)
+    except BadLog:
+        return None
 
 
 def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:

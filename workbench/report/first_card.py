@@ -34,9 +34,16 @@ def proposal_view(of: Proposal, card: Path, refused: str) -> Screen:
 
 def _signal_row(one: SignalGuess) -> Row:
     unit = one.unit if one.gain is None else f"{one.unit}, gain {one.gain}"
-    return one.name, one.shown, unit, "sure" if one.sure else "guess", one.why
+    return one.name, one.shown, unit, *_judged(one)
 
 
 def _rig_row(one: RigGuess) -> Row:
     value = "to be filled in" if one.value is None else f"{one.value}"
-    return one.key, value, one.unit, "sure" if one.sure else "guess", one.why
+    return one.key, value, one.unit, *_judged(one)
+
+
+def _judged(one: SignalGuess | RigGuess) -> tuple[str, str]:
+    """How sure a line is, and why; of a guess also what it would be otherwise."""
+    if one.sure:
+        return "sure", one.why
+    return "guess", f"{one.why}; else {one.rival}" if one.rival else one.why

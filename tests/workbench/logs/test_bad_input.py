@@ -321,7 +321,7 @@ def test_decimal_commas_between_commas(tmp_path: Path) -> None:
     lines = [line.split(",") for line in path.read_text("utf-8").splitlines()]
     bare = [lines[0], *([field.replace(".", ",") for field in line] for line in lines[1:])]
     path.write_text("\n".join(",".join(line) for line in bare), "utf-8")
-    assert "if the numbers have decimal commas, export with ';'" in refusal(path)
+    assert "a comma both parts the columns and is the decimal sign" in refusal(path)
     quoted = "\n".join(",".join(f'"{field}"' for field in line) for line in bare)
     path.write_text(quoted, "utf-8")
     np.testing.assert_array_equal(read_log(path, card(tmp_path))["y"], signals()["y"])

@@ -20,7 +20,10 @@ from workbench.registry.access import Access
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, Judgement
 
-pytestmark = pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason=NO_BROWSER)
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(CHROMIUM is None or DRIVER is None, reason=NO_BROWSER),
+]
 ENTER, SPACE = "\ue007", " "
 
 

@@ -1,5 +1,6 @@
 """What somebody answers to a guess of the first card, and the card with it."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 
@@ -10,8 +11,12 @@ from workbench.cards.nearest import nearest
 from workbench.cards.sensors import column_scale
 from workbench.steps.first_card.proposal import FileColumn, Proposal, RigGuess, SignalGuess
 
-LEAVE_OUT = "-"
+LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
+OTHER_MOTION = {"m": "rad", "mm": "deg", "um": "deg", "rad": "m", "deg": "mm", "turn": "mm",
+                "N": "N m", "kN": "N m", "mN": "mN m", "N m": "N", "mN m": "N"}  # fmt: skip
+OTHER_GAIN = {"mm": "turn", "turn": "mm"}
+GAIN = re.compile(r"[\d.]+ \S+/\S+")
 
 
 class BadAnswer(UserError):
@@ -21,12 +26,12 @@ class BadAnswer(UserError):
 def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
     """The proposal after an answer on one of its signals.
 
-    answer: empty (the guess is right), "-" (no such signal), or a column and its unit, or either
-    alone. Raises BadAnswer, one line, where it is none of these.
+    answer: empty (the guess is right), "-" (no such signal), "+" (what it would be otherwise), or a
+    column and its unit, or either alone. Raises BadAnswer, one line, where it is none of these.
     """
     one = of.signal(name)
     assert one is not None
-    text = answer.strip()
+    text = _other(answer.strip(), one.rival)
     if text == LEAVE_OUT:
         if name in NEEDED_SIGNALS[of.kind]:
             raise BadAnswer(f'a rig of kind "{of.kind}" needs {name}; name its column')
@@ -41,18 +46,19 @@ def with_signal(of: Proposal, name: str, answer: str) -> Proposal:
 
 
 def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
-    """The proposal after an answer on a value of its rig: empty, "-" or a number (or a word).
+    """The proposal after an answer on a value of its rig: empty, "-", "+", a number or a word.
 
     Raises BadAnswer where it is none of these.
     """
     one = next(guess for guess in of.rig if guess.key == key)
-    text = answer.strip()
+    text = _other(answer.strip(), one.rival)
     found: RigGuess = replace(one, sure=one.value is not None, why=CONFIRMED)
     if key == "motion" and text:
         if text not in ("linear", "rotary"):
             raise BadAnswer(f"{text!r}: linear or rotary needed")
         return replace(
             of, motion="rotary" if text == "rotary" else "linear",
+            signals=tuple(_turned(x) for x in of.signals) if text != of.motion else of.signals,
             rig=tuple(replace(found, value=text) if x is one else x for x in of.rig),
         )  # fmt: skip
     if text == LEAVE_OUT:
@@ -72,6 +78,23 @@ def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
     return replace(of, rig=tuple(found if x is one else x for x in of.rig))
 
 
+def _turned(one: SignalGuess) -> SignalGuess:
+    """A signal as a guess for the other kind of motion: its unit, and per what its gain is."""
+    gain = one.gain
+    if isinstance(gain, str):
+        number, _, per = gain.partition(" ")
+        above, _, below = per.partition("/")
+        gain = f"{number} {above}/{OTHER_GAIN.get(below, OTHER_MOTION.get(below, below))}"
+    return replace(one, unit=OTHER_MOTION.get(one.unit, one.unit), gain=gain, rival="")
+
+
+def _other(text: str, rival: str) -> str:
+    """The answer, "+" put into words; raises BadAnswer where there is nothing else."""
+    if text == THE_OTHER and not rival:
+        raise BadAnswer("nothing else is likely here; name a column, a unit or a number")
+    return rival if text == THE_OTHER else text
+
+
 def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
     """The signal from a column, a unit, or both."""
     names = _names(of)
@@ -84,6 +107,8 @@ def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
         column = names[before.strip()]
         return replace(given, column=column.key, shown=column.shown, unit=_unit(last),
                        gain=None, bits=None)  # fmt: skip
+    if GAIN.fullmatch(text):
+        return replace(given, gain=text)
     if written_unit(text) is None:
         raise BadAnswer(f"{text!r} is neither a column nor a unit{nearest(text, names)}")
     return replace(given, unit=_unit(text), gain=None if isinstance(one.gain, str) else one.gain)

@@ -15,26 +15,38 @@ from identification.signals.relations import motion_of
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import Header, read_header
 from workbench.logs.unknown import RawColumn, UnknownLog
+from workbench.steps.first_card.axes import axes_of, correlation
+from workbench.steps.first_card.registers import Register, read_register
 
-MOST_ROWS_LOOKED_AT = 12_000
+MOST_ROWS_LOOKED_AT = 10_000
 MOST_MISSING = 0.1  # of a column that is used
+WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
-BITS = (16, 32)  # of a register that counts below zero as two's complement
-BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
+FEW_LEVELS = 8  # values at most, of a flag, mode or state
+SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
+NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
+FEWEST_WITH_UNITS = 2  # columns, that make units of the last letters of others
+FEWEST_OF_AXES = 3  # columns from which a log may hold several axes
 MOST_ROUNDED = 0.02  # of a signal, that its rounding is
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
     """A column with its header; `values` (n,) as in the file, `x` (k,) on the grid looked at, both
-    without two's complement (`bits` of it, else None)."""
+    as its register means them; axis: which of several machines of the log it is of ("": of all)."""
 
     raw: RawColumn
     header: Header
     values: Array
     x: Array
-    bits: int | None = None
+    register: Register | None = None
+    axis: str = ""
+
+    @property
+    def bits(self) -> int | None:
+        """Of two's complement, else None."""
+        return self.register.bits if self.register else None
 
     @property
     def shown(self) -> str:
@@ -58,8 +70,33 @@ class Column:
     @cached_property
     def noise(self) -> float:
         """White noise and rounding of the column, one sigma."""
-        step = resolution(self.x)
-        return float(np.hypot(local_noise(self.x), step / np.sqrt(12.0)))
+        return float(np.hypot(local_noise(self.x), resolution(self.x) / np.sqrt(12.0)))
+
+    @cached_property
+    def levels(self) -> Array:
+        """The values that it takes, in order."""
+        return np.asarray(np.unique(self.numbers))
+
+    @cached_property
+    def step(self) -> float:
+        """Step of its values where all are multiples of one, else 0."""
+        return resolution(self.numbers)
+
+    @cached_property
+    def flag(self) -> bool:
+        """Whether it holds a few whole numbers: a switch, a mode or a state."""
+        few = self.levels
+        whole = 1 < len(few) <= FEW_LEVELS and bool(np.all(few == np.round(few)))
+        return whole and (few[0] >= 0.0 or bool(np.all(np.abs(few) <= 1.0)))
+
+    @cached_property
+    def way_gone(self) -> float:
+        """The way that it goes, in units of its range."""
+        size = max(1, len(self.x) // WAY_BLOCKS)
+        count = len(self.x) // size
+        means = self.x[: count * size].reshape(count, size).mean(axis=1)
+        width = float(np.ptp(means))
+        return float(np.sum(np.abs(np.diff(means)))) / width if width > 0 else 0.0
 
     @cached_property
     def whole(self) -> bool:
@@ -85,20 +122,26 @@ class Columns:
     read: tuple[Column, ...]
     scalars: tuple[Column, ...] = field(default=())
 
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes that the headers name, where there are several."""
+        return tuple(sorted({one.axis for one in self.signals if one.axis}))
+
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    read = [_signed(_column(one)) for one in log.columns]
+    read = [_signed(one) for one in _told_units([_column(one) for one in log.columns])]
     usable = [one for one in read if not _unusable(one)]
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
     step = float(np.median(np.diff(clock.values)))
-    clocks = {one.raw.number for one in usable if one is not clock and _ticks(one)}
+    clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
     left_out |= dict.fromkeys(sorted(clocks), "goes up evenly, as another clock does")
     others = [one for one in usable if one is not clock and one.raw.number not in clocks]
     grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_LOOKED_AT))
     signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
     kept, twice = _without_doubles(signals)
+    kept = _with_axes(kept)
     return Columns(
         log.path, log.spec, clock, step, grid, tuple(kept), left_out | twice,
         tuple(read), tuple(_column(one) for one in log.scalars),
@@ -107,6 +150,14 @@ def columns_of(log: UnknownLog) -> Columns:
 
 def _column(raw: RawColumn) -> Column:
     return Column(raw, read_header(raw.header, raw.unit_below), raw.values, raw.values)
+
+
+def _told_units(columns: Sequence[Column]) -> list[Column]:
+    """The columns, their doubtful units believed where others' headers end in units too."""
+    plain = [one for one in columns if one.header.unit and not one.header.doubtful]
+    if len(plain) < FEWEST_WITH_UNITS:
+        return list(columns)
+    return [replace(one, header=replace(one.header, doubtful=False)) for one in columns]
 
 
 def _unusable(one: Column) -> str:
@@ -122,28 +173,34 @@ def _unusable(one: Column) -> str:
 
 
 def _signed(one: Column) -> Column:
-    """The column read as two's complement where it leaps over its range around 0."""
-    finite = one.values[np.isfinite(one.values)]
-    if not len(finite) or not one.whole or finite.min() < 0:
+    """The column as its register means it, where it counts below zero in one."""
+    found = read_register(one.values)
+    if found is None:
         return one
-    for bits in BITS:
-        top = 2.0**bits
-        middle = (finite > top / 8) & (finite < top * 7 / 8)
-        low, high = np.mean(finite <= top / 8), np.mean(finite >= top * 7 / 8)
-        if finite.max() < top and np.mean(middle) < BETWEEN_SIGNS and low > 0.0 and high > 0.0:
-            values = np.where(one.values >= top / 2, one.values - top, one.values)
-            return replace(one, values=values, x=values, bits=bits)
-    return one
+    return replace(one, values=found.values, x=found.values, register=found)
 
 
 def _ticks(one: Column) -> bool:
     """Whether a column only goes up, by steps that are mostly alike or called times."""
-    if not _rises(one):
+    means, unit = one.header.means, one.header.unit
+    other = {"position", "velocity", "force", "pressure"} & set(means) and "time" not in means
+    if not _rises(one) or other or (unit and unit.quantity not in ("time", "count")):
         return False
     step = np.diff(one.values)
     middle = float(np.median(step))
     even = np.mean(np.abs(step - middle) > 0.5 * middle) < MOST_UNEVEN
     return bool(even) or "time" in one.header.means
+
+
+def _second(one: Column, clock: Column) -> bool:
+    """Whether a column is one more clock, or counts the rows."""
+    if not _ticks(one):
+        return False
+    if {"time", "count"} & set(one.header.means):
+        return True
+    line = np.polyfit(clock.values, one.values, 1)
+    off = float(np.max(np.abs(one.values - np.polyval(line, clock.values))))
+    return off < SECOND_CLOCK * float(np.ptp(one.values))
 
 
 def _rises(one: Column) -> bool:
@@ -205,8 +262,13 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     """
     kept, twice = list[Column](), dict[int, str]()
     order = sorted(columns, key=lambda one: (-_said(one), _coarseness(one), -one.raw.number))
-    for one in order:
-        same = next((other for other in kept if _same(one, other)), None)
+    if not order:
+        return [], {}
+    alike = np.abs(correlation(np.column_stack([one.x for one in order])))
+    place = {one.raw.number: k for k, one in enumerate(order)}
+    for k, one in enumerate(order):
+        near = (other for other in kept if alike[k, place[other.raw.number]] > NEARLY_ALIKE)
+        same = next((other for other in near if _same(one, other)), None)
         if same is None:
             kept.append(one)
         else:
@@ -214,10 +276,19 @@ def _without_doubles(columns: Sequence[Column]) -> tuple[list[Column], dict[int,
     return sorted(kept, key=lambda one: one.raw.number), twice
 
 
+def _with_axes(columns: Sequence[Column]) -> list[Column]:
+    """The columns, each with the axis that its header names where there are several."""
+    if len(columns) < FEWEST_OF_AXES:
+        return list(columns)
+    alike = correlation(np.column_stack([one.x for one in columns]))
+    named = axes_of([(one.header, one.raw.number) for one in columns], alike)
+    return [replace(one, axis=named.get(one.raw.number, "")) for one in columns]
+
+
 def _coarseness(one: Column) -> int:
     """How coarse a column is: the power of ten of its step over its range, 0 without a step."""
     width = float(np.ptp(one.numbers)) if len(one.numbers) else 0.0
-    step = resolution(one.numbers) / width if width > 0.0 else 0.0
+    step = one.step / width if width > 0.0 else 0.0
     return 0 if step == 0.0 else max(0, 8 + round(np.log10(step)))
 
 
@@ -241,6 +312,6 @@ def _same(one: Column, other: Column) -> bool:
         return False
     factor = float(a @ b) / square
     left = float(np.sqrt(np.mean((b - factor * a) ** 2)))
-    rounding = np.hypot(resolution(second[both]), abs(factor) * resolution(first[both]))
+    rounding = np.hypot(other.step, abs(factor) * one.step)
     allowed = max(float(rounding) / np.sqrt(12.0), 1e-9 * spread)
     return left < SAME_SIGNAL * allowed and left < MOST_ROUNDED * spread

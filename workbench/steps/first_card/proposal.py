@@ -1,7 +1,7 @@
 """A card proposed for a log that none describes, with the reason of each of its lines."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -10,14 +10,16 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.log import RigKind
-from identification.signals.relations import force_law, lead
+from identification.signals.relations import force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
+from workbench.steps.first_card.motion_guess import MotionGuess, told_motion
+from workbench.steps.first_card.remarks import BALANCED, remarks_on
 from workbench.steps.first_card.roles import Roles, told_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
-from workbench.steps.first_card.unit_guess import guessed_units, told_motion
+from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
@@ -26,13 +28,13 @@ MOTOR_CONSTANT = re.compile(
 )
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
-BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
 
 
 @dataclass(frozen=True)
 class SignalGuess:
     """One signal of the card: its column (as the card names it and as the file shows it), unit and
-    gain, whether column and unit are sure, and why."""
+    gain, whether column and unit are sure, and why; rival: what it would be otherwise, as an answer
+    says it."""
 
     name: str
     column: str | int
@@ -42,17 +44,19 @@ class SignalGuess:
     bits: int | None
     sure: bool
     why: str
+    rival: str = ""
 
 
 @dataclass(frozen=True)
 class RigGuess:
-    """A value of the rig; None where only who knows the machine can give it."""
+    """A value of the rig; None where only who knows the machine can give it; rival: the other."""
 
     key: str
     value: float | str | None
     unit: str
     sure: bool
     why: str
+    rival: str = ""
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,7 @@ class FileColumn:
 @dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
-    every column of the file, and what else was noticed."""
+    every column of the file, what else was noticed, and the axes that the file holds."""
 
     path: Path
     name: str
@@ -80,6 +84,7 @@ class Proposal:
     unused: Mapping[str, str]
     columns: tuple[FileColumn, ...]
     remarks: tuple[str, ...] = ()
+    axes: tuple[str, ...] = ()
 
     def signal(self, name: str) -> SignalGuess | None:
         """The signal of that name; None where the card has none."""
@@ -94,22 +99,25 @@ class Proposal:
                     **{one.key: one.value for one in self.rig}},
             "signals": {
                 one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
-                           "bits": one.bits, "sure": one.sure, "why": one.why}
+                           "bits": one.bits, "sure": one.sure, "why": one.why, "else": one.rival}
                 for one in self.signals
             },
             "file": self.spec.model_dump(exclude_defaults=True),
             "unused": dict(self.unused),
             "remarks": self.remarks,
+            "axes": self.axes,
         }  # fmt: skip
 
 
-def proposed(path: Path, name: str | None = None) -> Proposal:
+def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Proposal:
     """The card that fits the log in the file best; name: of the card, by default the file's.
 
-    Raises BadLog, one line, where no clock is found, or no column that moves as a driven body.
+    axis: the one of several in the file, or the header of a position. Raises BadLog, one line,
+    where no clock is found, no such axis, or no column that moves as a driven body.
     """
     columns = columns_of(read_unknown(path))
-    roles = told_roles(columns)
+    signals, only = _of_axis(columns, axis)
+    roles = told_roles(signals, only)
     if roles is None:
         there = ", ".join(one.shown for one in columns.signals) or "none"
         raise BadLog(
@@ -118,27 +126,60 @@ def proposed(path: Path, name: str | None = None) -> Proposal:
             " motor's command; or write the card by hand (manual: The card, key by key)"
         )
     _refuse_resting(columns, roles)
+    _refuse_sign_bits(columns, roles)
     roles, area = _pressure_beside_force(columns, roles)
-    motion, by = told_motion(roles)
+    motion = told_motion(roles)
     units = guessed_units(columns, roles, motion)
-    rig = [_motion_guess(motion, by), *_rig(columns, roles, motion)]
+    rig = [_motion_guess(motion), *_rig(columns, roles, motion.motion)]
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
         path=path,
         name=_card_name(name or path.stem),
         kind=roles.kind,
-        motion=motion,
+        motion=motion.motion,
         spec=columns.spec,
         signals=tuple(_signals(columns, roles, units)),
-        rig=tuple(one for one in rig if one is not None),
+        rig=tuple(rig),
         unused=_unused(columns, roles),
         columns=tuple(
             FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
             for one in columns.read
         ),
-        remarks=tuple(_remarks(columns, roles, units)),
+        remarks=tuple(remarks_on(columns, roles, units)),
+        axes=columns.axes,
     )
+
+
+def _of_axis(columns: Columns, axis: str | None) -> tuple[Sequence[Column], Column | None]:
+    """The columns that belong to an axis, and the one that is to be its position, if any."""
+    if axis is None:
+        return columns.signals, None
+    name = axis.strip().casefold()
+    if name in columns.axes:
+        return [one for one in columns.signals if one.axis in ("", name)], None
+    named = [one for one in columns.signals if one.raw.header.strip().casefold() == name]
+    if len(named) == 1:
+        return columns.signals, named[0]
+    there = ", ".join(columns.axes) or "its headers name one alone"
+    raise BadLog(
+        f"{columns.path}: no axis {axis!r} (axes: {there}); give one of them, or the header of a"
+        " position"
+    )
+
+
+def _refuse_sign_bits(columns: Columns, roles: Roles) -> None:
+    """Raises BadLog where a signal's sign is a bit of its own, which no card can undo."""
+    for one in roles.columns.values():
+        found = one.register
+        if found is None or found.sign_bit is None:
+            continue
+        top = 2**found.sign_bit
+        raise BadLog(
+            f"{columns.path}: column {one.shown} jumps by {top} (data row {found.row}) where it"
+            f" passes 0: sign and magnitude, bit {found.sign_bit} is the sign ({top} + n means -n);"
+            f" write x where x < {top}, else {top} - x, and give that log"
+        )
 
 
 def _refuse_resting(columns: Columns, roles: Roles) -> None:
@@ -196,11 +237,9 @@ def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGues
     return RigGuess(key, float(f"{area:.3g}"), "m^2", False, why)
 
 
-def _motion_guess(motion: Motion, by: str) -> RigGuess | None:
-    if motion == "linear" and not by:
-        return None
-    why = by or "the usual one: no unit and no word says that it turns"
-    return RigGuess("motion", motion, "", bool(by), why)
+def _motion_guess(found: MotionGuess) -> RigGuess:
+    rival = "" if found.sure else "linear" if found.motion == "rotary" else "rotary"
+    return RigGuess("motion", found.motion, "", found.sure, found.why, rival)
 
 
 def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
@@ -264,12 +303,20 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         if sign < 0.0:
             why += "; with this sign friction takes energy" if name != "r" else ""
         why += f"; unit {unit.why}"
-        known = unit.sure or name == "u"
+        sure = odds >= SURE and unit.sure
         out.append(
-            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits,
-                        odds >= SURE and known, why)
+            SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why,
+                        "" if sure else _rival(name, odds, unit, roles))
         )  # fmt: skip
     return out
+
+
+def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
+    """What a signal would be otherwise: the next column where the column is open, else a unit."""
+    other = roles.rivals.get(name)
+    if other is not None and (odds < SURE or not unit.rival):
+        return str(other.raw.key)
+    return unit.rival
 
 
 def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
@@ -283,33 +330,4 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():
         out[shown[number]] = why
-    return out
-
-
-def _remarks(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> list[str]:
-    """Delays that no key of a card holds, and a clock that is not even."""
-    out = []
-    clock = units["t"]
-    second = factor(clock.unit) if clock.gain is None else 1.0 / float(clock.gain.split()[0])
-    h = columns.step * second
-    steps = np.diff(columns.clock.values) * second
-    uneven = float(np.std(steps[steps < 3.0 * h]) / h)
-    even = "an even clock" if uneven < 1e-3 else f"a clock that jitters by {uneven:.1%}"
-    out.append(f"{len(columns.clock.values)} rows every {h:.4g} s, {even}")
-    gaps = int(np.sum(steps > 5.0 * h))
-    if gaps:
-        many = f"{gaps} gap" + ("s" if gaps > 1 else "")
-        out.append(f"{many} in the clock, the longest of {float(np.max(steps)):.3g} s")
-    if roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
-        balance, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
-        if balance > BALANCED * coulomb:
-            out.append(
-                f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
-                f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
-            )
-    if "r" in roles.columns:
-        y = roles.columns["y"]
-        found = lead(roles.columns["r"].x, y.x)
-        late = found.samples * h * columns.grid
-        out.append(f"the position follows the reference by {1e3 * late:.3g} ms")
     return out

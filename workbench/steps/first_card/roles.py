@@ -1,7 +1,8 @@
-"""Which column is which signal: what the headers say, weighed with how the columns hang together.
+"""Which column is which signal: all roles at once, by what the headers say and the signals do.
 
-Every position is tried with every way to drive it, the other columns with every other role; the
-largest sum of log-odds (`weights`) decides.
+Positions are ranked by their own course and by their derivatives among the columns. The likely
+ones are tried with every way to drive them, the best of these with every other role of the columns
+that are left; the largest sum of log-odds (`weights`) decides.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
@@ -13,29 +14,36 @@ from scipy.optimize import linear_sum_assignment
 
 from identification.arrays import Array
 from identification.log import RigKind
-from identification.signals.relations import (
-    ForceLaw,
-    actuator_share,
-    derivative,
-    force_law,
-    lead,
-)
-from workbench.steps.first_card.columns import Column, Columns
+from identification.signals.relations import ForceLaw, actuator_share, force_law
+from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.pairs import Pairs, Seen
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
     LEAST_SCORE,
     LOOKS_LIKE_A_FORCE,
     MIRRORED,
+    SURE,
     SURELY_TURNED,
+    acts,
     ahead_of,
+    among_derivatives,
     driving,
     in_one_unit,
+    less_way,
+    limits,
     moves_like_a_body,
     of_a_motor,
     said,
+    together,
     turned,
 )
+
+MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
+FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
+FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
+TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
+HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
 
@@ -45,7 +53,8 @@ class Roles:
     """Signals by canonical name, their signs, and how sure each is (log-odds over the next).
 
     law: what of the driving signal is inertia and friction along y; area_ratio: of the chambers;
-    why: reasons by signal.
+    why: reasons by signal; rivals: the next best column of each, where there is one; rival_kind:
+    the next best kind of rig, with the column that would drive it.
     """
 
     kind: RigKind
@@ -55,244 +64,292 @@ class Roles:
     why: Mapping[str, str]
     law: ForceLaw
     area_ratio: float = 1.0
+    rivals: Mapping[str, Column] = field(default_factory=dict)
+    rival_kind: tuple[RigKind, Column] | None = None
 
 
 @dataclass(frozen=True, eq=False)
-class _Drive:
-    """A way in which the body may be driven: the columns by role, their law, log-odds."""
+class _Way:
+    """A body and what drives it: the columns by role, their law, the force (n,), log-odds."""
 
+    seen: Seen
     kind: RigKind
     columns: Mapping[str, Column]
     law: ForceLaw
+    force: Array
     score: float
     area_ratio: float = 1.0
+
+    @property
+    def y(self) -> Column:
+        return self.seen.y
 
 
 @dataclass(frozen=True, eq=False)
 class _Choice:
-    y: Column
-    drive: _Drive
+    way: _Way
     others: Mapping[str, Column]
     gains: Mapping[str, float]
-    score: float = field(default=0.0)
+    next_best: Mapping[str, Column]
+
+    @property
+    def score(self) -> float:
+        return self.way.score + sum(self.gains.values())
+
+    @property
+    def columns(self) -> dict[str, Column]:
+        """Every column of the choice by its role."""
+        return {"y": self.way.y, **self.way.columns, **self.others}
 
 
-def told_roles(columns: Columns) -> Roles | None:
-    """The signals of a log; None where no column moves as a body that another one drives."""
-    choices = list(_choices(columns.signals))
-    if not choices:
+def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles | None:
+    """The signals of a log; None where no column moves as a body that another one drives.
+
+    only: the column that is to be the position, where somebody has said so.
+    """
+    if len(signals) < 2:
         return None
-    best = max(choices, key=lambda one: one.score)
-    found = {"y": best.y, **best.drive.columns, **best.others}
+    pairs = Pairs(signals)
+    behind = limits(pairs)
+    acting = [acts(pairs, k, behind) for k in range(len(signals))]
+    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, acting)]
+    if not ways:
+        return None
+    ways.sort(key=lambda one: -_with_reference(one))
+    choices = [_filled(way) for way in ways[:MOST_WAYS]]
+    choices.sort(key=lambda one: -one.score)
+    best = choices[0]
     return Roles(
-        kind=best.drive.kind,
-        columns=found,
+        kind=best.way.kind,
+        columns=best.columns,
         signs=_signs(best),
-        odds=_odds(best, choices, found),
+        odds=_odds(best, choices),
         why=_reasons(best),
-        law=best.drive.law,
-        area_ratio=best.drive.area_ratio,
+        law=best.way.law,
+        area_ratio=best.way.area_ratio,
+        rivals=_rivals(best, choices),
+        rival_kind=_rival_kind(best, choices),
     )
 
 
-def _choices(signals: Sequence[Column]) -> Iterator[_Choice]:
-    """Every position with every drive, and the best roles of the columns that are left."""
-    derived = _derivatives(signals)
-    for y in signals:
-        head = said(y, "y")
-        if y.motion is None or head <= -4.0:
+def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
+    """The columns that may be the position, likeliest first, with their log-odds so far."""
+    found = []
+    derived = among_derivatives(pairs)
+    for k, one in enumerate(pairs.signals):
+        head = said(one, "y")
+        if (only is not None and one is not only) or (head <= -4.0 and one is not only):
             continue
-        own = head + moves_like_a_body(y) + derived.get(y.raw.number, 0.0)
-        for drive in _drives(y, [one for one in signals if one is not y]):
-            taken = {y.raw.number, *(one.raw.number for one in drive.columns.values())}
-            rest = [one for one in signals if one.raw.number not in taken]
-            others, gains = _rest(y, drive, rest)
-            yield _Choice(
-                y, drive, others, {"y": own, **gains}, own + drive.score + sum(gains.values())
-            )
-
-
-def _derivatives(signals: Sequence[Column]) -> dict[int, float]:
-    """Log-odds against being the position, of what is the derivative of another column."""
-    out = dict[int, float]()
-    for one in signals:
-        for other in signals:
-            if one is other or one.motion is None:
-                continue
-            share = derivative(one.motion, other.x).share
-            if share > ALL_VELOCITY and said(one, "y") > -4.0:
-                out[other.raw.number] = min(out.get(other.raw.number, 0.0), -4.0)
-    return out
-
-
-def _drives(y: Column, others: Sequence[Column]) -> Iterator[_Drive]:
-    """What may drive the body: a force, the difference of two pressures, or the command itself."""
-    assert y.motion is not None
-    for one in others:
-        law = force_law(y.motion, y.x, one.x)
-        if law is None:
-            continue
-        physics = driving(y, one.x, law)
-        as_force, as_command = said(one, "F"), said(one, "u")
-        if as_force > -3.0:
-            yield _Drive("force", {"F": one}, law, 0.5 + as_force + physics)
-        if as_command > -3.0:
-            yield _Drive("motor", {"u": one}, law, as_command + physics + of_a_motor(one))
-    chambers = [one for one in others if said(one, "p") > -3.0 and one.x.min() >= 0.0]
-    for one, other in combinations(chambers, 2):
-        drive = _chambers(y, one, other)
-        if drive is not None:
-            yield drive
-
-
-def _chambers(y: Column, one: Column, other: Column) -> _Drive | None:
-    """Two pressures of one size as a drive, with the ratio of areas that explains most."""
-    assert y.motion is not None
-    first_x, second_x = in_one_unit(one, other)
-    if not 0.2 < first_x.mean() / second_x.mean() < 5.0:
-        return None
-    best: tuple[float, ForceLaw] | None = None
-    for ratio in AREA_RATIOS:
-        difference = first_x - ratio * second_x
-        law = force_law(y.motion, y.x, difference)
-        if law is not None and (best is None or law.share > best[1].share):
-            best = (ratio, law)
-    if best is None:
-        return None
-    ratio, law = best
-    score = driving(y, np.sign(law.way) * (first_x - ratio * second_x), turned(law))
-    alone = [force_law(y.motion, y.x, x) for x in (first_x, second_x)]
-    score += MIRRORED if _mirrored(alone) else 0.0
-    first, second = (one, other) if law.way > 0 else (other, one)
-    likely = 0.5 * (said(one, "p") + said(other, "p"))
-    return _Drive(
-        "electro-pneumatic", {"p_p": first, "p_n": second}, law, likely + score - 1.0,
-        ratio if law.way > 0 else 1.0 / ratio,
+        if one.motion is not None:
+            found.append((head + moves_like_a_body(one) + derived[k], k))
+    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_TELLS]
+    if named:  # beside a position that is called one no reference or model is any
+        beside = ("reference", "model")
+        found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
+    first = min((pairs.signals[k].axis for _, k in found if pairs.signals[k].axis), default="")
+    found = sorted(
+        ((own + (FIRST_AXIS if first and pairs.signals[k].axis == first else 0.0), k)
+         for own, k in found),
+        reverse=True,
     )  # fmt: skip
+    likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
+    return [(Seen(pairs, k), score) for score, k in likely]
 
 
-def _mirrored(laws: Sequence[ForceLaw | None]) -> bool:
+def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
+    """What may drive the body: a force, the difference of two pressures, or the command itself."""
+    laws, y, pairs = seen.laws, seen.y, seen.pairs
+    for k, law in enumerate(laws):
+        one = pairs.signals[k]
+        if one is y:
+            continue
+        as_force, as_command = said(one, "F"), said(one, "u")
+        if max(as_force, as_command) <= -3.0:
+            continue
+        physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
+        physics += own
+        force = law.way * seen.smooth[:, k]
+        if as_force > -3.0:
+            yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics)
+        if as_command > -3.0:
+            score = as_command + physics + of_a_motor(one) + acting[k]
+            yield _Way(seen, "motor", {"u": one}, law, force, score)
+    if laws:
+        yield from _chambers(seen, own)
+
+
+def _chambers(seen: Seen, own: float) -> Iterator[_Way]:
+    """Two pressures of one size as a drive, with the ratio of areas that explains most."""
+    signals, x = seen.pairs.signals, seen.pairs.x
+    likely = [
+        (said(one, "p"), k)
+        for k, one in enumerate(signals)
+        if one is not seen.y and said(one, "p") > -3.0 and one.x.min() >= 0.0
+    ]
+    likely = sorted(likely, reverse=True)[:MOST_CHAMBERS]
+    for i, j in combinations(sorted(k for _, k in likely), 2):
+        a, b = in_one_unit(signals[i], signals[j])
+        first, second = a * x[:, i], b * x[:, j]
+        if not 0.2 < first.mean() / max(float(second.mean()), 1e-300) < 5.0:
+            continue
+        f = np.column_stack([first - ratio * second for ratio in AREA_RATIOS])
+        smooth = np.column_stack(
+            [a * seen.smooth[:, i] - ratio * b * seen.smooth[:, j] for ratio in AREA_RATIOS]
+        )
+        laws = seen.laws_of(f, smooth)
+        at = int(np.argmax([law.share for law in laws]))
+        law, ratio = laws[at], AREA_RATIOS[at]
+        way = driving(turned(law), float(seen.v_share[i]), False) - 1.0
+        way += MIRRORED if _mirrored(seen.laws[i], seen.laws[j]) else 0.0
+        way += 0.5 * (said(signals[i], "p") + said(signals[j], "p"))
+        way += together(seen.y, signals[i]) + together(signals[i], signals[j])
+        pair = (signals[i], signals[j]) if law.way > 0 else (signals[j], signals[i])
+        yield _Way(
+            seen, "electro-pneumatic", dict(zip(("p_p", "p_n"), pair, strict=True)), law,
+            law.way * smooth[:, at], own + way, ratio if law.way > 0 else 1.0 / ratio,
+        )  # fmt: skip
+
+
+def _mirrored(one: ForceLaw, other: ForceLaw) -> bool:
     """Whether each of two columns alone looks like the force, but with opposite signs.
 
     Of two chambers the one is filled as the other is emptied; a force beside a pressure is no such.
     """
-    known = [law for law in laws if law is not None]
-    alike = len(known) == 2 and min(law.share for law in known) > LOOKS_LIKE_A_FORCE
-    return alike and known[0].way * known[1].way < 0.0
+    alike = min(one.share, other.share) > LOOKS_LIKE_A_FORCE
+    return alike and one.way * other.way < 0.0
 
 
-def _rest(
-    y: Column, drive: _Drive, rest: Sequence[Column]
-) -> tuple[dict[str, Column], dict[str, float]]:
+def _with_reference(way: _Way) -> float:
+    """Log-odds of a way with the likeliest reference of its position beside it."""
+    taken = [way.y, *way.columns.values()]
+    gains = [_gain_of_reference(way.seen, k) for k, one in enumerate(way.seen.pairs.signals)
+             if one not in taken]  # fmt: skip
+    return way.score + max([0.0, *gains])
+
+
+def _gain_of_reference(seen: Seen, k: int) -> float:
+    """Log-odds that a column is the reference; kept, since it does not depend on the drive."""
+    if k not in seen.as_reference:
+        one = seen.pairs.signals[k]
+        head = said(one, "r")
+        more = ahead_of(seen, k) + together(seen.y, one) if head >= -3.0 else 0.0
+        seen.as_reference[k] = head + more
+    return seen.as_reference[k]
+
+
+def _filled(way: _Way) -> _Choice:
     """The best roles of the columns that are neither the position nor drive the body."""
+    taken = [way.y, *way.columns.values()]
+    rest = [k for k, one in enumerate(way.seen.pairs.signals) if one not in taken]
     roles = ["r", "v", "a", "temperature"]
-    roles += ["u"] if "u" not in drive.columns else []
-    roles += ["F"] if drive.kind == "electro-pneumatic" else []
+    roles += ["u"] if "u" not in way.columns else []
+    roles += ["F"] if way.kind == "electro-pneumatic" else []
     if not rest:
-        return {}, {}
-    gain = np.array([[max(_gain(y, drive, one, role), LEAST_SCORE) for role in roles]
-                     for one in rest])  # fmt: skip
-    rows, places = linear_sum_assignment(-gain)
-    found = {
-        roles[j]: (rest[i], float(gain[i, j]))
-        for i, j in zip(rows.tolist(), places.tolist(), strict=True)
-        if gain[i, j] > LEAST_SCORE
-    }
-    return {k: one for k, (one, _) in found.items()}, {k: score for k, (_, score) in found.items()}
+        return _Choice(way, {}, {}, {})
+    signals, moved = way.seen.pairs.signals, way.seen.moves(way.force)
+    gain = np.array([[_gain(way, k, role, float(moved[k])) for role in roles] for k in rest])
+    kept = np.maximum(gain, LEAST_SCORE)
+    rows, places = linear_sum_assignment(-kept)
+    others, gains, next_best = {}, {}, {}
+    for i, j in zip(rows.tolist(), places.tolist(), strict=True):
+        if kept[i, j] <= LEAST_SCORE:
+            continue
+        role, others[roles[j]], gains[roles[j]] = roles[j], signals[rest[i]], float(kept[i, j])
+        behind = [m for m in np.argsort(-gain[:, j]).tolist() if m != i and gain[m, j] > -3.0]
+        if behind:
+            next_best[role] = signals[rest[behind[0]]]
+            gains[role] = float(min(gains[role], 2.0 * (gain[i, j] - gain[behind[0], j]) + 4.0))
+    return _Choice(way, others, gains, next_best)
 
 
-def _gain(y: Column, drive: _Drive, one: Column, role: str) -> float:
-    """Log-odds of a role of one more column, beside position and drive."""
-    head = said(one, role)
-    if role in ("r", "u", "v", "a") and head < -3.0:
-        return head
-    assert y.motion is not None
+def _gain(way: _Way, k: int, role: str, moved: float) -> float:
+    """Log-odds of a role of one more column, beside position and drive.
+
+    moved: how much more the force's change follows it than the other way round.
+    """
+    seen, one = way.seen, way.seen.pairs.signals[k]
+    head = said(one, role) + together(seen.y, one)
     if role == "r":
-        return head + ahead_of(y, one)
+        return _gain_of_reference(seen, k)
+    if role in ("u", "v", "a") and head < -3.0:
+        return head
     if role == "v":
-        share = derivative(y.motion, one.x).share
+        share = seen.v_share[k]
         return head + (2.5 if share > ALL_VELOCITY else -0.5 if share > 0.8 else -3.0)
-    if role == "a":
-        return head - 1.0
     if role == "u":
-        return head + _commands(y, drive, one)
-    if role == "F":
-        return head + 1.0
-    return head - 1.0
-
-
-def _commands(y: Column, drive: _Drive, one: Column) -> float:
-    """Log-odds that a column is the command behind the force of the rig."""
-    assert y.motion is not None
-    F = _force_of(drive)
-    share, _ = actuator_share(F, y.motion.v, one.x, y.motion.cutoff)
-    back, _ = actuator_share(one.x, y.motion.v, F, y.motion.cutoff)
-    one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
-    return float(np.clip(8.0 * (share - back) - 1.0 - one_way, -2.0, 4.0))
-
-
-def _force_of(drive: _Drive) -> Array:
-    """The driving signal, its sign that of a force, (k,)."""
-    if drive.kind == "electro-pneumatic":
-        p_p, p_n = in_one_unit(drive.columns["p_p"], drive.columns["p_n"])
-        ratio = drive.area_ratio
-        return np.asarray(p_p - ratio * p_n if ratio >= 1.0 else p_p / (1.0 / ratio) - p_n)
-    (one,) = drive.columns.values()
-    return drive.law.way * one.x
+        one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
+        return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, 4.0))
+    return head + 1.0 if role == "F" else head - 1.0
 
 
 def _signs(best: _Choice) -> dict[str, Sign]:
     """1 or -1 by signal: with which a force drives the body, and a command the force."""
-    out = dict.fromkeys(best.others, 1.0) | dict.fromkeys(best.drive.columns, 1.0) | {"y": 1.0}
-    if best.drive.kind != "electro-pneumatic":
-        (name,) = best.drive.columns
-        out[name] = best.drive.law.way
-    assert best.y.motion is not None
+    way, seen = best.way, best.way.seen
+    out = dict.fromkeys(best.columns, 1.0)
+    if way.kind != "electro-pneumatic":
+        (name,) = way.columns
+        out[name] = way.law.way if way.law.share > TELLS_SIGN or name == "F" else 1.0
     if "u" in best.others:
-        motion = best.y.motion
         u = best.others["u"].x
-        out["u"] = actuator_share(_force_of(best.drive), motion.v, u, motion.cutoff)[1]
+        out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]
     if "r" in best.others:
-        found = lead(best.others["r"].x, best.y.x)
+        found = seen.lead(seen.pairs.signals.index(best.others["r"]))
         out["r"] = -1.0 if found.likeness < -SURELY_TURNED else 1.0
     if "F" in best.others:
-        law = force_law(best.y.motion, best.y.x, best.others["F"].x)
+        law = force_law(seen.motion, seen.y.x, best.others["F"].x)
         out["F"] = 1.0 if law is None else law.way
     return out
 
 
-def _odds(
-    best: _Choice, choices: Sequence[_Choice], found: Mapping[str, Column]
-) -> dict[str, float]:
-    """How far the best choice is ahead of the best that gives each signal another column."""
+def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
+    """How far the best choice is ahead of the best that gives each signal another column.
 
-    def of(choice: _Choice, role: str) -> Column | None:
-        return {"y": choice.y, **choice.drive.columns, **choice.others}.get(role)
-
+    No role is sure whose header says nothing of it.
+    """
     out = {}
-    for role, column in found.items():
-        rivals = [one.score for one in choices if of(one, role) is not column]
+    for role, column in best.columns.items():
+        rivals = [one.score for one in choices if one.columns.get(role) is not column]
         ahead = best.score - max(rivals, default=-np.inf)
         own = best.gains.get(role)
-        out[role] = min(ahead, own) if own is not None and role != "y" else ahead
+        odds = min(ahead, own) if own is not None else ahead
+        told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_TELLS
+        out[role] = odds if told else min(odds, SURE - 1.0)
     return out
+
+
+def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
+    """The column that each signal would be otherwise."""
+    out = dict(best.next_best)
+    for role, column in best.columns.items():
+        for one in choices[1:]:
+            other = one.columns.get(role)
+            if role not in out and other is not None and other is not column:
+                out[role] = other
+    return out
+
+
+def _rival_kind(best: _Choice, choices: Sequence[_Choice]) -> tuple[RigKind, Column] | None:
+    """The likeliest choice of another kind of rig with the same position."""
+    for one in choices[1:]:
+        if one.way.kind != best.way.kind and one.way.y is best.way.y:
+            return one.way.kind, next(iter(one.way.columns.values()))
+    return None
 
 
 def _reasons(best: _Choice) -> dict[str, str]:
     """In words why each column has its role."""
-    law = best.drive.law
-    of = f"{law.share:.0%} of it is inertia and friction along the position"
+    law, seen = best.way.law, best.way.seen
+    of = f"{law.share:.0%} of it is inertia and friction"
     work = f", and friction takes {abs(law.work):.0%} of its work" if abs(law.work) > 0.1 else ""
-    out = {name: of + work for name in best.drive.columns}
-    if best.drive.kind == "electro-pneumatic":
-        out = dict.fromkeys(
-            out, f"of the difference of the two {of[: -len(' along the position')]}"
-        )
+    out = {name: f"{of} along the position{work}" for name in best.way.columns}
+    two = best.way.kind == "electro-pneumatic"
+    if two:
+        out = dict.fromkeys(out, f"of the difference of the two {of}")
     out["y"] = "moves as a body does, and " + (
-        "two pressures drive it" if best.drive.kind == "electro-pneumatic" else "a force drives it"
+        "two pressures drive it" if two else "a force drives it"
     )
     if "r" in best.others:
-        found = lead(best.others["r"].x, best.y.x)
+        found = seen.lead(seen.pairs.signals.index(best.others["r"]))
         out["r"] = f"the position follows it ({found.likeness:.0%} alike)"
     if "u" in best.others:
         out["u"] = "the force's change follows it"

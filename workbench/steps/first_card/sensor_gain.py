@@ -8,10 +8,10 @@ from identification.arrays import Array
 from identification.signals.relations import derivative, lead
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column, Columns
+from workbench.steps.first_card.motion_guess import counts_per_turn, is_count
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre
 
-COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio is a gain
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
 ABOUT = 0.05  # that a round gain is off what the log shows
@@ -19,35 +19,58 @@ SLOW_STRETCHES = 24  # of a log, over whose means position and reference are com
 SENSOR_OUTPUTS = ("command", "count")
 
 
-def by_reference(roles: Roles, given: Mapping[str, UnitGuess], motion: Motion) -> UnitGuess | None:
-    """The gain of a position in counts or volts, from a reference whose unit is known."""
+def by_reference(
+    columns: Columns, roles: Roles, given: Mapping[str, UnitGuess], motion: Motion
+) -> UnitGuess | None:
+    """The gain of a position in counts or volts: by where it leaps back, by a velocity or a
+    reference whose unit is known, else a usual one."""
     y, r = roles.columns["y"], roles.columns.get("r")
     if not is_output(y):
         return None
     unit = "V" if y.header.unit and y.header.unit.quantity == "command" else "count"
     per = "turn" if motion == "rotary" else "mm"
+    turn = counts_per_turn(y.numbers) if motion == "rotary" and unit == "count" else None
+    if turn is not None:
+        return UnitGuess(unit, f"{turn} count/turn", True, "it leaps back after a turn")
+    if (rate := _by_velocity(columns, roles, given, motion)) is not None:
+        number = _sensible(rate, per == "turn")
+        return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, "by the velocity beside it")
     if r is not None and not is_output(r):
         together = lead(r.x, y.x)
         known = given.get("r")
         usual = USUAL["y" if motion == "linear" else "y rotary"]
-        per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)
+        per = known.unit if known else likeliest("travel", np.ptp(r.x), usual, motion)[0]
         if abs(together.likeness) > WELL_KNOWN:
             number = _sensible(_slow_ratio(y.x, r.x), per == "turn")
             why = f"by its size beside the reference {r.shown}"
             return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
-    number = 4096.0 if motion == "rotary" else 1000.0
+    number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
+    rival = f"{other:.9g} {unit}/{per}"
     if unit == "V":
         number = _sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0))
+        rival = ""
     why = "nothing in the log tells it: the sensor's data sheet does"
-    return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
+    return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, rival)
+
+
+def _by_velocity(
+    columns: Columns, roles: Roles, given: Mapping[str, UnitGuess], motion: Motion
+) -> float | None:
+    """Counts a turn or a millimetre, where clock and velocity have known units."""
+    if not {"t", "v"} <= set(given) or "v" not in roles.columns:
+        return None
+    found = roles.columns["y"].motion
+    assert found is not None
+    per_sample = abs(derivative(found, roles.columns["v"].x).factor) * factor(given["v"].unit)
+    second = factor(given["t"].unit) * columns.step * columns.grid
+    size = 2.0 * np.pi if motion == "rotary" else 1e-3
+    return size / (per_sample * second) if per_sample > 0.0 else None
 
 
 def is_output(column: Column) -> bool:
     """Whether a position is what a sensor gives: counts, volts, or whole numbers without a unit."""
     unit = column.header.unit
-    if unit is not None:
-        return unit.quantity in SENSOR_OUTPUTS
-    return column.whole and len(np.unique(column.numbers)) > COUNTED_LEVELS
+    return is_count(column) or (unit is not None and unit.quantity in SENSOR_OUTPUTS)
 
 
 def _slow_ratio(y: Array, r: Array) -> float:

@@ -2,16 +2,17 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from identification.errors import BadCard
-from workbench.cards.units import Motion, conversion
+from workbench.cards.units import conversion
 
 USUAL: Mapping[str, Mapping[str, float]] = {  # signal: unit and how usual it is
     "t": {"s": 0.0, "ms": 0.0, "us": -0.7, "ns": -1.5},
     "y": {"m": 0.0, "mm": 0.5, "um": -1.0},
-    "y rotary": {"rad": 0.0, "deg": 0.3, "turn": -1.5},
+    "y rotary": {"rad": 0.3, "deg": 0.0, "turn": -1.5},
     "F": {"N": 0.0, "kN": -1.5, "mN": -3.0},
     "F rotary": {"N m": 0.0, "mN m": -1.5},
     "p": {"Pa": 0.0, "bar": 0.5, "kPa": -0.7, "MPa": -0.7, "mbar": -2.0, "psi": -2.0},
@@ -32,20 +33,24 @@ SIZES: Mapping[str, tuple[float, float]] = {
     "speed rotary": (5.0, 10.0),
     "force rotary": (1.0, 15.0),
     "mass rotary": (1e-3, 50.0),
+    "travel rotor": (20.0, 20.0),  # of a motor's own shaft
+    "speed rotor": (30.0, 10.0),
 }
 
 
 @dataclass(frozen=True)
 class UnitGuess:
     """Unit of a column as cards write it, its gain ("1000 count/mm") or None, whether it is sure,
-    and why."""
+    and why; rival: the next likely unit or gain."""
 
     unit: str
     gain: str | None
     sure: bool
     why: str
+    rival: str = ""
 
 
+@cache
 def factor(unit: str) -> float:
     """What one of the unit is in SI; raises BadCard where it is unknown."""
     found = conversion(unit, None)
@@ -63,14 +68,24 @@ def metre(unit: str, guess: UnitGuess | None) -> float:
     return factor(unit) * factor(below) / (factor(above) * abs(float(number)))
 
 
-def near(quantity: str, value: float, motion: Motion) -> float:
-    """Log-probability of a size, of the normal spread of its logarithm."""
-    key = f"{quantity} rotary" if motion == "rotary" and f"{quantity} rotary" in SIZES else quantity
+def near(quantity: str, value: float, machine: str) -> float:
+    """Log-probability of a size, of the normal spread of its logarithm.
+
+    machine: linear, rotary, or rotor where the motor's own shaft is logged.
+    """
+    keys = {"linear": (quantity,), "rotor": (f"{quantity} rotor", f"{quantity} rotary", quantity)}
+    key = next(one for one in keys.get(machine, (f"{quantity} rotary", quantity)) if one in SIZES)
     middle, by = SIZES[key]
     if not value > 0.0:
         return 0.0
     return -0.5 * float((np.log(value / middle) / np.log(by)) ** 2)
 
 
-def likeliest(quantity: str, value: float, usual: Mapping[str, float], motion: Motion) -> str:
-    return max(usual, key=lambda one: usual[one] + near(quantity, value * factor(one), motion))
+def likeliest(
+    quantity: str, value: float, usual: Mapping[str, float], machine: str
+) -> tuple[str, str]:
+    """The likeliest unit of a value, and the next one."""
+    ranked = sorted(
+        usual, key=lambda one: -usual[one] - near(quantity, value * factor(one), machine)
+    )
+    return ranked[0], ranked[1] if len(ranked) > 1 else ""

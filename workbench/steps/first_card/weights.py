@@ -9,10 +9,11 @@ from collections.abc import Mapping
 import numpy as np
 
 from identification.arrays import Array
-from identification.signals.relations import ForceLaw, derivative, lead
+from identification.signals.relations import ForceLaw
 from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
 from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.pairs import Pairs, Seen
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
@@ -33,33 +34,59 @@ AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are 
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
+AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
 MIRRORED = 4.0  # for two columns as chambers that look like forces of opposite sign
+SAME_AXIS, OTHER_AXIS = 1.0, -5.0  # for two columns, by the axes that their headers name
+SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's name
+ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
+MOST_COMMANDS = 12  # among which a limiter is looked for
+A_VELOCITY = -12.0  # for a drive that is the velocity alone
+STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
+NEVER = -9.0
+FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
+AS_FAR = 0.25  # of its range, that a reference of few levels is off the position's at most
+OF_A_MODEL = -9.0  # for what another model says, beside what is measured
+ALIKE, MOST_ALIKE = 1.5, 3.5  # for each decade by which a reference is nearer to the position
+LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
 
 def said(one: Column, role: str) -> float:
-    """Log-odds of a role by the header alone."""
+    """Log-odds of a role by the header, and by the few values that a column takes."""
     head = one.header
     total = 0.0
     for quantity, weight in head.means.items():
         if role in ROLES_OF[quantity]:
             total = max(total, weight if role != "r" else 0.5 * weight)
     if head.means and total == 0.0:
-        total -= 1.5
+        total -= 0.5 + max(head.means.values())
     if head.unit is not None:
         total += _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
-    if head.purpose == "reference":
-        total += {"r": 4.0, "y": -5.0, "F": -4.0, "p": -4.0, "v": -3.0}.get(role, 0.0)
-    elif head.purpose == "measured":
-        total += {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5}.get(role, 0.0)
-    elif head.purpose == "error":
-        total -= 6.0
+    total += _by_purpose(one, role)
     if one.bits is not None:
         total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
+    if one.flag:
+        driven = role == "u" and "command" in head.means
+        total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else NEVER
     return total
+
+
+def _by_purpose(one: Column, role: str) -> float:
+    """What "target", "actual", "error" or "predicted" in a header makes of a role."""
+    purpose, means = one.header.purpose, one.header.means
+    if purpose == "reference":
+        other = means and "position" not in means
+        return {"r": -3.0 if other else 4.0, "y": -6.9, "F": -4.0, "p": -4.0, "v": -3.0}.get(
+            role, 0.0
+        )
+    if purpose == "measured":
+        return {"y": 1.5, "r": -5.0, "F": 0.5, "p": 0.5, "v": 0.5, "u": 0.5}.get(role, 0.0)
+    if purpose == "demand":  # what is measured beside it acts
+        return -1.0 if role == "u" else 0.0
+    return {"error": -6.0, "model": OF_A_MODEL}.get(purpose, 0.0)
 
 
 def _by_unit(one: Column, role: str) -> float:
@@ -73,23 +100,39 @@ def _by_unit(one: Column, role: str) -> float:
     return BY_UNIT if role in ROLES_OF[quantity] else AGAINST_UNIT
 
 
+def together(one: Column, other: Column) -> float:
+    """Log-odds of two columns in one card, by the axes that their headers name."""
+    if not (one.axis and other.axis):
+        return 0.0
+    return SAME_AXIS if one.axis == other.axis else OTHER_AXIS
+
+
 def moves_like_a_body(y: Column) -> float:
     """Log-odds of a position by its own course: a body's velocity is far above its noise."""
     assert y.motion is not None
     v_noise = max(y.motion.v_noise, 1e-300)
     clear = float(np.std(y.motion.v)) / v_noise
-    levels = len(np.unique(y.x))
-    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if levels < 20 else 0.0)
+    few = len(y.levels) < 20
+    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
-def in_one_unit(one: Column, other: Column) -> tuple[Array, Array]:
-    """Two pressures [Pa] where both headers give units of pressure, else as they are."""
+def among_derivatives(pairs: Pairs) -> Array:
+    """Log-odds of each column as a position, by what it is the derivative of, and what its own."""
+    bodies = [i for i, one in enumerate(pairs.signals) if said(one, "y") > -4.0]
+    speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
+    of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
+    own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
+    return np.where(of_others > ALL_VELOCITY, -6.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
+
+
+def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
+    """Factors of two pressures to [Pa] where both headers give units of pressure, else 1."""
     units = [column.header.unit for column in (one, other)]
     if any(unit is None or unit.quantity != "pressure" for unit in units):
-        return one.x, other.x
+        return 1.0, 1.0
     factors = [conversion(unit.card, "Pa") for unit in units if unit is not None]
     first, second = (1.0 if of is None else of.factor for of in factors)
-    return first * one.x, second * other.x
+    return first, second
 
 
 def of_a_motor(one: Column) -> float:
@@ -97,8 +140,23 @@ def of_a_motor(one: Column) -> float:
     finite = one.values[np.isfinite(one.values)]
     low, high = float(finite.min()), float(finite.max())
     limited = low == -high and np.sum(finite == high) > 2
-    one_way = -3.0 if low * high > 0.0 else 0.0
-    return one_way + (1.5 if limited else 0.0) + (1.0 if max(-low, high) <= 12.0 else -0.5)
+    return (1.5 if limited else 0.0) + (1.0 if max(-low, high) <= 12.0 else -0.5)
+
+
+def limits(pairs: Pairs) -> dict[int, int]:
+    """Commands before a limiter or a sum: what comes out of it, each by its place."""
+    likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
+    likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
+    return pairs.behind(sorted(k for _, k in likely))
+
+
+def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
+    """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
+    x = pairs.signals[k].x
+    steady = abs(float(x.mean())) > STEADY * float(x.std())
+    one_way = -3.0 if x.min() * x.max() > 0.0 else 0.0
+    place = BEFORE_LIMIT if k in behind else ACTS if k in behind.values() else 0.0
+    return one_way + place - (3.0 if steady and one_way else 0.0)
 
 
 def turned(law: ForceLaw) -> ForceLaw:
@@ -110,46 +168,58 @@ def turned(law: ForceLaw) -> ForceLaw:
     )
 
 
-def driving(y: Column, f: Array, law: ForceLaw) -> float:
-    """Log-odds that a signal drives the body, by what of it is inertia and friction."""
-    assert y.motion is not None
+def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
+    """Log-odds that a signal drives the body, by what of it is inertia and friction.
+
+    v_share: of it that is the velocity alone; less_way: whether it goes less than the position.
+    """
     score = 6.0 * float(np.clip((law.share - 0.3) / 0.65, -0.7, 1.0)) + 2.0 * abs(law.work)
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
-    if law.friction < LITTLE_FRICTION and derivative(y.motion, f).share > ALL_VELOCITY:
-        score -= 8.0
+    if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
+        score += A_VELOCITY
     elif law.friction < NO_FRICTION:
         score -= 3.0
     if law.way < 0.0:
         score -= 1.0
-    if _way_gone(f) < LEAST_WAY * _way_gone(y.x):
-        score -= 3.0
-    return score
+    return score - (3.0 if less_way else 0.0)
 
 
-def _way_gone(x: Array) -> float:
-    """The way that a signal goes, in units of its range."""
-    size = max(1, len(x) // 2000)
-    count = len(x) // size
-    means = x[: count * size].reshape(count, size).mean(axis=1)
-    width = float(np.ptp(means))
-    return float(np.sum(np.abs(np.diff(means)))) / width if width > 0 else 0.0
+def less_way(y: Column, one: Column) -> bool:
+    """Whether a signal goes less way than the position, which no force on it does."""
+    return one.way_gone < LEAST_WAY * y.way_gone
 
 
-def ahead_of(y: Column, one: Column) -> float:
+def ahead_of(seen: Seen, k: int) -> float:
     """Log-odds that a column is the position's reference: alike, ahead of it, without noise."""
-    assert y.motion is not None
-    found = lead(one.x, y.x)
+    y, one = seen.y, seen.pairs.signals[k]
+    if abs(seen.pairs.alike[seen.at, k]) < LEAST_ALIKE:
+        return -3.0
+    found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    score = 4.0 * found.likeness - 2.0
+    score = min(-ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
-    if derivative(y.motion, one.x).share > ALL_VELOCITY:
+    if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
     score += 1.0 if abs(slope - round(slope)) < SAME_UNIT / np.log(10.0) else -1.0
+    if one.flag and found.likeness > AS_LIKE:
+        far = float(np.ptp(one.x)) / float(np.diff(np.quantile(y.x, (0.02, 0.98)))[0])
+        score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
-    return score + (1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0)
+    score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
+    return score + _named_for(seen, k)
+
+
+def _named_for(seen: Seen, k: int) -> float:
+    """Log-odds that a reference is that of y, where its header repeats a position's name."""
+    stems = seen.pairs.stems
+    if not stems[k]:
+        return 0.0
+    if stems[k] == stems[seen.at]:
+        return SAME_STEM
+    return OTHER_STEM if stems.count(stems[k]) > 1 else 0.0

@@ -36,7 +36,8 @@ def written(of: Proposal, *, asked: bool = False) -> str:
 
 
 def _rig_line(one: RigGuess) -> Line:
-    return Line(one.key, one.value, _remark(one.sure, f"{one.unit}: {one.why}".lstrip(": ")))
+    why = f"{one.unit}: {one.why}".lstrip(": ")
+    return Line(one.key, one.value, _remark(one.sure, why, one.rival))
 
 
 def _signal_line(one: SignalGuess) -> Line:
@@ -47,11 +48,12 @@ def _signal_line(one: SignalGuess) -> Line:
         value = {**value, "bits": one.bits, "signed": True}
     named = isinstance(one.column, int) and not one.shown.startswith("number")
     why = f"{one.shown}: {one.why}" if named else one.why
-    return Line(one.name, value, _remark(one.sure, why))
+    return Line(one.name, value, _remark(one.sure, why, one.rival))
 
 
-def _remark(sure: bool, why: str) -> str:
-    return f"{'sure' if sure else 'guess'}: {why}"
+def _remark(sure: bool, why: str, rival: str) -> str:
+    other = "" if sure or not rival else f"; else {rival}"
+    return f"{'sure' if sure else 'guess'}: {why}{other}"
 
 
 def _tail(of: Proposal) -> list[str]:

@@ -1,0 +1,184 @@
+"""A first card of tables as drives log them: what is no signal, what acts, which axis."""
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.init_real_tables import fewest_wrong, machine, make_table
+from benchmarks.init_table_words import KINDS
+from identification.arrays import Array
+from identification.errors import BadLog
+from workbench.logs.unknown import read_unknown
+from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
+from workbench.steps.first_card.columns import columns_of
+from workbench.steps.first_card.proposal import Proposal, proposed
+
+T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
+
+
+@pytest.fixture(scope="module")
+def joint() -> dict[str, Array]:
+    """The signals of a joint behind a limited loop, in SI."""
+    return machine(np.random.default_rng(5), T, KINDS["choose"][0])
+
+
+@pytest.fixture(scope="module")
+def other() -> dict[str, Array]:
+    """The signals of another joint."""
+    return machine(np.random.default_rng(8), T, KINDS["choose"][0])
+
+
+def propose(folder: Path, headers: str, *columns: Array, axis: str | None = None) -> Proposal:
+    """The proposal for a table with this line of headers, as it stands in a file."""
+    rows = (",".join(f"{one:.9g}" for one in row) for row in np.column_stack(columns).tolist())
+    path = folder / "run.csv"
+    path.write_text("\n".join([headers, *rows]), "utf-8")
+    return proposed(path, axis=axis)
+
+
+def plain(joint: Mapping[str, Array]) -> Array:
+    """Its position without the steps of a turn."""
+    return joint["y"] + 1e-4 * np.random.default_rng(1).standard_normal(len(T))
+
+
+def columns(found: Proposal) -> Mapping[str, str | int]:
+    return {one.name: one.column for one in found.signals}
+
+
+@pytest.mark.parametrize(("part", "seed"), [("choose", 2), ("choose", 9), ("judge", 1)])
+def test_a_table_of_the_bench_is_right(tmp_path: Path, part: str, seed: int) -> None:
+    table = make_table(seed, part, tmp_path)
+    assert fewest_wrong(proposed(table.path), table) == {}
+
+
+def test_what_comes_out_of_a_limiter_acts(joint: dict[str, Array], tmp_path: Path) -> None:
+    limit = 0.6 * float(np.max(np.abs(joint["u0"])))
+    u = np.clip(joint["u0"], -limit, limit)
+    found = propose(tmp_path, "t,a,pos,controller,drive", T, joint["a"], joint["y"], joint["u0"], u)
+    assert columns(found)["u"] == "drive"
+    found = propose(tmp_path, "t,pos,out1,out2,ff", T, joint["y"], joint["u0"] - joint["ff"],
+                    joint["u0"], joint["ff"])  # fmt: skip
+    assert columns(found)["u"] == ("out2" if np.any(joint["ff"]) else columns(found)["u"])
+
+
+def test_switches_supplies_and_predictions_are_no_signals(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    switch = (T > 3.0) * 1.0
+    found = propose(
+        tmp_path, " time, pred_angle, active, Vsupply, angle [deg], error, torque [Nm]", T,
+        57.3 * joint["pred"], switch, 12.0 - 0.1 * np.abs(joint["F"]), 57.3 * joint["y"],
+        joint["e"], joint["F"],
+    )  # fmt: skip
+    assert columns(found) == {"t": "time", "y": "angle [deg]", "F": "torque [Nm]"}
+    assert found.motion == "rotary"
+
+
+def test_each_of_several_axes_has_its_card(
+    joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    table = (T, joint["y"], joint["F"], other["y"], other["F"], joint["v"], other["v"])
+    headers = "time,hip_pos,hip_tau,knee_pos,knee_tau,hip_vel,knee_vel"
+    found = propose(tmp_path, headers, *table)
+    assert found.axes == ("hip", "knee")
+    assert columns(found) == {"t": "time", "y": "hip_pos", "F": "hip_tau"}
+    assert any("2 axes in this log: hip, knee" in one for one in found.remarks)
+    found = propose(tmp_path, headers, *table, axis="knee")
+    assert columns(found) == {"t": "time", "y": "knee_pos", "F": "knee_tau"}
+    with pytest.raises(BadLog, match="axes: hip, knee"):
+        propose(tmp_path, headers, *table, axis="toe")
+
+
+def test_a_sign_bit_is_named_and_nothing_is_fitted(joint: dict[str, Array], tmp_path: Path) -> None:
+    raw = np.round(2000.0 * joint["y"])
+    raw = np.where(raw < 0.0, 32768.0 - raw, raw)
+    with pytest.raises(BadLog, match=r"jumps by 32768 .*sign and magnitude, bit 15") as refused:
+        propose(tmp_path, "t,pos,torque", T, raw, joint["F"])
+    assert "\n" not in str(refused.value)
+
+
+def test_a_clock_that_a_velocity_denies_is_named(joint: dict[str, Array], tmp_path: Path) -> None:
+    headers = "time [s],angle [rad],speed [rad/s],torque [Nm]"
+    found = propose(tmp_path, headers, 0.5 * T, joint["y"], joint["v"], joint["F"])
+    assert any("the clock runs 2 times too slow" in one for one in found.remarks)
+    found = propose(tmp_path, headers, T, joint["y"], joint["v"], joint["F"])
+    assert not any("the clock runs" in one for one in found.remarks)
+
+
+def test_a_velocity_makes_sure_of_a_position(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "time [s],angle,speed [deg/s],torque [Nm]", T,
+                    joint["y"] * 180.0 / np.pi, joint["v"] * 180.0 / np.pi, joint["F"])  # fmt: skip
+    one = found.signal("y")
+    assert one is not None and (one.unit, one.sure) == ("deg", True)
+
+
+def test_sizes_alone_make_nothing_sure(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "time,position,force", T, plain(joint), joint["F"])
+    assert [one.name for one in found.signals if one.sure] == ["t"]
+    motion = next(one for one in found.rig if one.key == "motion")
+    assert (motion.sure, motion.rival) == (False, "rotary")
+    turned = with_rig(found, "motion", "+")
+    assert turned.motion == "rotary"
+    units = {one.name: one.unit for one in turned.signals}
+    assert units["F"] == "N m" and units["y"] in ("rad", "deg")
+
+
+def test_the_other_guess_is_one_key_away(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "time,angle,torque", T, plain(joint), joint["F"])
+    y = found.signal("y")
+    assert y is not None and y.rival
+    after = with_signal(found, "y", "+").signal("y")
+    assert after is not None and y.rival in (after.unit, str(after.column))
+    with pytest.raises(BadAnswer, match="nothing else"):
+        with_signal(found, "t", "+")
+
+
+def test_columns_of_one_name_are_named(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "t,angle,torque,torque", T, joint["y"], joint["F"], 0.0 * T)
+    assert columns(found)["F"] == 2
+    assert any("columns 2 and 3 (from 0) are all named 'torque'" in one for one in found.remarks)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_arrays_of_numpy_are_tables(joint: dict[str, Array], tmp_path: Path, turned: bool) -> None:
+    rows = np.column_stack([T, joint["y"], joint["F"]])
+    np.save(tmp_path / "run.npy", rows.T if turned else rows)
+    found = proposed(tmp_path / "run.npy")
+    assert {one.name: one.column for one in found.signals if one.name in "ty"} == {"t": 0, "y": 1}
+    np.savez(tmp_path / "run.npz", time=T, q=np.stack([joint["y"], joint["v"]]), tau=joint["F"])
+    assert columns(proposed(tmp_path / "run.npz"))["F"] == "tau"
+
+
+def test_python_objects_in_arrays_are_never_unpickled(tmp_path: Path) -> None:
+    np.save(tmp_path / "run.npy", np.array([{}, []], dtype=object), allow_pickle=True)
+    with pytest.raises(BadLog, match="holds Python objects") as refused:
+        proposed(tmp_path / "run.npy")
+    assert "\n" not in str(refused.value)
+
+
+def test_a_comma_for_both_is_refused_in_those_words(tmp_path: Path) -> None:
+    rows = [f"{k // 100},{k % 100:02d},{k},{k % 7}" for k in range(300)]
+    (tmp_path / "run.csv").write_text("\n".join(["Zeit_s,Kraft_N", *rows]), "utf-8")
+    with pytest.raises(BadLog, match="a comma both parts the columns and is the decimal sign"):
+        proposed(tmp_path / "run.csv")
+
+
+def test_stamps_and_bars_are_read(joint: dict[str, Array], tmp_path: Path) -> None:
+    rows = [
+        f"2024-05-01T10:00:{t:06.3f}Z,|,{y:.6f},|,{F:.5f}"
+        for t, y, F in zip(T, joint["y"], joint["F"], strict=True)
+    ]
+    (tmp_path / "run.csv").write_text("\n".join(["stamp,s1,q,s2,tau", *rows]), "utf-8")
+    found = proposed(tmp_path / "run.csv")
+    assert columns(found) == {"t": "stamp", "y": "q", "F": "tau"}
+    assert found.unused["'s1'"] == "'|' alone"
+
+
+def test_a_position_that_only_rises_is_no_clock(tmp_path: Path) -> None:
+    y = np.cumsum(1e-3 * (2.0 + np.sin(3.0 * T)))
+    np.savetxt(tmp_path / "run.csv", np.column_stack([T, y, np.cos(3.0 * T)]), delimiter=",",
+               header="t,position,current", comments="")  # fmt: skip
+    found = columns_of(read_unknown(tmp_path / "run.csv"))
+    assert [one.raw.header for one in found.signals] == ["position", "current"]

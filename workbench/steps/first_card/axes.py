@@ -1,0 +1,80 @@
+"""Several axes or joints in one log: which column is of which, by what their headers share."""
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from identification.arrays import Array
+from workbench.cards.headers import Header, meaning, tells_purpose, words_of
+
+SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
+
+
+def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, str]:
+    """The axis of each column by its number, "" of what belongs to all; empty for one axis.
+
+    Headers that differ in one word alone make a family: of positions that do not move together
+    the word is the axis. columns: headers and numbers; alike: correlation of the columns, (k, k).
+    """
+    heads = [head for head, _ in columns]
+    words = [words_of(head.name) for head in heads]
+    families: dict[tuple[str, ...], dict[str, int]] = {}
+    for k, own in enumerate(words):
+        for place, word in enumerate(own):
+            if _may_be_a_name(word):
+                families.setdefault((*own[:place], "*", *own[place + 1 :]), {})[word] = k
+    found = [one for one in families.values() if len(one) > 1]
+    best = max((_positions(one, heads, alike, found) for one in found), key=len, default=())
+    if len(best) < 2:
+        return {}
+    out = {}
+    for (_, number), own in zip(columns, words, strict=True):
+        named = [word for word in dict.fromkeys(own) if word in best]
+        out[number] = named[0] if len(named) == 1 else ""
+    return out
+
+
+def _may_be_a_name(word: str) -> bool:
+    """Whether a word may tell an axis: it says nothing else, or is itself a position's name."""
+    means = meaning(word)
+    return not tells_purpose(word) and (not means or "position" in means or len(word) == 1)
+
+
+def _positions(
+    family: Mapping[str, int],
+    heads: Sequence[Header],
+    alike: Array,
+    families: Sequence[Mapping[str, int]],
+) -> tuple[str, ...]:
+    """The words of a family that are axes: those of positions, each of which moves for itself."""
+    kept = [(word, k) for word, k in family.items() if _is_position(heads[k])]
+    names = {word for word, _ in kept}
+    elsewhere = sum(names <= set(other) for other in families)
+    apart = list[tuple[str, int]]()
+    for word, k in kept:
+        if elsewhere > 1 or all(abs(alike[k, j]) < SAME_MOTION for _, j in apart):
+            apart.append((word, k))
+    return tuple(word for word, _ in apart)
+
+
+def _is_position(head: Header) -> bool:
+    if head.purpose in ("reference", "error", "model"):
+        return False
+    if head.unit is not None:
+        return head.unit.quantity == "position" or (
+            head.unit.quantity == "count" and "position" in head.means
+        )
+    return max(head.means, key=lambda what: head.means[what], default="other") == "position"
+
+
+def stem(head: Header) -> tuple[str, ...]:
+    """What a header says beside what its signal is for: "theta" of "target_theta"."""
+    return tuple(word for word in words_of(head.name) if not tells_purpose(word))
+
+
+def correlation(x: Array) -> Array:
+    """Correlation of the columns of x (n, k), (k, k)."""
+    a = x - x.mean(axis=0)
+    size = np.sqrt(np.sum(a**2, axis=0))
+    a = a / np.where(size > 0.0, size, 1.0)
+    return np.asarray(a.T @ a)

@@ -1,0 +1,106 @@
+"""Whether a machine turns or slides, and what a position's own values tell of its unit."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+from workbench.cards.headers import words_of
+from workbench.cards.units import Motion
+from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.roles import Roles
+
+WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one
+TURNS = {"rad": 2.0 * np.pi, "deg": 360.0}
+WRAPS = 0.02  # of a turn, that a leap or a range is off it
+TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
+COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
+CURRENTS = ("current", "strom", "電流", "courant", "corrente", " iq ", " i q ", " isq ", " ia ",
+            " i a ", " amp")  # fmt: skip
+ROTOR = 1.5  # the same of words that speak of a motor's own shaft
+
+
+class MotionGuess(NamedTuple):
+    """Whether the machine turns, why, whether that is sure, and whether by its own rotor."""
+
+    motion: Motion
+    why: str
+    sure: bool
+    rotor: bool = False
+
+    @property
+    def machine(self) -> str:
+        """As sizes of machines are looked up: linear, rotary or rotor."""
+        return "rotor" if self.rotor and self.motion == "rotary" else self.motion
+
+
+def told_motion(roles: Roles) -> MotionGuess:
+    """Turns or slides: by units, by words, by a turn in the position's values; else a guess."""
+    weak = {
+        name: column.header.turning
+        for name, column in roles.columns.items()
+        if name in ("y", "u", "F")
+    }
+    rotor = weak.get("u", 0.0) >= ROTOR
+    for name in ("y", "r", "F", "v"):
+        column = roles.columns.get(name)
+        unit = column.header.unit if column else None
+        if column and unit and unit.quantity in ("position", "velocity", "force"):
+            motion: Motion = "rotary" if unit.rotary else "linear"
+            sure = not column.header.doubtful or len(unit.card) > 1
+            return MotionGuess(motion, f"the unit of column {column.shown}", sure, rotor)
+    if any(column.header.angle for column in roles.columns.values()):
+        return MotionGuess("rotary", "a header that speaks of an angle or a torque", True, rotor)
+    turn = unit_by_turn(roles.columns["y"])
+    if turn is not None:
+        return MotionGuess("rotary", f"{turn[1]} in {turn[0]}", True, rotor)
+    if _counted_shaft(roles):
+        why = "counts of an encoder beside a motor's current are mostly those of a shaft"
+        return MotionGuess("rotary", why, False, rotor)
+    if sum(weak.values()) >= TURNING:
+        most = roles.columns[max(weak, key=lambda one: weak[one])]
+        why = f"machines that turn have names like {most.shown} more often"
+        return MotionGuess("rotary", why, False, rotor)
+    return MotionGuess("linear", "the usual one: no unit and no word says that it turns", False)
+
+
+def _counted_shaft(roles: Roles) -> bool:
+    """Whether a position in counts is driven by a current."""
+    return "u" in roles.columns and is_count(roles.columns["y"]) and is_current(roles.columns["u"])
+
+
+def is_count(y: Column) -> bool:
+    """Whether a position has whole numbers of an encoder, by its unit or by its values."""
+    unit = y.header.unit
+    return unit.quantity == "count" if unit else y.whole and len(y.levels) > COUNTED_LEVELS
+
+
+def is_current(u: Column) -> bool:
+    """Whether a command is a current, by its unit or by its name."""
+    text = f" {' '.join(words_of(u.header.name))} "
+    if u.header.unit is not None:
+        return u.header.unit.card in ("A", "mA")
+    return any(one in text for one in CURRENTS)
+
+
+def unit_by_turn(y: Column) -> tuple[str, str] | None:
+    """Unit of an angle and what tells it: its steps are a turn over a power of two, or it leaps
+    by a turn; None where neither is so."""
+    leap = float(np.max(np.abs(np.diff(y.numbers)), initial=0.0))
+    for unit, turn in TURNS.items():
+        power = np.log2(turn / y.step) if y.step > 0.0 else 0.5
+        if abs(power - round(power)) < WHOLE_POWER:
+            return unit, f"its steps are a turn over {2 ** round(power)}"
+        if abs(leap / turn - 1.0) < WRAPS and float(np.ptp(y.numbers)) < (1.0 + WRAPS) * turn:
+            return unit, "it leaps by a turn"
+    return None
+
+
+def counts_per_turn(y: Array) -> int | None:
+    """Counts of a turn, of an encoder that leaps back by a power of two; None where it does not."""
+    leap = float(np.max(np.abs(np.diff(y)), initial=0.0))
+    if leap < 2.0:
+        return None
+    power = 2 ** round(np.log2(leap))
+    wraps = abs(leap / power - 1.0) < WRAPS and 0.9 * power < float(np.ptp(y)) < power
+    return int(power) if wraps and y.min() >= 0.0 else None

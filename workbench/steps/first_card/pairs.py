@@ -1,0 +1,182 @@
+"""What the columns of a log do to each other: cheap for all pairs, more for a few positions."""
+
+from collections.abc import Sequence
+from functools import cached_property
+from itertools import permutations
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.signals.differentiate import Motion, low_pass
+from identification.signals.relations import (
+    ForceLaw,
+    Lead,
+    beside,
+    changed_by,
+    force_laws,
+    lead,
+)
+from workbench.steps.first_card.axes import correlation, stem
+from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
+
+STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
+FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
+ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
+MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
+ROUNDED, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
+
+
+class Pairs:
+    """The signals of a log beside each other: `x` (n, k), `alike` and `rate` (k, k).
+
+    alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned.
+    """
+
+    def __init__(self, signals: Sequence[Column]) -> None:
+        self.signals = tuple(signals)
+        self.x = np.column_stack([one.x for one in signals])
+        self.alike = correlation(self.x)
+        self.rate = _rates(self.x)
+        self.stems = [stem(one.header) for one in signals]
+
+    def behind(self, commands: Sequence[int]) -> dict[int, int]:
+        """Commands before a limiter or a sum, by their place: the place of what comes out of it.
+
+        commands: places of the columns that may be such.
+        """
+        out = {}
+        for i, j in permutations(commands, 2):
+            if abs(self.alike[i, j]) < MAYBE_ONE or self.signals[j].flag:
+                continue
+            before, after = self.signals[i], self.signals[j]
+            if _clipped(before, after):
+                out[i] = j
+            elif i not in out and (part := _added(self.signals, i, j)) is not None:
+                out |= {i: j, part: j}
+        return out
+
+
+def _rates(x: Array) -> Array:
+    """How much of each signal (column) is the derivative of another (row), signed, (k, k)."""
+    best = np.zeros((x.shape[1], x.shape[1]))
+    mean = x - x.mean(axis=0)
+    summed = np.vstack([np.zeros(x.shape[1]), np.cumsum(0.5 * (mean[1:] + mean[:-1]), axis=0)])
+    for size in STRETCHES:
+        if 4 * size > len(x):
+            break
+        every = max(1, size // 4)
+        change = (mean[size:] - mean[:-size])[::every]
+        found = _normed(change).T @ _normed((summed[size:] - summed[:-size])[::every])
+        share = np.sign(found) * found**2
+        best = np.where(np.abs(share) > np.abs(best), share, best)
+    np.fill_diagonal(best, 0.0)
+    return best
+
+
+def _normed(x: Array) -> Array:
+    """Columns (n, k) without their mean, of length one."""
+    a = x - x.mean(axis=0)
+    size = np.sqrt(np.sum(a**2, axis=0))
+    return np.asarray(a / np.where(size > 0.0, size, 1.0))
+
+
+def _clipped(before: Column, behind: Column) -> bool:
+    """Whether a column is another one, mostly, but where it stands at limits which that passes.
+
+    Mostly: a feed-forward may be added between the two. They are in one unit.
+    """
+    a, b = _both(before, behind)
+    low, high = float(b.min()), float(b.max())
+    above, below = b == high, b == low
+    at = above | below
+    if max(np.sum(above), np.sum(below)) < FEWEST_AT_LIMIT or np.sum(~at) < FEWEST_AT_LIMIT:
+        return False
+    slope, shift = np.polyfit(a[~at], b[~at], 1) if np.ptp(a[~at]) > 0.0 else (0.0, 0.0)
+    fitted = slope * a + shift
+    left = float(np.var(b[~at] - fitted[~at]))
+    past = np.sum(fitted[above] > high) + np.sum(fitted[below] < low)
+    return (
+        abs(slope - 1.0) < ONE_UNIT
+        and left < MOST_ADDED * float(np.var(b[~at]))
+        and bool(past > MOSTLY_PAST * np.sum(at))
+        and float(np.ptp(a)) > PASSES * (high - low)
+    )
+
+
+def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
+    """The place of the column that, added to one, makes the other; None where there is none."""
+    a, b = _both(signals[i], signals[j])
+    width = float(np.ptp(b))
+    for k, part in enumerate(signals):
+        if k in (i, j) or part.flag or len(part.values) != len(signals[i].values):
+            continue
+        c = part.values[:MOST_ROWS_LOOKED_AT]
+        if len(c) != len(a) or float(np.ptp(c)) > width:
+            continue
+        same = np.abs(b - a - c) < ROUNDED * width
+        if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > ROUNDED * width) > SELDOM:
+            return k
+    return None
+
+
+def _both(one: Column, other: Column) -> tuple[Array, Array]:
+    """The rows looked at in which both have a number."""
+    a, b = one.values[:MOST_ROWS_LOOKED_AT], other.values[:MOST_ROWS_LOOKED_AT]
+    both = np.isfinite(a) & np.isfinite(b)
+    return a[both], b[both]
+
+
+class Seen:
+    """The other columns as a position sees them; `at` is its place among them.
+
+    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,).
+    """
+
+    def __init__(self, pairs: Pairs, at: int) -> None:
+        self.pairs, self.at, self.y = pairs, at, pairs.signals[at]
+        assert self.y.motion is not None
+        self.motion: Motion = self.y.motion
+        self.smooth = low_pass(pairs.x.T, 1.0, self.motion.cutoff).T
+        inside = slice(self.motion.edge, len(self.motion.v) - self.motion.edge)
+        v = self.motion.v[inside] - self.motion.v[inside].mean()
+        f = self.smooth[inside] - self.smooth[inside].mean(axis=0)
+        square, together = max(float(v @ v), 1e-300), v @ f
+        self.v_factor = together / square
+        self.v_share = together**2 / square / np.maximum(np.sum(f**2, axis=0), 1e-300)
+        self._leads = dict[int, Lead]()
+        self.as_reference = dict[int, float]()
+
+    @cached_property
+    def laws(self) -> list[ForceLaw]:
+        """What of each column is the force along the position; empty where too little moves."""
+        return force_laws(self.motion, self.y.x, self.pairs.x, self.smooth)
+
+    def laws_of(self, f: Array, smooth: Array) -> list[ForceLaw]:
+        """The same of other signals (n, j), and of these smoothed."""
+        return force_laws(self.motion, self.y.x, f, smooth)
+
+    def lead(self, k: int) -> Lead:
+        """By how much a column is ahead of the position."""
+        if k not in self._leads:
+            self._leads[k] = lead(self.pairs.x[:, k], self.y.x)
+        return self._leads[k]
+
+    @cached_property
+    def _beside(self) -> Array:
+        return beside(self.smooth, self.motion.v)
+
+    @cached_property
+    def _rates(self) -> Array:
+        """The change of each column, its share of the velocity taken out, over its spread."""
+        rate = np.gradient(self.smooth, axis=0)
+        spread = np.sqrt(np.sum((rate - rate.mean(axis=0)) ** 2, axis=0))
+        return np.asarray(beside(rate, self.motion.v) / np.maximum(spread, 1e-300))
+
+    def moves(self, F: Array) -> Array:
+        """How much more the change of F (n,), smoothed, follows each column than its follows F."""
+        v = self.motion.v
+        there = np.abs(changed_by(F[:, None], self._beside, v)[0])
+        own = beside(F[:, None], v)[:, 0]
+        back = (own @ self._rates) ** 2 / max(float(own @ own), 1e-300)
+        return np.asarray(there - back)

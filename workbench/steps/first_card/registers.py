@@ -1,0 +1,57 @@
+"""Registers that count below zero: as two's complement, or with a bit of their own for the sign."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from identification.arrays import Array
+
+BITS = (16, 32)  # of a register that counts below zero as two's complement
+FEWEST_BITS = 8  # of a magnitude beside its sign
+BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
+NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
+SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
+
+
+class Register(NamedTuple):
+    """A column as its register means it: bits of two's complement, or the bit of its sign.
+
+    row: where it first leaps, a row of data from 1.
+    """
+
+    values: Array
+    bits: int | None
+    sign_bit: int | None = None
+    row: int = 0
+
+
+def read_register(x: Array) -> Register | None:
+    """The column (n,) of whole numbers as signed ones; None where it is as it stands."""
+    finite = x[np.isfinite(x)]
+    if len(finite) < 2 or finite.min() < 0 or np.any(finite != np.round(finite)):
+        return None
+    for bits in BITS:
+        top = 2.0**bits
+        middle = (finite > top / 8) & (finite < top * 7 / 8)
+        low, high = np.mean(finite <= top / 8), np.mean(finite >= top * 7 / 8)
+        if finite.max() < top and np.mean(middle) < BETWEEN_SIGNS and low > 0.0 and high > 0.0:
+            return Register(np.where(x >= top / 2, x - top, x), bits)
+    return _sign_and_magnitude(x)
+
+
+def _sign_and_magnitude(x: Array) -> Register | None:
+    """The column whose topmost bit is the sign: it leaps by that bit where it passes zero."""
+    finite = x[np.isfinite(x)]
+    bit = int(np.log2(max(finite.max(), 1.0)))
+    top = 2.0**bit
+    if bit < FEWEST_BITS or not np.any(finite < top):
+        return None
+    read = np.where(x >= top, top - x, x)
+    step, smooth = np.abs(np.diff(x)), np.abs(np.diff(read))
+    leaps = np.flatnonzero((x[1:] >= top) != (x[:-1] >= top))
+    if not len(leaps) or np.nanmax(smooth) > SMOOTHER * np.nanmax(step):
+        return None
+    size = np.maximum(np.abs(read[leaps]), np.abs(read[leaps + 1]))
+    if np.nanmedian(size) > NEAR_ZERO * float(np.nanmax(np.abs(read))):
+        return None
+    return Register(read, None, bit, int(leaps[0]) + 2)

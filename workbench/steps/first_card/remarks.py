@@ -1,0 +1,77 @@
+"""What a first card cannot hold: gaps, delays, axes, doubled names, a clock that a velocity denies,
+and what kind of rig it would be otherwise."""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from identification.signals.relations import lead
+from workbench.steps.first_card.columns import Columns
+from workbench.steps.first_card.roles import Roles
+from workbench.steps.first_card.sizes import UnitGuess, factor
+from workbench.steps.first_card.unit_guess import contradicted_clock
+
+BALANCED = 2.0  # times the Coulomb level, that a force has to be off zero for a pressure's area
+
+
+def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> Iterator[str]:
+    """The remarks of a card, each a line."""
+    clock = units["t"]
+    second = factor(clock.unit) if clock.gain is None else 1.0 / float(clock.gain.split()[0])
+    h = columns.step * second
+    yield from _of_clock(columns, second, h)
+    yield from _of_names(columns, roles)
+    if (ratio := contradicted_clock(columns, roles, dict(units))) is not None:
+        yield _contradiction(roles, units, ratio)
+    if roles.kind == "force" and not {"p_p", "p_n"} & set(roles.columns):
+        balance, coulomb = abs(roles.law.balance), abs(roles.law.coulomb)
+        if balance > BALANCED * coulomb:
+            yield (
+                f"the force is {balance:.3g} {units['F'].unit} off zero between its two directions,"
+                f" friction {coulomb:.3g}: a pressure on an area, a weight or an offset is in it"
+            )
+    if "r" in roles.columns:
+        found = lead(roles.columns["r"].x, roles.columns["y"].x)
+        late = found.samples * h * columns.grid
+        yield f"the position follows the reference by {1e3 * late:.3g} ms"
+    if roles.rival_kind is not None:
+        kind, column = roles.rival_kind
+        yield f'else a rig of kind "{kind}", driven by column {column.shown}'
+
+
+def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
+    """Rows, their period, how even it is, and gaps."""
+    steps = np.diff(columns.clock.values) * second
+    uneven = float(np.std(steps[steps < 3.0 * h]) / h)
+    even = "an even clock" if uneven < 1e-3 else f"a clock that jitters by {uneven:.1%}"
+    yield f"{len(columns.clock.values)} rows every {h:.4g} s, {even}"
+    gaps = int(np.sum(steps > 5.0 * h))
+    if gaps:
+        many = f"{gaps} gap" + ("s" if gaps > 1 else "")
+        yield f"{many} in the clock, the longest of {float(np.max(steps)):.3g} s"
+
+
+def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
+    """Axes of the log, and names that several columns have."""
+    if columns.axes:
+        own = roles.columns["y"].axis
+        said = f"this card is of {own}" if own else "this card is of none of them"
+        yield (
+            f"{len(columns.axes)} axes in this log: {', '.join(columns.axes)}; {said}, another is"
+            " had by --axis NAME"
+        )
+    headers = [one.raw.header for one in columns.read if one.raw.header]
+    for name in (name for name, many in Counter(headers).items() if many > 1):
+        places = [str(one.raw.number) for one in columns.read if one.raw.header == name]
+        yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: told by number"
+
+
+def _contradiction(roles: Roles, units: Mapping[str, UnitGuess], ratio: float) -> str:
+    """In words, that clock and velocity do not go together."""
+    slow = f"{ratio:.3g} times too fast" if ratio > 1.0 else f"{1.0 / ratio:.3g} times too slow"
+    return (
+        f"the velocity {roles.columns['v'].shown} is {ratio:.3g} times the derivative of the"
+        f" position by this clock: the clock runs {slow}, or the unit of position"
+        f" ({units['y'].unit}) or velocity ({units['v'].unit}) is another"
+    )
