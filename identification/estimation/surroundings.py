@@ -50,7 +50,7 @@ TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
-WHOLE = "exact: a whole number of times in a turn"
+WHOLE_NUMBER = "exact: a whole number of times in a turn"
 NO_FIRST = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is known
 
 
@@ -151,7 +151,7 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
     }
     for acting in around.cogging:
         known |= {
-            f"{acting.key}.{p.name}": Estimate(acting.values[p.name], p.unit, reason=WHOLE)
+            f"{acting.key}.{p.name}": Estimate(acting.values[p.name], p.unit, reason=WHOLE_NUMBER)
             for p in acting.effect.params
             if p.name not in ("a", "b")
         }

@@ -35,12 +35,14 @@ from identification.thresholds import (
 
 HIGHEST = 100  # order that the windows are made short enough for
 MOST_ORDERS = 8
-PLAIN = 7  # columns beside those of the orders
+PLAIN_COLUMNS = 7  # columns beside those of the orders
 LEAST_TURNS = 0.5  # of motion, in which neighbouring orders differ
-MOST_ROWS = 3000
-FEWEST_ROWS = 60
-OUTLYING = 6.0  # times the median of what is left, beyond which a row is of a start or a stop
-BETWEEN = np.array([-0.5, -0.25, 0.25, 0.5])  # of an order, where no whole number may fit better
+THINNED_TO = 3000
+FEWEST_WINDOWS_OF_A_TURN = 60
+OUTLYING_ROW = 6.0  # times the median of what is left, beyond which a row is of a start or a stop
+BESIDE_ORDER = np.array(
+    [-0.5, -0.25, 0.25, 0.5]
+)  # of an order, where no whole number may fit better
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +70,7 @@ class _Turning:
         """The rows that a model of these orders does not leave far outside."""
         columns = np.column_stack([self.X, *(self.pair(n) for n in chosen)])
         rest = np.abs(self.b - columns @ np.linalg.lstsq(columns, self.b, rcond=1e-10)[0])
-        kept = rest <= OUTLYING * float(np.median(rest))
+        kept = rest <= OUTLYING_ROW * float(np.median(rest))
         counts = self.counts.copy()
         counts[counts] = kept
         return replace(
@@ -96,7 +98,8 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
         return ()
     theta, sd = _with_spread(columns, found)
     sizes = [
-        Size(-float(value), float(s)) for value, s in zip(theta[PLAIN:], sd[PLAIN:], strict=True)
+        Size(-float(value), float(s))
+        for value, s in zip(theta[PLAIN_COLUMNS:], sd[PLAIN_COLUMNS:], strict=True)
     ]
     made = [Order(n, sizes[2 * i], sizes[2 * i + 1]) for i, n in enumerate(chosen)]
     sure = (one for one in made if is_sure(one.size, one.sd))
@@ -114,7 +117,9 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
         _turning(some, held) for some in (logs, [around.of_place.taken_out(log) for log in logs])
     )
     if without is None or left is None:
-        raise NotIdentifiable(f"{logs[0].name}: fewer than {FEWEST_ROWS} windows of sliding")
+        raise NotIdentifiable(
+            f"{logs[0].name}: fewer than {FEWEST_WINDOWS_OF_A_TURN} windows of sliding"
+        )
     each = (np.sqrt(_left(one.X, one.b) / len(one.b)) for one in (without, left))
     first, second = each
     return float(first), float(second)
@@ -148,7 +153,7 @@ def _chosen(found: _Turning) -> tuple[int, ...]:
         after = before - float(explained[best])
         if n in chosen or after > SURROUNDINGS_LEAVE * before:
             break
-        beside = max(_explained(found.pair(n + off), base, left) for off in BETWEEN)
+        beside = max(_explained(found.pair(n + off), base, left) for off in BESIDE_ORDER)
         if before - beside < SURROUNDINGS_LEAVE * after:
             break  # it repeats with something else than the turn
         chosen.append(n)
@@ -199,11 +204,11 @@ def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:
     made = [(one, _windows(one, speed)) for one in moved]
     made = [(one, w) for one, w in made if len(w.start)]
     rows = sum(len(w.start) for _, w in made)
-    if rows < FEWEST_ROWS:
+    if rows < FEWEST_WINDOWS_OF_A_TURN:
         return None
     X, b, block, angles = [], [], [], []
     for i, (one, every) in enumerate(made):
-        w = every.every(max(1, rows // MOST_ROWS))
+        w = every.every(max(1, rows // THINNED_TO))
         y, up = np.asarray(one.log["y"]), one.signals["d"][w.middle] > 0
         rate = w.first @ y
         friction = (1.0 * up, -1.0 * ~up, rate * up, rate * ~up)

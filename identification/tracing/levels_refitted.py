@@ -25,11 +25,11 @@ from identification.thresholds import FOLLOWS_AS_WELL, LEVELS_LEAVE
 from identification.tracing.result import Change
 
 BEGIN = 0.25  # of a test log, on which the levels are fitted
-LONGEST_STEP = 0.2  # of a level, with which a search for the nearest minimum begins
+FIRST_STEP = 0.2  # of a level, with which a search for the nearest minimum begins
 SHIFTS = np.linspace(-0.2, 0.4, 7)  # of a level, from where it begins
-ROUNDS = 80  # of a search
+SEARCH_ROUNDS = 80  # of a search
 LENGTH = {"linear": "m", "rotary": "rad"}
-NOTHING: tuple[tuple[Change, ...], str] = ((), "")
+NO_CHANGE: tuple[tuple[Change, ...], str] = ((), "")
 
 
 def levels_refitted(
@@ -46,11 +46,11 @@ def levels_refitted(
     tests = [one.log for one in seen]
     begins = [log.part(0, round(BEGIN * len(log))) for log in tests]
     if not follows_worse(_rms(plant, tests, drive, BEGIN), usual):
-        return NOTHING
+        return NO_CHANGE
     moved = _fitted(plant, begins, drive)
     was, now = (_rms(_with(plant, x), tests, drive, BEGIN) for x in (np.zeros(2), moved))
     if not explains_the_day(was, now, usual):
-        return NOTHING
+        return NO_CHANGE
     sd = np.abs(_fitted(plant, tests, drive) - moved)  # by what the rest of the logs changes
     unit = units_of(rig.motion, rig.command_unit)["F_cp"]
     levels = zip(("F_cp", "F_cn"), (told.F_cp, told.F_cn), moved, sd, strict=True)
@@ -91,8 +91,13 @@ def _fitted(plant: Plant, logs: Sequence[Log], drive: Drive) -> Array:
         return _rms(_with(plant, x * scale), logs, drive)
 
     start = min(((a, b) for a in SHIFTS for b in SHIFTS), key=lambda x: cost(np.array(x)))
-    simplex = np.array(start) + LONGEST_STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
-    options: Any = {"initial_simplex": simplex, "maxiter": ROUNDS, "xatol": 1e-4, "fatol": 0.0}
+    simplex = np.array(start) + FIRST_STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    options: Any = {
+        "initial_simplex": simplex,
+        "maxiter": SEARCH_ROUNDS,
+        "xatol": 1e-4,
+        "fatol": 0.0,
+    }
     return np.asarray(
         minimize(cost, np.array(start), method="Nelder-Mead", options=options).x * scale
     )

@@ -66,7 +66,7 @@ def test_what_comes_out_of_a_limiter_acts(joint: dict[str, Array], tmp_path: Pat
 def test_switches_supplies_and_predictions_are_no_signals(
     joint: dict[str, Array], tmp_path: Path
 ) -> None:
-    switch = (T > 3.0) * 1.0
+    switch = (T > 3.0).astype(np.float64)
     found = propose(
         tmp_path, " time, pred_angle, active, Vsupply, angle [deg], error, torque [Nm]", T,
         57.3 * joint["pred"], switch, 12.0 - 0.1 * np.abs(joint["F"]), 57.3 * joint["y"],

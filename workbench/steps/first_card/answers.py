@@ -16,7 +16,7 @@ CONFIRMED = "confirmed"
 OTHER_MOTION = {"m": "rad", "mm": "deg", "um": "deg", "rad": "m", "deg": "mm", "turn": "mm",
                 "N": "N m", "kN": "N m", "mN": "mN m", "N m": "N", "mN m": "N"}  # fmt: skip
 OTHER_GAIN = {"mm": "turn", "turn": "mm"}
-GAIN = re.compile(r"[\d.]+ \S+/\S+")
+WRITTEN_GAIN = re.compile(r"[\d.]+ \S+/\S+")
 
 
 class BadAnswer(UserError):
@@ -107,7 +107,7 @@ def _answered(of: Proposal, one: SignalGuess, text: str) -> SignalGuess:
         column = names[before.strip()]
         return replace(given, column=column.key, shown=column.shown, unit=_unit(last),
                        gain=None, bits=None)  # fmt: skip
-    if GAIN.fullmatch(text):
+    if WRITTEN_GAIN.fullmatch(text):
         return replace(given, gain=text)
     if written_unit(text) is None:
         raise BadAnswer(f"{text!r} is neither a column nor a unit{nearest(text, names)}")

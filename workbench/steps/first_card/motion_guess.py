@@ -11,7 +11,7 @@ from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.roles import Roles
 
 WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one
-TURNS = {"rad": 2.0 * np.pi, "deg": 360.0}
+TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
@@ -87,7 +87,7 @@ def unit_by_turn(y: Column) -> tuple[str, str] | None:
     """Unit of an angle and what tells it: its steps are a turn over a power of two, or it leaps
     by a turn; None where neither is so."""
     leap = float(np.max(np.abs(np.diff(y.numbers)), initial=0.0))
-    for unit, turn in TURNS.items():
+    for unit, turn in TURN_IN.items():
         power = np.log2(turn / y.step) if y.step > 0.0 else 0.5
         if abs(power - round(power)) < WHOLE_POWER:
             return unit, f"its steps are a turn over {2 ** round(power)}"

@@ -23,7 +23,7 @@ STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
-ROUNDED, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
@@ -114,8 +114,8 @@ def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
         c = part.values[:MOST_ROWS_LOOKED_AT]
         if len(c) != len(a) or float(np.ptp(c)) > width:
             continue
-        same = np.abs(b - a - c) < ROUNDED * width
-        if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > ROUNDED * width) > SELDOM:
+        same = np.abs(b - a - c) < SAME_SUM * width
+        if np.mean(same) > MOSTLY_ADDED and np.mean(np.abs(c) > SAME_SUM * width) > SELDOM:
             return k
     return None
 

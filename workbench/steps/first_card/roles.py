@@ -42,7 +42,7 @@ from workbench.steps.first_card.weights import (
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
-TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
+COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
@@ -288,7 +288,7 @@ def _signs(best: _Choice) -> dict[str, Sign]:
     out = dict.fromkeys(best.columns, 1.0)
     if way.kind != "electro-pneumatic":
         (name,) = way.columns
-        out[name] = way.law.way if way.law.share > TELLS_SIGN or name == "F" else 1.0
+        out[name] = way.law.way if way.law.share > COMMAND_TELLS_SIGN or name == "F" else 1.0
     if "u" in best.others:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]

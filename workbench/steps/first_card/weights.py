@@ -45,11 +45,14 @@ ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
-NEVER = -9.0
+RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
 AS_FAR = 0.25  # of its range, that a reference of few levels is off the position's at most
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
-ALIKE, MOST_ALIKE = 1.5, 3.5  # for each decade by which a reference is nearer to the position
+A_DECADE_ALIKE, MOST_ALIKE = (
+    1.5,
+    3.5,
+)  # for each decade by which a reference is nearer to the position
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -70,7 +73,7 @@ def said(one: Column, role: str) -> float:
         total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
     if one.flag:
         driven = role == "u" and "command" in head.means
-        total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else NEVER
+        total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else RULED_OUT
     return total
 
 
@@ -201,7 +204,7 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    score = min(-ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
+    score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
