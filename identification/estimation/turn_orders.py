@@ -39,10 +39,8 @@ PLAIN_COLUMNS = 7  # columns beside those of the orders
 LEAST_TURNS = 0.5  # of motion, in which neighbouring orders differ
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
-OUTLYING_ROW = 6.0  # times the median of what is left, beyond which a row is of a start or a stop
-BESIDE_ORDER = np.array(
-    [-0.5, -0.25, 0.25, 0.5]
-)  # of an order, where no whole number may fit better
+OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or a stop
+BESIDE_ORDER = np.array([-0.5, -0.25, 0.25, 0.5])  # where no order may fit better
 
 
 @dataclass(frozen=True, eq=False)

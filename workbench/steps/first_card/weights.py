@@ -52,7 +52,7 @@ OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
     3.5,
-)  # for each decade by which a reference is nearer to the position
+)  # a decade by which a reference is nearer to the position
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
