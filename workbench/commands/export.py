@@ -1,6 +1,7 @@
 """`workbench export`: a design -> code for the machine."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -79,12 +80,15 @@ def command(
     from workbench.documents.design_read import read_design
     from workbench.export.exported import exported
     from workbench.export.targets import writers
+    from workbench.export.validated import validation_line
 
     wide = [target for target in targets if target not in SINGLE]
     if precision == "single" and wide:
         raise click.UsageError(f"--precision single is for {', '.join(SINGLE)}, not {wide[0]}.")
     found = read_design(design_file)
     what = exported(found, controller, compensated=compensator, precision=precision, name=name)
+    checked = validation_line(design_file)
+    what = replace(what, remarks=(checked, *what.remarks)) if checked else what
     now = datetime.now()
     files: dict[str, str | bytes] = {}
     for target in dict.fromkeys(targets):
