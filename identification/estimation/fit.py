@@ -29,6 +29,7 @@ from identification.estimation.late_position import what_acts_beside
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import (
     RecordedLogs,
+    chosen_drive,
     commanded,
     led_by_rig,
     recorded_logs,
@@ -42,6 +43,7 @@ from identification.estimation.structure_fit import (
     searched,
 )
 from identification.estimation.surroundings import surrounding_estimates
+from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
 from identification.log import Log, Rig
@@ -110,10 +112,14 @@ def fit_plant(
             fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
     up = way_of(alone, held=rig.kind == "motor")
     fit = fit if up is None else of_one_way(fit, up, rig)
+    if not (fit.adequate or beside.orders or halt.reached()):
+        resonance = two_masses(alone, rig) if chosen_drive(alone, rig, drive) == "force" else None
+        if resonance is not None:
+            beside, fit = replace(beside, resonance=resonance), of_two_masses(fit, resonance)
     if halt.reached():
         fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
     if beside.none:
-        return fit
+        return replace(fit, surroundings=beside)
     return replace(
         fit, surroundings=beside, effects=beside.effects,
         estimates={**fit.estimates, **surrounding_estimates(beside)},

@@ -16,7 +16,8 @@ from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.structure_fit import plain_structure
 from identification.estimation.surroundings import explains, surroundings
 from identification.log import Log, Rig
-from identification.model.surroundings import NOT_SHOWN, Size, Surroundings
+from identification.model.size import NOT_SHOWN, Size
+from identification.model.surroundings import Surroundings
 from identification.progress import Halt
 from identification.thresholds import FOLLOWED
 

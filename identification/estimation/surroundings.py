@@ -28,11 +28,10 @@ from identification.estimation.regression.weighted_rows import BLOCKS, OVERLAP
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
+from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import (
     NO_SURROUNDINGS,
-    NOT_SHOWN,
     Order,
-    Size,
     Surroundings,
 )
 from identification.thresholds import (

@@ -25,7 +25,8 @@ from identification.estimation.regression.equation_rows import (
 )
 from identification.estimation.regression.weighted_rows import BLOCKS
 from identification.log import Log, Rig
-from identification.model.surroundings import Order, Size, Surroundings
+from identification.model.size import Size
+from identification.model.surroundings import Order, Surroundings
 from identification.signals.weak_form import WeakWindows, sliding_windows
 from identification.thresholds import (
     ORDERS_LEAVE,

@@ -8,17 +8,8 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.effects._library import built_in, numbered
 from identification.log import Log
-
-
-@dataclass(frozen=True)
-class Size:
-    """A size and its standard deviation; both 0 where it does not show."""
-
-    value: float = 0.0
-    sd: float = 0.0
-
-
-NOT_SHOWN = Size()
+from identification.model.resonance import Resonance
+from identification.model.size import NOT_SHOWN, Size
 
 
 @dataclass(frozen=True)
@@ -54,9 +45,9 @@ class Surroundings:
 
     lag [s]: of the motion behind the column of the force; force [N]: that is always there, towards
     +y; sine, cosine [N m]: gravity's of the angle; orders: of a turn, in which cogging repeats,
-    the largest first. gives [N per unit of u]: a motor's, whose force
-    is its command's; None elsewhere. sampled: its column is a current measured at instants, no
-    command that is held until the next.
+    the largest first; resonance: of a second mass, which is not taken out. gives [N per unit of
+    u]: a motor's, whose force is its command's; None elsewhere. sampled: its column is a current
+    measured at instants, no command that is held until the next.
     """
 
     lag: Size = NOT_SHOWN
@@ -66,6 +57,7 @@ class Surroundings:
     orders: tuple[Order, ...] = ()
     gives: float | None = None
     sampled: bool = False
+    resonance: Resonance | None = None
 
     @property
     def none(self) -> bool:

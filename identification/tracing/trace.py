@@ -13,6 +13,7 @@ import numpy as np
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
 from identification.estimation.late_position import what_acts_beside
+from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
     ACTUATOR,
     MECHANICAL,
@@ -20,6 +21,7 @@ from identification.estimation.regression.equation_rows import (
     motion_log,
 )
 from identification.estimation.structure_fit import FittedStructure
+from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
@@ -94,7 +96,15 @@ def trace(
         return orders_alone(refused, beside, *recorded_as, rig, rng)
     if still:
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
-    return told if beside.none else with_surroundings(told, beside, *recorded_as, rig)
+    if not beside.none:
+        told = with_surroundings(told, beside, *recorded_as, rig)
+    elastic = told.verdict == "unknown" and not told.effects and not halt.reached()
+    if not elastic or chosen_drive(train, rig, None) != "force":
+        return told
+    resonance = two_masses(train, rig)
+    if resonance is None:
+        return told
+    return replace(told, surroundings=replace(beside, resonance=resonance))
 
 
 def _traced(

@@ -57,6 +57,7 @@ from identification.estimation.surroundings import (
     stands_out,
 )
 from identification.estimation.turn_orders import are_most, is_sure
+from identification.estimation.two_masses import are_two
 from identification.estimation.walking_residual import walk_size
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
@@ -853,6 +854,10 @@ def test_follows_as_well() -> None:
 def test_levels_leave() -> None:
     assert explains_the_day(2.0, 0.9, 1.0) and not explains_the_day(2.0, 1.1, 1.0)
     assert not explains_the_day(4.0, 1.6, 1.0)
+
+
+def test_two_masses_leave() -> None:
+    assert are_two(2.0, 0.5) and not are_two(2.0, 0.7)
 
 
 def test_every_threshold_has_a_test() -> None:

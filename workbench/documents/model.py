@@ -174,6 +174,7 @@ class ModelFile:
     controller: PresentFile | None = None
     identifiability: tuple[Told, ...] = ()
     lag: Estimate | None = None
+    resonance: Mapping[str, Estimate] | None = None
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -202,7 +203,8 @@ class Model(ModelFile):
     posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
     the logs lie from the model, each alone; bad_samples: what was set aside of them; controller:
     the one that the machine has now; identifiability: what the logs could tell before a fit, empty
-    where not asked; lag: of the motion behind the force's column [s], None where none shows.
+    where not asked; lag: of the motion behind the force's column [s], None where none shows;
+    resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`).
     library: where the effects' equations are. read: what to say of its file, a
     line for each value in another unit than ours.
     """

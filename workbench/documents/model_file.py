@@ -31,6 +31,8 @@ def model_document(model: Model) -> dict[str, Any]:
         for key, found in model.effects.items()
     }
     document["lag"] = None if model.lag is None else as_number(model.lag)
+    if model.resonance is not None:
+        document["resonance"] = {name: as_number(one) for name, one in model.resonance.items()}
     if model.controller is not None:
         document["controller"] = plain(model.controller)
     return {"schema": document.pop("schema"), **document}

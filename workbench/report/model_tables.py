@@ -30,6 +30,13 @@ MEANING = {
     "k2": "actuator back-effect of velocity",
     "k_a": "motor constant",
 }
+RESONANCE = {
+    "frequency": "resonance of two masses with a spring between",
+    "anti_resonance": "below it, where the measured mass stands still",
+    "damping": "of the resonance",
+    "m_1": "the mass that is measured",
+    "m_2": "the mass behind the spring",
+}
 ROTARY_MEANING = {
     **MEANING,
     "m": "moment of inertia",
@@ -56,6 +63,9 @@ def parameter_rows(model: Model) -> list[Row]:
         rows.append(
             ("lag", *estimate_cells(model.lag), "of the position behind the force of its row")
         )
+    for name, one in (model.resonance or {}).items():
+        rows.append((name.replace("_", "-") if "resonance" in name else name,
+                     *estimate_cells(one), RESONANCE[name]))  # fmt: skip
     return rows
 
 
@@ -176,7 +186,7 @@ def fit_lines(model: Model) -> list[str]:
     ]
     if model.imposed:
         lines.append("the equation of motion was fitted, not a free run")
-    if model.fit.force_relative is not None:
+    if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
     runs = runs_to_add(model)

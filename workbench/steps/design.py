@@ -27,7 +27,7 @@ from workbench.documents.design import (
     margin_values,
 )
 from workbench.documents.drive import ForceLoop
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.versions import versions
 from workbench.steps.identify import check_period
@@ -41,6 +41,7 @@ LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take 
 SLOWED = 4  # times that a controller is made slower for the sake of its reference
 ENOUGH = 0.95  # of the w_n that would just do
 SLOWEST_CUT = 0.3  # of its w_n that is left at once, at least
+WELL_BELOW = 4.0  # times its poles' frequency, at least, that a resonance lies above them
 OVERSHOOT = 0.05  # of a step, in the linear loop
 NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
 
@@ -322,4 +323,21 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
         out.append(f"compensator: assumed, not identified: {', '.join(model.assumed)}")
     if not model.fit.adequate:
         out.append("the model leaves more than noise; check the loop on the machine with care")
+    if model.resonance is not None:
+        out += _below_resonance(used(model.resonance["frequency"]), found, chosen)
     return out
+
+
+def _below_resonance(resonance: float, found: Design, chosen: Recommendation) -> Iterator[str]:
+    """How far below a resonance [Hz] the recommended loop stays: it is designed on one body, which
+    two masses are only far below it."""
+    taken = found.controllers.get("rst" if chosen.controller == "none" else chosen.controller)
+    if taken is None:
+        return
+    poles = taken.dominant[0] / (2.0 * np.pi)
+    said = (
+        f"the loop's poles lie at {poles:.3g} Hz, {resonance / poles:.2g} times below the resonance"
+        f" of two masses at {resonance:.3g} Hz"
+    )
+    near = resonance < WELL_BELOW * poles
+    yield f"{said}: too near, it may swing; design it slower (--poles W_N,ZETA)" if near else said

@@ -20,6 +20,7 @@ from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
+from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, Estimate, KarnoppFit
 from identification.model.inverse_model import ForceError, Smoothing, force_error
@@ -110,6 +111,7 @@ def identify(
         correlation=_correlation(fit),
         effects=surrounding_effects(fit.surroundings, rig),
         lag=lag_estimate(fit.surroundings),
+        resonance=resonance_of(fit.surroundings, rig),
     )
     known = with_own_logs(model_in_force(model, ""), logs, alone)
     return replace(model, own_logs=known.own_logs), fit
@@ -127,6 +129,11 @@ def surrounding_effects(around: Surroundings, rig: Rig) -> Mapping[str, Mapping[
         )
         for one in around.effects
     }
+
+
+def resonance_of(around: Surroundings, rig: Rig) -> Mapping[str, Estimate] | None:
+    """The resonance of a second mass, None where none shows."""
+    return None if around.resonance is None else resonance_estimates(around.resonance, rig)
 
 
 def _summary(fit: KarnoppFit, errors: ForceError | None, closed: Sequence[str]) -> FitSummary:

@@ -14,7 +14,8 @@ from identification.log import Log
 from identification.model.estimates import Drive
 from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.plant import Motor
-from identification.model.surroundings import Size, Surroundings
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start

@@ -5,7 +5,9 @@ import math
 from identification.estimation.estimates import NORMAL_95
 from identification.log import Rig
 from identification.model.plant import units_of
-from identification.model.surroundings import Size, Surroundings
+from identification.model.resonance import Resonance
+from identification.model.size import Size
+from identification.model.surroundings import Surroundings
 from workbench.cards.readable import number
 
 MS = 1e3
@@ -35,7 +37,19 @@ def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
             f" {number(MS * abs(lag.value))} ms"
             f" ({_interval(Size(MS * abs(lag.value), MS * lag.sd))}): taken into account"
         )
+    if around.resonance is not None:
+        lines.append(_resonance(around.resonance, units_of(rig.motion)["m"]))
     return tuple(lines)
+
+
+def _resonance(found: Resonance, unit: str) -> str:
+    hertz, behind = (number(one.value, 4) for one in (found.frequency, found.anti_resonance))
+    return (
+        f"two masses: a resonance at {hertz} Hz, damping {number(found.damping.value, 2)}, behind"
+        f" an anti-resonance at {behind} Hz; {number(found.m_1.value)} {unit}"
+        f" ({_interval(found.m_1)}) are measured and {number(found.m_2.value)}"
+        f" ({_interval(found.m_2)}) hang on a spring; m is both together"
+    )
 
 
 def _interval(of: Size) -> str:

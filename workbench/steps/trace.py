@@ -25,7 +25,7 @@ from workbench.documents.plausible import model_remarks
 from workbench.documents.versions import versions
 from workbench.logs.fetch import card_path
 from workbench.logs.sources import Source, Sources
-from workbench.steps.identify import arx_plant, speed_of, surrounding_effects
+from workbench.steps.identify import arx_plant, resonance_of, speed_of, surrounding_effects
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines
 
@@ -159,6 +159,7 @@ def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
             **{e.effect.key: effect_estimates(e, rig) for e in found.effects},
         },
         lag=lag_estimate(found.surroundings),
+        resonance=resonance_of(found.surroundings, rig),
         library=library,
     )
 
@@ -253,6 +254,7 @@ def _surroundings(traced: Traced) -> dict[str, Any]:
         "gravity": _numbers(gravity) if gravity and shown else None,
         "constant_force": as_number(force["F_0"]) if force and shown else None,
         "lag": None if model.lag is None else as_number(model.lag),
+        "resonance": None if model.resonance is None else _numbers(model.resonance),
     }
 
 

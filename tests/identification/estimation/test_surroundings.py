@@ -9,7 +9,8 @@ from identification.estimation.surroundings import lag_estimate, surroundings
 from identification.log import Log, Rig
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
-from identification.model.surroundings import NO_SURROUNDINGS, Size, Surroundings
+from identification.model.size import Size
+from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.simulation.free_run import free_run
 from tests.identification.motor_logs import K_A, NINE, made
 from tests.identification.plants import made_log, table

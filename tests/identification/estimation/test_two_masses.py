@@ -1,0 +1,53 @@
+"""Two masses and a spring, told from the motion of the first; one body is never taken for two."""
+
+import numpy as np
+import pytest
+
+from identification.estimation.two_masses import two_masses
+from identification.log import Log, Rig
+
+H, SUB = 1e-3, 4
+SECONDS = 10.0
+RIG = Rig("force", motion="rotary")
+
+
+def log_of(m_1: float, m_2: float, k: float, *, damping: float, seed: int) -> Log:
+    """A motor with Coulomb friction that turns a load through a spring (k = 0: alone)."""
+    rng, n = np.random.default_rng(seed), round(SECONDS / H)
+    t = H * np.arange(n)
+    steps = np.repeat(rng.uniform(-1.0, 1.0, n // 20), 20)
+    force = 0.25 * np.sin(2.0 * np.pi * 0.7 * t) + 0.2 * np.sin(2.0 * np.pi * 3.1 * t) + 0.1 * steps
+    y = np.zeros(n)
+    p, v, q, w = 0.0, 0.0, 0.0, 0.0
+    dt = H / SUB
+    for i in range(n):
+        y[i] = p
+        for _ in range(SUB):
+            spring = k * (p - q) + damping * (v - w)
+            free = v + dt * (force[i] - spring) / m_1
+            stop = dt * 0.05 / m_1
+            v = np.sign(free) * max(abs(free) - stop, 0.0)
+            w += dt * spring / m_2
+            p, q = p + dt * v, q + dt * w
+    shown = np.asarray(y + 1e-5 * rng.standard_normal(n), dtype=np.float64)
+    return Log("two", {"t": np.asarray(t, dtype=np.float64), "y": shown, "F": force})
+
+
+@pytest.mark.parametrize(("m_1", "m_2", "hertz"), [(1e-3, 3e-3, 25.0), (2e-3, 1e-3, 40.0)])
+def test_resonance_and_both_masses_are_found(m_1: float, m_2: float, hertz: float) -> None:
+    k = (2.0 * np.pi * hertz) ** 2 * m_1 * m_2 / (m_1 + m_2)
+    found = two_masses([log_of(m_1, m_2, k, damping=1e-3, seed=1)], RIG)
+    assert found is not None
+    assert found.frequency.value == pytest.approx(hertz, rel=0.02)
+    assert found.m_1.value == pytest.approx(m_1, rel=0.05)
+    assert found.m_2.value == pytest.approx(m_2, rel=0.05)
+    assert found.F_cp.value == pytest.approx(0.05, rel=0.1)
+
+
+def test_one_body_is_not_two() -> None:
+    assert two_masses([log_of(2e-3, 1e-3, 0.0, damping=0.0, seed=2)], RIG) is None
+
+
+def test_a_short_log_tells_nothing() -> None:
+    log = log_of(1e-3, 3e-3, 18.5, damping=1e-3, seed=3)
+    assert two_masses([log.part(0, 2000)], RIG) is None
