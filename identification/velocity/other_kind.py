@@ -49,7 +49,7 @@ def _errors(record: Record, x: Array) -> list[Array]:
         for a in run.starts(AHEAD):
             v = (run.y[a + reach] - run.y[a - reach]) / (2 * reach * run.h)
             rows.append(run.y[a : a + size] - _slides(late[a : a + size], run.h, v, x[:6]))
-        out.append(np.array(rows))
+        out.append(np.array(rows).reshape(len(rows), size))  # of a short run none
     return out
 
 

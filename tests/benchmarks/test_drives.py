@@ -133,7 +133,7 @@ def test_a_clock_that_jitters_reads_another_instant() -> None:
     assert 0.0 < np.std(off[np.abs(motion[1]) > 0.05]) < 3.0 * 0.02 / 500 * np.max(motion[1])
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_every_effect_has_a_size_and_shows_in_the_log() -> None:
     for family in FAMILIES:
         one = bare(family, 500)

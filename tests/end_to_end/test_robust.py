@@ -64,7 +64,7 @@ def test_a_machines_drift_so_far_widens_the_draws(
     assert found["drift"] == {"F_cp": pytest.approx(0.0953, rel=1e-2)}
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_what_no_loop_keeps_ends_with_the_run_to_make(
     here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -10,7 +10,7 @@ import pytest
 from benchmarks.scenario import SPRING, Told, days, picture, story
 from workbench.registry.store import Registry
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.method
 
 LOGGED = (0, 1, 2, 4, 6, 7, 8, 10, 12, 14, 16, 18, 20, 22)  # one a week, and both unreadable ones
 DAYS = [day for day in days() if day.number in LOGGED]
@@ -28,7 +28,6 @@ def told(home: Path) -> list[Told]:
     return story(home, 5, LOGGED)
 
 
-@pytest.mark.slow
 def test_every_log_has_one_verdict(told: list[Told]) -> None:
     assert [one.day for one in told] == DAYS
     verdicts = {one.day.number: one.outcome.verdict for one in told}

@@ -146,7 +146,7 @@ def test_a_number_of_forces_has_no_place_in_its_card(
     assert "knows no force; leave 'area_p_m2' out" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_the_kind_that_a_log_looks_like(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     run(folder, "identify", "a.csv", "--card", "motor.toml", "--out", "x")
     assert 'the log looks like kind = "velocity"' in "".join(capsys.readouterr()).replace("\n", " ")

@@ -124,7 +124,7 @@ def test_units() -> None:
     assert units("linear", "mA")["d_p"] == "mA"
 
 
-@pytest.mark.slow
+@pytest.mark.method
 @pytest.mark.parametrize("how", [{}, {"step": 1e-3, "noise": 0.0}])
 def test_intervals_hold(how: Mapping[str, Any]) -> None:
     """Over 30 seeds that served no choice, 90 % of the intervals hold, of each number 80 %."""

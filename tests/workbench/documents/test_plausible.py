@@ -115,7 +115,7 @@ def test_a_stored_log_and_a_design_that_are_off() -> None:
     assert all(line not in design(model).remarks for line in (period, travel))
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_identify_trace_and_design_say_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -143,7 +143,7 @@ def test_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     shown_well(found, " recommended, position loop every")
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_robust_design(bench: Bench, model: Any, tmp_path: Path) -> None:
     arguments = ("design", bench.path("model/model.json"), "--robust", "--draws", "20")
     folder = bench.ran("robust", *arguments, "--poles", "15,1", "--seed", "4")
@@ -170,7 +170,7 @@ def test_validate(bench: Bench, model: Any, tmp_path: Path) -> None:
     assert not strict.passed
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_experiment(bench: Bench, model: Any, tmp_path: Path) -> None:
     design = bench.path("design/design.json")
     arguments = (bench.path("model/model.json"), "--design", design, "--time", "6")

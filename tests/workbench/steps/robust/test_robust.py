@@ -76,7 +76,7 @@ def test_what_it_promises_holds_on_machines_that_it_has_not_seen() -> None:
         assert share == pytest.approx(promised, abs=PATIENCE), name
 
 
-@pytest.mark.slow
+@pytest.mark.method
 def test_machines_further_off_than_the_model_says_break_the_promise() -> None:
     """The judge above can fail: three times the spread is not what was promised."""
     one = robust_design(uncertain(), replace(WANTED, limits=Limits(force=1.0)), POLES)
