@@ -116,9 +116,9 @@ def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
         assert found.assumed is not None
         assert found.reason is not None
         assert "negative direction" in found.reason or "does not tell" in found.reason
-    both = fit.estimates["F_cp"]  # as one with a constant force, if there is any
-    assert both.value is None and "any constant force" in str(both.reason)
-    assert both.assumed == pytest.approx(table(2).F_cp, rel=0.02)
+    together = fit.estimates["F_cp"]  # as one with a constant force, if there is any
+    assert together.value is None and "any constant force" in str(together.reason)
+    assert together.assumed == pytest.approx(table(2).F_cp, rel=0.02)
 
 
 @pytest.mark.slow
