@@ -8,9 +8,11 @@ status 1 where a mutant passes.
 """
 
 import importlib
+import os
 import pkgutil
-import subprocess
 import sys
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
 from types import ModuleType
 
 import pytest
@@ -22,39 +24,33 @@ FILE = "tests/identification/test_thresholds.py"
 FACTORS = (0.5, 2.0)
 
 
-class Mutation:
-    """Sets a constant in every module that names it, before the tests are collected."""
-
-    def __init__(self, name: str, factor: float) -> None:
-        self.name, self.factor = name, factor
-
-    def pytest_sessionstart(self) -> None:
-        """Loads the whole package, so that no module comes by the constant afterwards."""
-        modules: list[ModuleType] = [thresholds]
-        for found in pkgutil.walk_packages(identification.__path__, "identification."):
-            modules.append(importlib.import_module(found.name))
-        value = getattr(thresholds, self.name)
-        for module in modules:
-            if self.name in vars(module):
-                setattr(module, self.name, type(value)(self.factor * value))
+def every_module() -> list[ModuleType]:
+    """The whole package, so that no module comes by a constant afterwards."""
+    found = pkgutil.walk_packages(identification.__path__, "identification.")
+    return [thresholds, *(importlib.import_module(one.name) for one in found)]
 
 
-def passes(name: str, factor: float) -> bool:
+def passes(name: str, factor: float, modules: list[ModuleType]) -> bool:
     """Whether the constant's test passes with so many times its value, in a process of its own."""
-    given = [sys.executable, __file__, name, str(factor)]
-    return subprocess.run(given, check=False, capture_output=True).returncode == 0
+    child = os.fork()
+    if child:
+        return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
+    value = getattr(thresholds, name)
+    for module in modules:
+        if name in vars(module):
+            setattr(module, name, type(value)(factor * value))
+    asked = ["-q", "-x", "-p", "no:cacheprovider", f"{FILE}::test_{name.lower()}"]
+    with Path(os.devnull).open("w") as nowhere, redirect_stdout(nowhere), redirect_stderr(nowhere):
+        status = int(pytest.main(asked))
+    os._exit(status)
 
 
 def main() -> None:
-    if len(sys.argv) == 3:
-        name, factor = sys.argv[1], float(sys.argv[2])
-        asked = ["-q", "-x", "-p", "no:cacheprovider", f"{FILE}::test_{name.lower()}"]
-        sys.exit(pytest.main(asked, plugins=[Mutation(name, factor)]))
-    names = [name for name in vars(thresholds) if name.isupper()]
+    names, modules = [name for name in vars(thresholds) if name.isupper()], every_module()
     missed = 0
     for name in names:
-        caught = [not passes(name, factor) for factor in FACTORS]
-        sound = passes(name, 1.0) and all(caught)
+        caught = [not passes(name, factor, modules) for factor in FACTORS]
+        sound = passes(name, 1.0, modules) and all(caught)
         missed += not sound
         print(f"{name:20s} {'caught' if sound else f'MISSED {caught}'}", flush=True)
     print(f"{len(names) - missed} of {len(names)} noticed both ways")

@@ -5,7 +5,7 @@ whether a parameter can be told is asked of the same thresholds, with the events
 motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.errors import BadLog
+from identification.errors import BadLog, UserError
+from identification.estimation.late_position import what_acts_beside
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
@@ -192,6 +193,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         else RunsTell(reason=found.refused)
     )
     remarks = list(found.remarks)
+    late = _late_command(runs, found.rig) if runs and not found.refused and seen.motion else None
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
     return Examined(
@@ -200,7 +202,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         clock=found.clock,
         sensors=tuple(_sensor(name, x) for name, x in found.raw.signals.items() if name != "t"),
         bad=found.bad,
-        delays=_delays(log, seen.motion) if log is not None and seen.motion else (),
+        delays=_delays(log, seen.motion, late) if log is not None and seen.motion else (),
         ways=seen.ways,
         told=seen.told,
         add=tuple(dict.fromkeys(one.add for one in seen.told if one.add)),
@@ -250,8 +252,22 @@ def _sensor(name: str, x: Array) -> SensorState:
                        resolution(good))  # fmt: skip
 
 
-def _delays(log: Log, motion: Motion) -> tuple[Delay, ...]:
-    """How late the command acts, and how far the position is behind its reference."""
+def _late_command(runs: Sequence[Log], rig: Rig) -> float | None:
+    """By how much a motor's command acts late [s], as `identify` will find it; None where that
+    does not show."""
+    if rig.kind != "motor" or not rig.force_per_command:
+        return None
+    try:
+        return max(what_acts_beside(runs, rig).lag.value, 0.0) or None
+    except UserError:
+        return None
+
+
+def _delays(log: Log, motion: Motion, late_command: float | None) -> tuple[Delay, ...]:
+    """How late the command acts, and how far the position is behind its reference.
+
+    late_command [s]: of a motor, where the equation of motion or its run shows it.
+    """
     out = []
     longest = max(2, round(LONGEST_LAG / log.h))
     if "u" in log and "F" in log and np.ptp(log["u"]) > 0.0:
@@ -265,7 +281,8 @@ def _delays(log: Log, motion: Motion) -> tuple[Delay, ...]:
             others = np.column_stack([motion.v, one])
         late, gain = command_lag(target, others, smooth["u"], longest)
         late -= HALF_A_HOLD  # what is held over a period acts half of it later on the average
-        out.append(Delay("u", on, late * log.h if gain > SURE_LAG and late > LEAST_LAG else None))
+        shown = late * log.h if gain > SURE_LAG and late > LEAST_LAG else None
+        out.append(Delay("u", on, late_command if on == "motion" and late_command else shown))
     if "r" in log and np.ptp(log["r"]) > 0.0:
         found = lead(log["r"], log["y"])
         out.append(Delay("r", "y", found.samples * log.h if found.likeness > 0.5 else None))

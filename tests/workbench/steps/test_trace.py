@@ -55,7 +55,7 @@ CONTRACT = {
 }  # fmt: skip
 BESIDE = {
     "bad_samples", "complete", "curves", "left", "not_tried", "remarks", "parameters", "card",
-    "log", "test_log", "versions", "gravity", "constant_force", "lag",
+    "log", "test_log", "versions", "gravity", "constant_force", "lag", "resonance",
 }  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
