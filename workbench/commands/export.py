@@ -87,7 +87,7 @@ def command(
         raise click.UsageError(f"--precision single is for {', '.join(SINGLE)}, not {wide[0]}.")
     found = read_design(design_file)
     what = exported(found, controller, compensated=compensator, precision=precision, name=name)
-    checked = validation_line(design_file)
+    checked = validation_line(found, design_file)
     what = replace(what, remarks=(checked, *what.remarks)) if checked else what
     now = datetime.now()
     files: dict[str, str | bytes] = {}

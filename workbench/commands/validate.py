@@ -73,7 +73,6 @@ def command(
     from workbench.documents.design_read import read_design
     from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
-    from workbench.export.validated import of_design
     from workbench.report.next_steps import after_validate
     from workbench.report.reports import validation_report
     from workbench.report.validation_tables import validation_view
@@ -93,7 +92,7 @@ def command(
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             result, traces = validate(model, found, rng, plant=plant, limits=limits)
-        document = validation_document(result) | {"design": of_design(design_file)}
+        document = validation_document(result)
         folder.write_json("validation.json", document)
         folder.write_text("report.html", validation_report(result, traces, model.rotary))
     emit(
@@ -113,7 +112,6 @@ def _velocity(
     import numpy as np
 
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
-    from workbench.export.validated import of_design
     from workbench.report.velocity import (
         after_velocity_validation,
         velocity_validation_report,
@@ -127,7 +125,7 @@ def _velocity(
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
-        document = velocity_validation_document(found) | {"design": of_design(files[1])}
+        document = velocity_validation_document(found)
         folder.write_json("validation.json", document)
         folder.write_text("report.html", velocity_validation_report(found))
     emit(

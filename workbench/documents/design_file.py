@@ -1,5 +1,7 @@
 """design.json: a design as it is written, every parameter with its unit."""
 
+import hashlib
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -132,6 +134,12 @@ def design_document(found: Design) -> dict[str, Any]:
     """The design as design.json writes it, the schema first, every parameter with its unit."""
     document: dict[str, Any] = plain(as_file(found, units_of(found)))
     return {"schema": document.pop("schema"), **document}
+
+
+def design_digest(found: Design) -> str:
+    """By what a validation names the design that it is of: the SHA-256 of its content."""
+    text = json.dumps(design_document(found), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def units_of(found: "Design | DesignFile") -> FileUnits:

@@ -10,6 +10,7 @@ from identification.errors import BadModel
 from identification.remarks import Aside
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design
+from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.versions import versions
 from workbench.steps.closed_loop import driven_loop, effects_left_out
@@ -35,7 +36,8 @@ class Validation:
     """Every controller on every plant (by names like "rst", then "model", "plant").
 
     The loop that decides is without the compensator; "rst + compensator" is the same with it,
-    "present" the controller that the machine has now. why: what speaks for the judged one.
+    "present" the controller that the machine has now. why: what speaks for the judged one. design:
+    digest of the design.
     """
 
     card: str
@@ -46,6 +48,7 @@ class Validation:
     remarks: tuple[str, ...]
     versions: Mapping[str, str]
     why: str = ""
+    design: str = ""
     schema: Literal["validation/1"] = "validation/1"
 
 
@@ -102,6 +105,7 @@ def validate(
         ),
         versions=versions(),
         why=reasons(judged, with_it, first, shown(model.rotary)),
+        design=design_digest(found),
     ), traces
 
 

@@ -1,6 +1,6 @@
 """Workers killed at random points: nothing half done, nothing lost, nothing twice.
 
-18 of them, or as many as the variable KILLS says.
+30 of them, or as many as the variable KILLS says.
 
 Among the logs are some that come late and some that are to be judged again: none of them puts an
 older model in force.
@@ -29,8 +29,8 @@ from workbench.registry.store import Registry
 pytestmark = pytest.mark.slow
 
 MACHINES = ("a", "b", "c")
-KILLS = int(os.environ.get("KILLS", "18"))
-IN_HAND = KILLS // 6  # kills, at least, that hit a worker with a log in hand
+KILLS = int(os.environ.get("KILLS", "30"))
+IN_HAND = KILLS // 10  # kills, at least, that hit a worker with a log in hand
 MOST = 4 * KILLS  # where starting takes long, few do: kills go on for so long
 LONGEST = 0.16  # s that a worker lives at most
 SEED = 20260301
