@@ -85,7 +85,10 @@ SURROUNDINGS_LEAVE = 0.8  # of the equation's square, left at most by a lag, or 
 SURE_OF_SURROUNDINGS = 4.0  # deviations from 0, of either
 ORDERS_LEAVE = 0.5  # of the same, left at most by all orders of a turn that repeat with it
 SURE_OF_ORDER = 5.0  # deviations from 0, of each: a hundred are tried
+ORDERS_FROM = 0.5  # turns of motion, in which neighbouring orders differ
 TWO_MASSES_LEAVE = 0.3  # of the square that one body leaves, left at most by two
+RESONANCE_APART = 1.02  # times the anti-resonance, from which a resonance shows a load
+OTHER_WAY = 0.02  # of the windows of sliding, up to which those of a direction are noise
 BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).

@@ -106,7 +106,10 @@ def fit_plant(
     try:
         fit = _fit(alone, rng, rig, drive, None, on_progress, halt)
     except NotIdentifiable as refused:
-        fit = _one_way(alone, rng, rig, refused)
+        try:
+            fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
+        except UserError:
+            raise refused from None
     if beside.orders and not fit.adequate:  # what a run one way leaves open, it bends
         with suppress(NotIdentifiable):
             fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
@@ -124,16 +127,6 @@ def fit_plant(
         fit, surroundings=beside, effects=beside.effects,
         estimates={**fit.estimates, **surrounding_estimates(beside)},
     )  # fmt: skip
-
-
-def _one_way(
-    logs: Sequence[Log], rng: np.random.Generator, rig: Rig, refused: NotIdentifiable
-) -> KarnoppFit:
-    """The fit of logs that move one way alone; raises `refused` where they do not."""
-    try:
-        return fit_one_way(recorded_logs(logs, rig, None), rng, ONE_WAY_WHY)
-    except UserError:
-        raise refused from None
 
 
 def _fit(

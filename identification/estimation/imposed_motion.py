@@ -30,11 +30,10 @@ from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
-from identification.thresholds import SPEEDS_APART
+from identification.thresholds import OTHER_WAY, SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
-OTHER_WAY = 0.02  # of the windows of sliding; fewer of a direction are noise
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
@@ -157,7 +156,7 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
     Raises NotIdentifiable where they go both ways, or hardly slide.
     """
     moved = _moved(recorded.plain, recorded.held)
-    way = way_of(recorded.plain, held=recorded.held)
+    way = _way(moved)
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
     theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
@@ -167,10 +166,18 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    up = np.concatenate([one.up for one in _moved(logs, held)])
-    if len(up) < FEWEST_JUDGED or OTHER_WAY < np.mean(up) < 1.0 - OTHER_WAY:
-        return None
-    return bool(np.mean(up) > 0.5)
+    return _way(_moved(logs, held))
+
+
+def _way(moved: Sequence[MotionLog]) -> bool | None:
+    up = np.concatenate([one.up for one in moved])
+    share = float(np.mean(up)) if len(up) else 0.5
+    return share > 0.5 if len(up) >= FEWEST_JUDGED and is_one_way(share) else None
+
+
+def is_one_way(share_up: float) -> bool:
+    """Whether motion of which so much goes up goes one way alone, up or down."""
+    return not OTHER_WAY < share_up < 1.0 - OTHER_WAY
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:

@@ -24,7 +24,11 @@ from identification.estimation.regression.equation_rows import (
     mechanical,
     motion_log,
 )
-from identification.estimation.regression.weighted_rows import BLOCKS, OVERLAP
+from identification.estimation.regression.weighted_rows import (
+    BLOCKS,
+    OVERLAP,
+    spread_of_left_out,
+)
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
@@ -227,7 +231,7 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     i = int(np.clip(best, 1, len(left) - 2))
     bend = max(float(left[i - 1] - 2.0 * left[i] + left[i + 1]) / LAG_STEP**2, 1e-300)
     by_likelihood = float(np.sqrt(2.0 * left[best] / (bend * found.rows / OVERLAP)))
-    sd = max(float(_spread(np.array(each))), by_likelihood)
+    sd = max(float(spread_of_left_out(np.array(each))), by_likelihood)
     return Size(lag, sd) if stands_out(lag, sd) else NOT_SHOWN
 
 
@@ -247,18 +251,12 @@ def _with_spread(found: _Squares, used: Sequence[int], lag: float) -> tuple[Arra
         theta = found.left(kept, used)[1]
         return np.array([np.interp(lag, found.lags, one) for one in theta])
 
-    return of(every), _spread(np.array([of(_but(every, k)) for k in range(len(every))]))
+    return of(every), spread_of_left_out(np.array([of(_but(every, k)) for k in range(len(every))]))
 
 
 def _but(every: BoolArray, k: int) -> BoolArray:
     """All blocks but one."""
     return np.asarray(every & (np.arange(len(every)) != k))
-
-
-def _spread(each: Array) -> Array:
-    """Standard deviations of estimates (k, ...), each made without one of k blocks."""
-    n, off = len(each), each - np.mean(each, axis=0)
-    return np.asarray(np.sqrt((n - 1) / n * np.sum(off**2, axis=0)))
 
 
 def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | None:

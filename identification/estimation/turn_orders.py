@@ -23,12 +23,13 @@ from identification.estimation.regression.equation_rows import (
     MotionLog,
     motion_log,
 )
-from identification.estimation.regression.weighted_rows import BLOCKS
+from identification.estimation.regression.weighted_rows import BLOCKS, spread_of_left_out
 from identification.log import Log, Rig
 from identification.model.size import Size
 from identification.model.surroundings import Order, Surroundings
 from identification.signals.weak_form import WeakWindows, sliding_windows
 from identification.thresholds import (
+    ORDERS_FROM,
     ORDERS_LEAVE,
     SURE_OF_ORDER,
     SURROUNDINGS_LEAVE,
@@ -37,7 +38,6 @@ from identification.thresholds import (
 HIGHEST = 100  # order that the windows are made short enough for
 MOST_ORDERS = 8
 PLAIN_COLUMNS = 7  # columns beside those of the orders
-LEAST_TURNS = 0.5  # of motion, in which neighbouring orders differ
 THINNED_TO = 3000
 FEWEST_WINDOWS_OF_A_TURN = 60
 OUTLYING_ROW = 6.0  # times the median left, beyond which a row is of a start or a stop
@@ -83,7 +83,7 @@ def turn_orders(logs: Sequence[Log], rig: Rig) -> tuple[Order, ...]:
     None where a machine does not turn, too little of its motion slides, or the whole of what is
     left is not mostly theirs: a small one is an effect as any other, for a trace to find.
     """
-    if rig.motion != "rotary" or max(float(np.ptp(log["y"])) for log in logs) < _turns():
+    if rig.motion != "rotary" or not turns(max(float(np.ptp(log["y"])) for log in logs)):
         return ()
     found = _turning(logs, held=rig.kind == "motor")
     if found is None:
@@ -119,9 +119,8 @@ def orders_explain(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple
         raise NotIdentifiable(
             f"{logs[0].name}: fewer than {FEWEST_WINDOWS_OF_A_TURN} windows of sliding"
         )
-    each = (np.sqrt(_left(one.X, one.b) / len(one.b)) for one in (without, left))
-    first, second = each
-    return float(first), float(second)
+    before, after = (float(np.sqrt(_left(one.X, one.b) / len(one.b))) for one in (without, left))
+    return before, after
 
 
 def are_most(without: float, left: float) -> bool:
@@ -134,8 +133,9 @@ def is_sure(size: float, sd: float) -> bool:
     return size > SURE_OF_ORDER * sd
 
 
-def _turns() -> float:
-    return LEAST_TURNS * 2.0 * np.pi
+def turns(angle: float) -> bool:
+    """Whether motion over an angle [rad] tells neighbouring orders apart."""
+    return angle >= ORDERS_FROM * 2.0 * np.pi
 
 
 def _chosen(found: _Turning) -> tuple[int, ...]:
@@ -184,8 +184,7 @@ def _with_spread(X: Array, found: _Turning) -> tuple[Array, Array]:
     for k in np.unique(found.block):
         kept: BoolArray = np.asarray(found.block != k)
         each.append(np.linalg.lstsq(X[kept], found.b[kept], rcond=1e-10)[0])
-    n, off = len(each), np.array(each) - np.mean(each, axis=0)
-    return np.asarray(theta), np.asarray(np.sqrt((n - 1) / n * np.sum(off**2, axis=0)))
+    return np.asarray(theta), spread_of_left_out(np.array(each))
 
 
 def _turning(logs: Sequence[Log], held: bool) -> _Turning | None:

@@ -24,12 +24,13 @@ from identification.arrays import Array
 from identification.errors import UserError
 from identification.estimation.estimates import told_estimate
 from identification.estimation.regression.equation_rows import motion_log
+from identification.estimation.regression.weighted_rows import spread_of_left_out
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size
-from identification.thresholds import SURE_OF_SURROUNDINGS, TWO_MASSES_LEAVE
+from identification.thresholds import RESONANCE_APART, SURE_OF_SURROUNDINGS, TWO_MASSES_LEAVE
 
 RUN_SECONDS = 0.5  # s
 LEAST_CYCLES = 2.0  # of the resonance in a window
@@ -40,7 +41,6 @@ APART_TRIED = (1.1, 1.5, 2.2)  # of resonance to anti-resonance
 BEGUN = 0.03  # damping with which the search begins
 SEARCHES_RUN, EACH_SEARCH = 3, 25  # of the search
 FEWEST_RUNS = 8
-LEAST_APART = 1.02  # resonance over anti-resonance, below which no load shows
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,24 +68,29 @@ def two_masses(logs: Sequence[Log], rig: Rig) -> Resonance | None:
         return None
     one_body = _left(cut, (np.ones(1), np.array([1.0, 0.0, 0.0])), h, _drift)[0]
 
-    def rest(p: Array) -> Array:
-        return _two_bodies(p, cut, h)[0]
-
     tried = [
         np.log([2.0 * np.pi * f / ratio, 2.0 * np.pi * f, BEGUN])
         for f in np.geomspace(lowest, highest, HERTZ_TRIED)
         for ratio in APART_TRIED
     ]
-    starts = sorted(tried, key=lambda p: float(np.sum(rest(p) ** 2)))[:SEARCHES_RUN]
+    starts = sorted(tried, key=lambda p: float(np.sum(_left_of(p, cut, h) ** 2)))[:SEARCHES_RUN]
     found = min(
-        (least_squares(rest, p, method="lm", max_nfev=EACH_SEARCH * 4) for p in starts),
+        (
+            least_squares(_left_of, p, method="lm", max_nfev=EACH_SEARCH * 4, args=(cut, h))
+            for p in starts
+        ),
         key=lambda one: float(one.cost),
     )
     w_a, w_r, damping = (float(x) for x in np.exp(found.x))
-    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and w_r > LEAST_APART * w_a
+    inside = 2.0 * np.pi * lowest < w_r < 2.0 * np.pi * highest and shows_a_load(w_r, w_a)
     if not inside or not are_two(float(one_body @ one_body), float(found.fun @ found.fun)):
         return None
     return _told(found.x, cut, h, damping)
+
+
+def shows_a_load(resonance: float, anti_resonance: float) -> bool:
+    """Whether a resonance lies so far above its anti-resonance that a second mass shows."""
+    return resonance > RESONANCE_APART * anti_resonance
 
 
 def are_two(one_body: float, left: float) -> bool:
@@ -127,8 +132,7 @@ def _told(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonan
         kept = [one for one, group in zip(cut, groups, strict=True) if group != k]
         again = least_squares(_left_of, p, method="lm", max_nfev=EACH_SEARCH, args=(kept, h))
         each.append(_numbers(again.x, kept, h))
-    n, off = len(each), np.array(each) - np.mean(each, axis=0)
-    sd = np.sqrt((n - 1) / n * np.sum(off**2, axis=0))
+    sd = spread_of_left_out(np.array(each))
     sizes = [Size(float(value), float(s)) for value, s in zip(whole, sd, strict=True)]
     made = Resonance(*sizes)
     sure = all(

@@ -1,7 +1,12 @@
 """A resonance of two masses with a spring between them."""
 
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+from scipy.signal import bilinear, lfilter
+
+from identification.arrays import Array
 from identification.model.size import Size
 
 
@@ -25,3 +30,17 @@ class Resonance:
     def mass(self) -> Size:
         """Both masses together [kg]."""
         return Size(self.m_1.value + self.m_2.value, (self.m_1.sd**2 + self.m_2.sd**2) ** 0.5)
+
+
+def load_acceleration(
+    a: Array, h: float, frequency: float, anti_resonance: float, damping: float
+) -> Array:
+    """Acceleration of the second mass where the first has a (n,), every h [s].
+
+    (2 z_a w_a s + w_a^2)/(s^2 + 2 z_a w_a s + w_a^2), as the spring and its damping take it along;
+    frequencies [Hz] and damping as of a `Resonance`.
+    """
+    w_a = 2.0 * np.pi * anti_resonance
+    drag = 2.0 * damping * anti_resonance / frequency * w_a
+    sampled: Any = bilinear([drag, w_a**2], [1.0, drag, w_a**2], fs=1.0 / h)
+    return np.asarray(lfilter(sampled[0], sampled[1], a))

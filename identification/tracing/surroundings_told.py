@@ -1,6 +1,6 @@
 """A trace of logs whose surroundings were taken out, told of the logs as they were recorded."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,14 +8,23 @@ import numpy as np
 from identification.effects._base import Acting
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
+from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.surroundings import explains as explains_much
 from identification.estimation.surroundings import lag_explains, surrounding_estimates
 from identification.estimation.turn_orders import orders_explain
 from identification.log import Log, Rig
+from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
 from identification.model.surroundings import Surroundings
 from identification.thresholds import CHANCE_LEVEL
-from identification.tracing.result import Dependence, Errors, FoundEffect, Left, Trace
+from identification.tracing.result import (
+    Dependence,
+    Errors,
+    FoundEffect,
+    Left,
+    Residual,
+    Trace,
+)
 
 DELAY = "input_delay"
 
@@ -31,9 +40,32 @@ def with_surroundings(
     """
     plant = replace(of.plant, effects=(*of.plant.effects, *around.effects))
     of = replace(of, plant=plant, surroundings=around)
-    for named in _named(around):
-        of = _with_named(of, named, around, (train, test or train), rig)
+    delay = tuple(one for one in around.effects if one.key == DELAY)
+    for named, explain in ((delay, lag_explains), (around.cogging, orders_explain)):
+        if not named:
+            continue
+        try:
+            left = {
+                name: explain(logs, rig, around)
+                for name, logs in (("train", train), ("test", test or train))
+            }
+        except NotIdentifiable:  # the test logs do not slide enough to tell what they explain
+            continue
+        without, with_them = left["test"]
+        if named is delay or explains_much(without**2, with_them**2):
+            of = _with_named(of, named, around, left)
+            of = of if named is delay else replace(of, residuals=_with_orders(of, around))
     return of
+
+
+def _with_orders(of: Trace, around: Surroundings) -> tuple[Residual, ...]:
+    """The residuals, before with the orders' force that was taken out of the logs."""
+    return tuple(
+        replace(one, before=one.before - sum(o.force(one.signals["y"]) for o in around.orders))
+        if one.equation == MECHANICAL and "y" in one.signals
+        else one
+        for one in of.residuals
+    )
 
 
 def orders_alone(
@@ -44,6 +76,7 @@ def orders_alone(
     one way, for a plain model to be traced; refused: why. Raises it where the orders explain
     nothing of the test logs either."""
     fit = fit_plant(train, rng, rig=rig)
+    own = {name: one for name, one in fit.estimates.items() if name in (*NAMES, "k1", "k2")}
     left = {
         name: Errors(orders_explain(logs or train, rig, around)[1], None, None, None)
         for name, logs in (("train", train), ("test", test))
@@ -52,8 +85,8 @@ def orders_alone(
         verdict="none", before=left, after=left,
         noise_y=fit.noise_y, noise_F=fit.noise_F, noise_force=fit.noise_F, noise_actuator=None,
         effects=(), rivals=(), unknown=Dependence((), 0.0), drift=(),
-        next_experiment="motion both ways, at several speeds", parameters_before=fit.estimates,
-        parameters_after=fit.estimates,
+        next_experiment="motion both ways, at several speeds",
+        parameters_before=own, parameters_after=own,
         plant=Plant(fit.friction, fit.actuator), residuals=(), complete=False,
         left=Left(1.0, ()), remarks=(*fit.remarks, str(refused)),
     )  # fmt: skip
@@ -63,48 +96,36 @@ def orders_alone(
     return replace(told, verdict="effect", complete=False)
 
 
-def _named(around: Surroundings) -> list[tuple[Acting, ...]]:
-    """What is told as effects that were missing: orders of a turn, and a command that acts late."""
-    delay = tuple(one for one in around.effects if one.key == DELAY)
-    return [one for one in (delay, around.cogging) if one]
-
-
 def _with_named(
     of: Trace, named: tuple[Acting, ...], around: Surroundings,
-    logs: tuple[Sequence[Log], Sequence[Log]], rig: Rig,
+    left: Mapping[str, tuple[float, float]],
 ) -> Trace:  # fmt: skip
-    """The trace with these effects first among its own; as it is where the test logs do not
-    slide enough to tell what they explain."""
-    orders = named[0].key != DELAY
-    explains = orders_explain if orders else lag_explains
-    try:
-        errors = {
-            name: explains(own, rig, around)
-            for name, own in zip(("train", "test"), logs, strict=True)
-        }
-    except NotIdentifiable:
-        return of
-    without, left = errors["test"]
-    if orders and not explains_much(without**2, left**2):
-        return of
-    before = {name: _with_left(of.before[name], *errors[name]) for name in errors}
+    """The trace with these effects first among its own; left: of "train" and "test", what the
+    equation leaves without them and with them.
+
+    `explained` is of all of them together. Each stood out of 0 by so many deviations that luck
+    would not, so its chance is at most the level asked for.
+    """
+    without, with_them = left["test"]
     known = surrounding_estimates(around)
     found = tuple(
         FoundEffect(
             one.effect,
             {p.name: known[f"{one.key}.{p.name}"] for p in one.effect.params},
-            1.0 - (left / without) ** 2,
+            1.0 - (with_them / without) ** 2,
             CHANCE_LEVEL,
         )
         for one in named
     )
     nothing_else = of.verdict in ("none", "drift")
     return replace(
-        of, before=before, effects=(*found, *of.effects),
+        of,
+        before={name: _with_left(of.before[name], *own) for name, own in left.items()},
+        effects=(*found, *of.effects),
         verdict="effect" if nothing_else else of.verdict,
         complete=of.complete or of.verdict == "none",
-        left=replace(of.left, share=of.left.share * (left / without) ** 2),
-    )  # fmt: skip
+        left=replace(of.left, share=of.left.share * (with_them / without) ** 2),
+    )
 
 
 def _with_left(errors: Errors, without: float, left: float) -> Errors:

@@ -1,6 +1,7 @@
 """`workbench init`: a log -> a first card for it."""
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,30 +96,33 @@ def _asked(of: "Proposal") -> "Proposal":
 
 def _asked_signal(of: "Proposal", name: str) -> "Proposal":
     """The proposal after a question on one of its signals, asked until the answer can be one."""
-    from workbench.steps.first_card.answers import BadAnswer, with_signal
+    from workbench.steps.first_card.answers import with_signal
 
     one = of.signal(name)
     assert one is not None
     gain = "" if one.gain is None else f", gain {one.gain}"
     said = f"{name}: column {one.shown} in {one.unit}{gain} ({one.why}{_other(one.rival)})"
-    while True:
-        try:
-            return with_signal(of, name, click.prompt(said, default="", show_default=False))
-        except BadAnswer as error:
-            click.echo(f"  {error}", err=True)
+    return _answered(said, lambda answer: with_signal(of, name, answer))
 
 
 def _asked_rig(of: "Proposal", key: str) -> "Proposal":
     """The proposal after a question on a value of its rig, asked until the answer can be one."""
-    from workbench.steps.first_card.answers import BadAnswer, with_rig
+    from workbench.steps.first_card.answers import with_rig
 
     guess = next(one for one in of.rig if one.key == key)
     value = "nothing" if guess.value is None else guess.value
     unit = f" {guess.unit}" if guess.value is not None and guess.unit else ""
     said = f"{key}: {value}{unit} ({guess.why}{_other(guess.rival)})"
+    return _answered(said, lambda answer: with_rig(of, key, answer))
+
+
+def _answered(said: str, changed: "Callable[[str], Proposal]") -> "Proposal":
+    """The proposal changed by the first answer that can be one."""
+    from workbench.steps.first_card.answers import BadAnswer
+
     while True:
         try:
-            return with_rig(of, key, click.prompt(said, default="", show_default=False))
+            return changed(click.prompt(said, default="", show_default=False))
         except BadAnswer as error:
             click.echo(f"  {error}", err=True)
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from identification.errors import BadLog
 from identification.log import Log, Rig
@@ -114,3 +115,20 @@ def _told_apart(source: Source, path: Path) -> Source:
     """The run named with its folder, as another file has the same name."""
     name = source.log.name.replace(path.name, f"{path.parent.name}/{path.name}", 1)
     return replace(source, log=replace(source.log, name=name))
+
+
+def refuse_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
+    """Raises BadLog where a test file has the bytes of a training file."""
+    names = {source.sha256: source.file for source in train}
+    for source in test:
+        if source.sha256 in names:
+            raise BadLog(
+                f"--test {source.file}: the same bytes as the training log"
+                f" {names[source.sha256]}; test on a log that the fit has not seen"
+            )
+
+
+def fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
+    """Name, digest and rows of each file, as a result names the logs that it is of."""
+    found = {s.sha256: {"file": s.file, "sha256": s.sha256, "rows": s.rows} for s in sources}
+    return list(found.values())

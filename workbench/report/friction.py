@@ -10,9 +10,11 @@ from identification.log import Log
 from identification.model.estimates import KarnoppFit
 from identification.model.inverse_model import held_force
 from identification.model.karnopp import NAMES, Karnopp
+from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import differentiate, low_pass
+from identification.simulation.effect_along_motion import contribution
 from workbench.cards.readable import Units, units_of
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
 from workbench.report.figures import evenly_spread
@@ -24,11 +26,16 @@ FRICTION_DOTS = 3000  # of a panel
 SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
 SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
 LOW_IN_BANDS, LOW_SHARE = 4.0, 0.25  # low speeds: in widths of the band, and of all speeds
+NARROW = 1e-4  # of all speeds, up to which a band is not seen
 
 
 @dataclass(frozen=True)
 class FrictionData:
-    """Velocity [m/s], acceleration [m/s^2] and friction force F_e - m a [N] of a log, (n,)."""
+    """Velocity [m/s], acceleration [m/s^2] and friction force F_e - m a [N] of a log, (n,).
+
+    Without the model's forces of place (gravity, cogging, a spring), and of two masses with the
+    second's own acceleration, so that what is left is friction alone.
+    """
 
     v: Array
     a: Array
@@ -39,9 +46,36 @@ def friction_data(model: Model, log: Log) -> FrictionData:
     """What the log says of friction, force and motion smoothed alike."""
     motion = differentiate(log["y"], log.h)
     F = held_force(log["F"]) if model.rig.kind == "motor" else log["F"]
-    F = low_pass(F, log.h, motion.cutoff)
+    F = low_pass(F + _of_place(model, log), log.h, motion.cutoff)
     inner = slice(motion.edge, len(F) - motion.edge)
-    return FrictionData(motion.v[inner], motion.a[inner], (F - model.karnopp.m * motion.a)[inner])
+    left = F - _inertia(model, motion.a, log.h)
+    return FrictionData(motion.v[inner], motion.a[inner], left[inner])
+
+
+def _of_place(model: Model, log: Log) -> Array:
+    """Force [N] of the effects that depend on the place alone, (n,)."""
+    force, blank = np.zeros(len(log)), np.zeros(len(log))
+    signals = {
+        "t": blank,
+        "y": np.asarray(log["y"]),
+        "v": blank,
+        "F": blank,
+        "u": blank,
+        "d": blank,
+    }
+    for one in model.acting:
+        if one.effect.acts == "force" and set(one.effect.depends_on) <= {"y"}:
+            force = force + contribution(one.effect, one.values, signals, log.h, model.karnopp)
+    return force
+
+
+def _inertia(model: Model, a: Array, h: float) -> Array:
+    """Force [N] that accelerates the body, or both masses behind each other, (n,)."""
+    if model.resonance is None:
+        return model.karnopp.m * a
+    found = {name: used(one) for name, one in model.resonance.items()}
+    behind = load_acceleration(a, h, found["frequency"], found["anti_resonance"], found["damping"])
+    return found["m_1"] * a + found["m_2"] * behind
 
 
 def friction_curve(model: Model, fit: KarnoppFit, sources: Sequence[Source]) -> Section:
@@ -77,8 +111,11 @@ def friction_chart(model: Model, fit: KarnoppFit, data: Sequence[FrictionData]) 
 
 
 def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
-    """The speeds [m/s] around the stick band, where friction bends."""
-    low = min(LOW_IN_BANDS * max(p.dv_p, -p.dv_n), LOW_SHARE * max(reach[1], -reach[0]))
+    """The speeds [m/s] around the stick band, where friction bends; the slow ones where the band is
+    too narrow to be seen."""
+    band, most = max(p.dv_p, -p.dv_n), max(reach[1], -reach[0])
+    low = LOW_SHARE * most
+    low = min(LOW_IN_BANDS * band, low) if band > NARROW * most else low
     low = max(low, 1.5 * p.dv_p, -1.5 * p.dv_n)
     return -low, low
 

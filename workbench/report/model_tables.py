@@ -155,6 +155,9 @@ def summary(model: Model) -> str:
         text += f" Not told: {', '.join(model.assumed)}."
     if model.fit.adequate:
         return f"{text} The model leaves nothing but sensor noise."
+    if model.resonance is not None:
+        hertz = number(used(model.resonance["frequency"]), 4)
+        return f"{text} Two masses with a spring between them swing at {hertz} Hz."
     return f"{text} The model leaves more than noise, {left_of(model)}: an effect is missing."
 
 
@@ -169,7 +172,7 @@ def left_of(model: Model) -> str:
 
 def next_of_model(model: Model) -> str:
     """What to do with a model, and the command that does it."""
-    if not model.fit.adequate:
+    if not model.fit.adequate and model.resonance is None:
         logs = " ".join(dict.fromkeys(e.file for e in model.log))
         return f"`workbench trace {logs} --card CARD` finds the effect that the model lacks"
     return "`workbench design model.json` makes a controller for this machine"

@@ -30,6 +30,7 @@ from workbench.report.trace_tables import (
 from workbench.report.trace_words import then_of, trace_sentence, words
 from workbench.steps.trace import Traced
 
+EVERY_EQUATION = ("mechanical", "actuator")
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
     " transducer shows: the free run tells it, no residual of an equation does."
@@ -86,7 +87,7 @@ def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:
     lines = [
         HIDDEN.format(words(e.effect.key))
         for e in traced.trace.effects
-        if in_equation(e.effect) not in seen
+        if in_equation(e.effect) not in (seen if traced.trace.residuals else EVERY_EQUATION)
     ]
     return [Section("Where it shows", render("lines", lines=lines))] if lines else []
 

@@ -19,6 +19,7 @@ from workbench.report.trace_words import words
 
 Equation = Literal["mechanical", "actuator"]
 LEVELS = 30  # of a signal, over which the running median is taken
+A_PERIOD = 12  # levels at least, of an effect that repeats
 FINE = 90  # of a signal, for the curve of what the effect takes away, which has no noise
 DOTS = 3000
 # Name of a signal, and the quantity whose unit it has.
@@ -52,7 +53,8 @@ class Picture:
     """A residual, the signal against which it is drawn, and the effect that it is to show.
 
     without: the residual of the model without this effect, (r,), and `how` it is called; curve:
-    what the effect takes away, (r,), where it depends on this signal only.
+    what the effect takes away, (r,), where it depends on this signal only; period: over which the
+    effect repeats, in the signal's unit, None where it does not.
     """
 
     residual: Residual
@@ -61,6 +63,15 @@ class Picture:
     without: Array
     how: str
     curve: Array | None
+    period: float | None = None
+
+    @property
+    def levels(self) -> int:
+        """Of the signal, over which running medians are taken: enough for what repeats."""
+        if self.period is None:
+            return LEVELS
+        travel = float(np.ptp(self.residual.signals[self.signal]))
+        return max(LEVELS, min(round(A_PERIOD * travel / self.period), len(self.residual.t) // 8))
 
 
 def in_equation(effect: Effect) -> Equation | None:
@@ -104,7 +115,10 @@ def _of_effect(acting: Acting, residual: Residual, p: Karnopp, alone: bool) -> P
         if own is not None:
             taken, how = own, f"without {words(effect.key)}"
     single = len(effect.depends_on) == 1 and (alone or how != "before")
-    return Picture(residual, signal, effect, residual.after + taken, how, taken if single else None)
+    repeats = effect.named("period") if signal == "y" else None
+    period = None if repeats is None else acting.values[repeats]
+    curve = taken if single else None
+    return Picture(residual, signal, effect, residual.after + taken, how, curve, period)
 
 
 def along_rows(acting: Acting, residual: Residual, p: Karnopp) -> Array | None:
@@ -248,7 +262,7 @@ def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
     panels: list[Panel] = []
     for values, colour, name in both:
         title = name if len(both) > 1 else ""
-        lines = _cloud(residual, x, factor * values, colour)
+        lines = _cloud(residual, x, factor * values, colour, picture.levels)
         if picture.curve is not None and picture.effect and not panels:
             lines += _fitted(picture, x, factor)
         panels.append(Panel(label, f"residual [{unit}]", lines, title, y_range=limits, height=260))
@@ -256,12 +270,12 @@ def signal_chart(picture: Picture, rotary: bool, command: str = "V") -> Chart:
     return Chart(f"trace-{residual.equation}-{picture.signal}", what, panels, columns=2)
 
 
-def _cloud(residual: Residual, x: Array, values: Array, colour: Colour) -> list[Line]:
+def _cloud(residual: Residual, x: Array, values: Array, colour: Colour, levels: int) -> list[Line]:
     """Points against a signal, and their running median in each direction of motion."""
     keep = evenly_spread(len(x), DOTS)
     out = [Line("rows", x[keep], values[keep], colour, "dots")]
     for name, (at, way) in by_direction(residual).items():
-        out.append(Line(name, *running_median(x[at], values[at], LEVELS), way, "bold"))
+        out.append(Line(name, *running_median(x[at], values[at], levels), way, "bold"))
     return out
 
 
@@ -271,7 +285,7 @@ def _fitted(picture: Picture, x: Array, factor: float) -> list[Line]:
     name = f"fitted: {words(picture.effect.key)}"
     out: list[Line] = []
     for at, _ in by_direction(picture.residual).values():
-        curve = running_median(x[at], factor * picture.curve[at], FINE)
+        curve = running_median(x[at], factor * picture.curve[at], max(FINE, picture.levels))
         out.append(Line("" if out else name, *curve, "measured", "dashed"))
     return out
 

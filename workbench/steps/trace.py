@@ -24,7 +24,7 @@ from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
 from workbench.documents.versions import versions
 from workbench.logs.fetch import card_path
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
 from workbench.steps.identify import arx_plant, resonance_of, speed_of, surrounding_effects
 from workbench.steps.present import present_of_card
 from workbench.steps.surrounding_lines import surrounding_lines
@@ -78,7 +78,7 @@ def trace_sources(
             f"{train.runs[0].file}: a motor needs its force_per_command; set it under [rig] of the"
             " card (1 where it is not known: a force is then in units of the command)"
         )
-    _no_twins(train.runs, seen)
+    refuse_twins(train.runs, seen)
     if test and test.rig != train.rig:
         raise BadLog(
             f"{test.runs[0].file}: the card gives it another rig than {train.runs[0].file}; trace"
@@ -109,17 +109,6 @@ def _held_out(train: Sources) -> list[str]:
     kept = train.card.split.get("test", ())
     names = dict.fromkeys(source.file for source in train.runs if source.file in kept)
     return [f"{name}: trained on, though the card's [split] keeps it for tests" for name in names]
-
-
-def _no_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
-    """Refuses a test file with the bytes of a training file."""
-    names = {source.sha256: source.file for source in train}
-    for source in test:
-        if source.sha256 in names:
-            raise BadLog(
-                f"--test {source.file}: the same bytes as the training log"
-                f" {names[source.sha256]}; test on a log that the fit has not seen"
-            )
 
 
 def traced_model(found: Trace, sources: Sources, library: Library) -> Model:
@@ -208,8 +197,8 @@ def trace_document(traced: Traced) -> dict[str, Any]:
     return {
         "schema": TRACE_SCHEMA,
         "card": traced.model.card,
-        "log": _fingerprints(traced.train),
-        "test_log": _fingerprints(traced.test),
+        "log": fingerprints(traced.train),
+        "test_log": fingerprints(traced.test),
         "verdict": found.verdict,
         "before": {name: asdict(errors) for name, errors in found.before.items()},
         "after": {name: asdict(errors) for name, errors in found.after.items()},
@@ -262,11 +251,6 @@ def _curve(one: FreeCurve) -> dict[str, Any]:
     """A free curve and its law, an array each as a list."""
     lists = {name: getattr(one, name).tolist() for name in ("at", "free", "sd", "law")}
     return {"key": one.effect, "equation": one.equation, "signal": one.signal, **lists}
-
-
-def _fingerprints(sources: Sequence[Source]) -> list[dict[str, Any]]:
-    found = {s.sha256: {"file": s.file, "sha256": s.sha256, "rows": s.rows} for s in sources}
-    return list(found.values())
 
 
 def _numbers(estimates: Mapping[str, Estimate]) -> dict[str, Any]:

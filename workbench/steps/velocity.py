@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.errors import BadLog, BadModel
+from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Estimate
 from identification.progress import KeepGoing, without_end
@@ -24,7 +24,7 @@ from identification.velocity.told import told, told_beside, units
 from workbench.documents.plain import as_number
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
 from workbench.documents.versions import versions
-from workbench.logs.sources import Source, Sources
+from workbench.logs.sources import Source, Sources, fingerprints, refuse_twins
 from workbench.steps.other_kind import looks_like_friction
 
 
@@ -61,13 +61,7 @@ def trace_velocity(
 
     Raises BadLog where a test log is a training log, NotIdentifiable as `identify_velocity`.
     """
-    seen = {source.sha256: source.file for source in train.runs}
-    for source in test.runs if test else ():
-        if source.sha256 in seen:
-            raise BadLog(
-                f"--test {source.file}: the same bytes as the training log {seen[source.sha256]};"
-                " test on a log that the fit has not seen"
-            )
+    refuse_twins(train.runs, test.runs if test else ())
     record = recorded(logs_of_runs(train))
     unseen = recorded(logs_of_runs(test)) if test else None
     if unseen is not None:
@@ -124,8 +118,8 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
         "schema": "velocity-trace/1",
         "kind": "velocity",
         "card": found.model.card,
-        "log": [_fingerprint(one) for one in found.train],
-        "test_log": [_fingerprint(one) for one in found.test],
+        "log": fingerprints(found.train),
+        "test_log": fingerprints(found.test),
         "verdict": left.verdict,
         "complete": left.complete,
         "before": _errors(left.held),
@@ -150,10 +144,6 @@ def velocity_trace_document(found: VelocityTraced) -> dict[str, Any]:
 def _errors(held: HeldOut) -> dict[str, float]:
     long, short = held.rms
     return {"position_rms_2s": long, "position_rms_02s": short}
-
-
-def _fingerprint(source: Source) -> dict[str, Any]:
-    return {"file": source.file, "sha256": source.sha256, "rows": source.rows}
 
 
 @dataclass(frozen=True)

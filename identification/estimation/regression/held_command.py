@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog
-from identification.estimation.regression.weighted_rows import Rows
+from identification.estimation.regression.weighted_rows import Rows, spread_of_left_out
 from identification.log import Log
 from identification.thresholds import SHARE_BEYOND, SHARE_GAINS, SURE_OF_SHARE
 
@@ -50,9 +50,7 @@ def share_between(logs: Sequence[MotionLog], rows: Rows, slowest: float = 0.0) -
 
     each = np.unique(blocks)
     apart = np.array([share_of(_least_squares(X[blocks != k], b[blocks != k])[0]) for k in each])
-    n = len(each)
-    sd = float(np.sqrt((n - 1) / n * np.sum((apart - np.mean(apart)) ** 2)))
-    return told_share(share_of(theta), sd, 1.0 - left / without)
+    return told_share(share_of(theta), float(spread_of_left_out(apart)), 1.0 - left / without)
 
 
 def _rate_column(one: MotionLog) -> Array:

@@ -69,6 +69,15 @@ def solve_rows(
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
 
 
+def spread_of_left_out(each: Array) -> Array:
+    """Standard deviations of estimates (k, ...), each made without one of k blocks of the rows.
+
+    Source: the jackknife, Tukey, Annals of Mathematical Statistics 29 (1958) 614.
+    """
+    n, off = len(each), each - np.mean(each, axis=0)
+    return np.asarray(np.sqrt((n - 1) / n * np.sum(off**2, axis=0)))
+
+
 def of_column(A: Array) -> Array:
     """Root mean square of each column (k,); 1 of nothing, whose parameter then comes out 0."""
     size = np.sqrt(np.mean(A**2, axis=0))

@@ -1,0 +1,43 @@
+"""Orders of a turn in a trace: named first, proved on logs that no fit has seen, drawn before."""
+
+import numpy as np
+import pytest
+
+from identification.arrays import Array
+from identification.effects._library import built_in
+from identification.errors import NotIdentifiable
+from identification.tracing.result import Trace
+from identification.tracing.trace import trace
+from tests.identification.estimation.test_turn_orders import BOTH_WAYS, ONE_WAY, RIG, log_of
+
+COGGING = {7: 0.8, 28: 0.4}
+
+
+def traced(y: Array, test: dict[float, float] = COGGING) -> Trace:
+    """The trace of a log with cogging, and of a held-out one with that of `test`."""
+    rng = np.random.default_rng(0)
+    return trace([log_of(y, COGGING)], [log_of(y, test, seed=1)], RIG, built_in(), rng)
+
+
+def test_each_order_is_an_effect_and_the_residual_before_shows_it() -> None:
+    found = traced(BOTH_WAYS)
+    assert found.verdict == "effect"
+    assert [one.effect.key for one in found.effects][:2] == ["cogging", "cogging_2"]
+    assert "7 times in a turn" in found.effects[0].effect.meaning
+    before, after = (found_errors["test"].force_rms for found_errors in (found.before, found.after))
+    assert before is not None and after is not None and after < 0.1 * before
+    (rows,) = (one for one in found.residuals if one.equation == "mechanical")
+    assert np.std(rows.before) > 0.5 > 10.0 * np.std(rows.after)
+
+
+def test_a_log_of_one_way_has_its_orders_and_no_level_of_friction() -> None:
+    found = traced(ONE_WAY)
+    assert (found.verdict, found.complete) == ("effect", False)
+    assert [one.effect.key for one in found.effects] == ["cogging", "cogging_2"]
+    assert found.parameters_after["F_cp"].value is None
+    assert not [name for name in found.parameters_after if "cogging" in name]
+
+
+def test_what_is_not_in_the_held_out_log_is_not_named() -> None:
+    with pytest.raises(NotIdentifiable):  # one way alone, and its orders are not there
+        traced(ONE_WAY, {})
