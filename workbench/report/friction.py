@@ -26,7 +26,7 @@ FRICTION_DOTS = 3000  # of a panel
 SLIDING_PARAMETERS = ("F_cp", "F_cn", "F_vp", "F_vn")
 SHOWN_RANGE = 1.6  # of the curve's range shown; the force of a fast start lies far outside
 LOW_IN_BANDS, LOW_SHARE = 4.0, 0.25  # low speeds: in widths of the band, and of all speeds
-NARROW = 1e-4  # of all speeds, up to which a band is not seen
+UNSEEN_BAND = 1e-4  # of all speeds, up to which a band is not seen
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def low_speeds(p: Karnopp, reach: tuple[float, float]) -> tuple[float, float]:
     too narrow to be seen."""
     band, most = max(p.dv_p, -p.dv_n), max(reach[1], -reach[0])
     low = LOW_SHARE * most
-    low = min(LOW_IN_BANDS * band, low) if band > NARROW * most else low
+    low = min(LOW_IN_BANDS * band, low) if band > UNSEEN_BAND * most else low
     low = max(low, 1.5 * p.dv_p, -1.5 * p.dv_n)
     return -low, low
 

@@ -10,7 +10,7 @@ from identification.tracing.result import Trace
 from identification.tracing.trace import trace
 from tests.identification.estimation.test_turn_orders import BOTH_WAYS, ONE_WAY, RIG, log_of
 
-COGGING = {7: 0.8, 28: 0.4}
+COGGING: dict[float, float] = {7: 0.8, 28: 0.4}
 
 
 def traced(y: Array, test: dict[float, float] = COGGING) -> Trace:
