@@ -22,8 +22,10 @@ from benchmarks.real_shares import model_run, model_share, window_of
 from benchmarks.yardstick import Fit, Record, fitted, own_share, record, run_errors
 from identification.effects._library import built_in
 from identification.errors import UserError
+from identification.log import Log
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.tracing.result import Trace
 from workbench.cards.card import Card
 from workbench.documents.model import Model
 from workbench.logs.runs import read_signals, with_force
@@ -65,8 +67,9 @@ def by_yardstick(
 
 
 def judged_model(
-    case: Case, model: Model, test: Sequence[Record], fit: Fit | None
-) -> dict[str, Any]:
+    case: Case, model: Model, test: Sequence[Record], fit: Fit | None,
+    read: Sequence[Sequence[Log]],
+) -> dict[str, Any]:  # fmt: skip
     """Parameters of a model, what it leaves on the held-out records, and its free runs."""
     numbers: dict[str, Estimate] = {name: model.friction[name] for name in NAMES}
     for key, params in model.effects.items():
@@ -79,12 +82,20 @@ def judged_model(
         "remarks": list(model.fit.remarks),
     }
     try:
-        out["share"] = model_share(model, test, fit) if fit else None
+        out["share"] = model_share(model, test, fit, read) if fit else None
         if not case.imposed:
             out |= {f"run_{s:g}": model_run(model, test, s) for s in (SHORT, LONG)}
     except UserError as error:
         out["not_judged"] = str(error)
     return out
+
+
+def named_in(found: Trace) -> list[str]:
+    """The effects of a trace, with what acts beside the force and a second mass."""
+    beside = found.surroundings
+    keys = [one.effect.key for one in found.effects] + [one.key for one in beside.effects]
+    keys += ["two_masses"] if beside.resonance is not None else []
+    return list(dict.fromkeys(keys))
 
 
 def doctor_answer(found: Examined) -> dict[str, Any]:
@@ -150,11 +161,16 @@ def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
     fit: Fit | None = least.get("fit")
     sources: Sources | None = None
 
+    def read_apart() -> list[list[Log]]:
+        """The runs of each test file, as the workbench reads it."""
+        every = [sources_of([str(path)], card).runs for path in ready.test]
+        return [[one.log for one in runs] for runs in every]
+
     def identified() -> dict[str, Any]:
         nonlocal sources
         sources = sources_of([str(path) for path in ready.train], card)
         model = identify_sources(sources, seed=SEED).model
-        return judged_model(case, model, test, fit)
+        return judged_model(case, model, test, fit, read_apart())
 
     def traced() -> dict[str, Any]:
         read = sources or sources_of([str(path) for path in ready.train], card)
@@ -165,12 +181,12 @@ def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
         )  # fmt: skip
         return {
             "verdict": found.trace.verdict,
-            "effects": [one.effect.key for one in found.trace.effects],
+            "effects": named_in(found.trace),
             "rivals": [one.key for one in found.trace.rivals],
             "depends_on": list(found.trace.unknown.depends_on),
             "drift": [one.name for one in found.trace.drift],
             "not_tried": list(found.trace.not_tried),
-            **judged_model(case, found.model, test, fit),
+            **judged_model(case, found.model, test, fit, read_apart()),
         }
 
     if part in ("identify", "both"):

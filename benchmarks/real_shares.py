@@ -20,7 +20,7 @@ from identification.model.inverse_model import Smoothing
 from identification.signals.differentiate import differentiate
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.steps.predict import predict
 from workbench.steps.predicted_force import force_needed, of_body, refuse_missing
 
@@ -40,14 +40,23 @@ def log_of(record: Record, rig: Rig, name: str) -> Log:
     return Log(name, signals)
 
 
-def model_share(model: Model, records: Sequence[Record], fit: Fit) -> float | None:
-    """Share of the signal that the model leaves on the records, at the rows of the yardstick."""
+def model_share(
+    model: Model, records: Sequence[Record], fit: Fit, read: Sequence[Sequence[Log]] = ()
+) -> float | None:
+    """Share of the signal that the model leaves on the records, at the rows of the yardstick.
+
+    read: the runs of each as the workbench reads them, whose motion the model goes by where there
+    is one run: without samples in which a slow sensor is held.
+    """
     plant = model.simulated
-    rig, lag = model.rig, 0.0
+    rig = model.rig
+    late = [a.values["tau"] for a in plant.effects if a.effect.place.delays]
+    lag = sum(late) if late or model.lag is None else used(model.lag)
     if rig.kind == "motor":
-        late = [a.values["tau"] for a in plant.effects if a.effect.place.delays]
-        lag = sum(late) + 0.5 * records[0].h  # a command is held until the next
-    needs = [_needs(model, one) for one in records]
+        period = model.fit.command_period  # for which a command is held
+        lag += 0.5 * (records[0].h if period is None else period)
+    whole = [runs[0] if len(runs) == 1 else None for runs in read] or [None] * len(records)
+    needs = [_needs(model, one, log) for one, log in zip(records, whole, strict=True)]
     commands = tuple(
         a for a in plant.effects if a.effect.place.on_command and not a.effect.place.delays
     )
@@ -64,10 +73,10 @@ def model_share(model: Model, records: Sequence[Record], fit: Fit) -> float | No
     return ratio(np.concatenate(measured), np.concatenate(predicted))
 
 
-def _needs(model: Model, record: Record) -> Array:
+def _needs(model: Model, record: Record, read: Log | None) -> Array:
     """Force that the motion needs but for the inertia [N], (n,), by the model alone."""
     plant = model.simulated
-    log = log_of(record, model.rig, "held out")
+    log = log_of(record, model.rig, "held out") if read is None else read
     refuse_missing(log, plant.effects)
     body = of_body(log, plant)
     how, most = Smoothing(), MOST * float(np.max(np.abs(log["F"])))
@@ -77,7 +86,8 @@ def _needs(model: Model, record: Record) -> Array:
     for _ in range(ROUNDS if by_load else 1):
         force = force_needed(body.with_signals(F=force), plant, how)
         force = np.clip(np.nan_to_num(force, nan=most), -most, most)
-    return np.asarray(force - plant.friction.m * a)
+    t = record.t if read is None else record.t - record.t[0] + log["t"][0]
+    return np.interp(t, log["t"], force - plant.friction.m * a)
 
 
 def command_for(reached: Array, u: Array, acting: tuple[Acting, ...]) -> Array:

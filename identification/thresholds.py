@@ -64,7 +64,7 @@ DRIFT_GAIN = 30.0  # chi-square that a parameter freed gains
 DRIFT_SHARE = 0.1  # of the test logs' square error, that it takes away
 DRIFT_LEAST = 0.01  # of its value, that it changes
 FOLLOWS_AS_WELL = 1.5  # times the usual error of whole runs, up to which one is followed as usual
-LEVELS_LEAVE = 0.5  # of a run's error, left at most by Coulomb levels fitted before it
+LEVELS_LEAVE = 0.8  # of a run's error, left at most by Coulomb levels fitted before it
 
 # What a test of a new log must be able to see, or it does not judge (drift.py: coarse).
 SEEN = 0.05  # of a Coulomb level, the change that it sees
@@ -81,6 +81,7 @@ MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of
 
 # What acts beside the applied force and is taken out first (real.py: rigs and cases).
 LAG_FROM = 0.4  # samples, from which motion and force are not of one instant
+LAG_LEAVES = 0.5  # of the equation's square, left at most by a lag that no run shows
 SURROUNDINGS_LEAVE = 0.8  # of the equation's square, left at most by a lag, or by gravity
 SURE_OF_SURROUNDINGS = 4.0  # deviations from 0, of either
 ORDERS_LEAVE = 0.5  # of the same, left at most by all orders of a turn that repeat with it

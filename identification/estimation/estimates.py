@@ -25,6 +25,7 @@ NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
+NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "held at its default: the logs call for no other value"
 SILENT = "no interval: nothing that these logs show changes with it"
@@ -34,16 +35,18 @@ EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 @dataclass(frozen=True)
 class Events:
     """What happened in the fitted run, (positive, negative): rests that ended, crossings of the
-    band's limit, samples of sliding, and the fastest sliding speed [m/s]."""
+    band's limit, samples of sliding, and the fastest sliding speed [m/s]; force: the applied one's
+    spread [N], 0 where it is not known."""
 
     breakaways: tuple[int, int]
     crossings: tuple[int, int]
     sliding: tuple[int, int]
     fastest: tuple[float, float]
+    force: float = 0.0
 
 
-def events_of(modes: Sequence[IntArray], speeds: Sequence[Array]) -> Events:
-    """Events counted over the modes (n,) and velocities (n,) of simulated runs."""
+def events_of(modes: Sequence[IntArray], speeds: Sequence[Array], force: float = 0.0) -> Events:
+    """Events counted over the modes (n,) and velocities (n,) of simulated runs; force: applied."""
     both = []
     for side, (slip, band) in enumerate(((SLIP_P, BAND_P), (SLIP_N, BAND_N))):
         sign = 1.0 if side == 0 else -1.0
@@ -60,7 +63,7 @@ def events_of(modes: Sequence[IntArray], speeds: Sequence[Array]) -> Events:
                 fastest = max(fastest, float(np.max(sign * v[slides])))
         both.append((starts, crossings, sliding, fastest))
     (s0, c0, n0, v0), (s1, c1, n1, v1) = both
-    return Events((s0, s1), (c0, c1), (n0, n1), (v0, v1))
+    return Events((s0, s1), (c0, c1), (n0, n1), (v0, v1), force)
 
 
 def told_estimate(
@@ -138,8 +141,9 @@ def estimates(
             bounds = (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf)
             beside = _beside(name, value_of, events)
             found[name] = told_estimate(
-                value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside
-            )
+                value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside,
+                at_bound=max(AT_ZERO, NOTHING_OF * _scale(name, events)),
+            )  # fmt: skip
     return found
 
 
@@ -171,6 +175,16 @@ def silent_reason(name: str, events: Events, log: str) -> str | None:
             f" {SLIDING_SAMPLES} needed; add motion that way"
         )
     return None
+
+
+def _scale(name: str, events: Events) -> float:
+    """Size that a parameter of friction would have if it took all of the log's force, or speed."""
+    fastest = max(events.fastest)
+    if name.startswith("dv"):
+        return fastest
+    if name.startswith("F_v"):
+        return events.force / fastest if fastest > 0.0 else 0.0
+    return events.force if name in NAMES and name != "m" else 0.0
 
 
 def _beside(name: str, value_of: Mapping[str, float], events: Events) -> float:

@@ -21,8 +21,10 @@ from identification.estimation.contradicted import Corrected, corrected, told_of
 from identification.estimation.imposed_motion import (
     fit_imposed,
     fit_one_way,
+    is_unexplained,
     left_by,
     of_one_way,
+    untold,
     way_of,
 )
 from identification.estimation.late_position import what_acts_beside
@@ -48,7 +50,6 @@ from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
-from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant
 from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
@@ -58,7 +59,6 @@ from identification.thresholds import (
     ACTUATOR_SHARE,
     COMPLETE,
     CONTRADICTS_EQUATION,
-    MOST_UNEXPLAINED,
     NO_RUN,
     PLACES_SET_ASIDE,
     RUN_ASTRAY,
@@ -72,6 +72,10 @@ ENDED_EARLY = "ended early, with the best so far: give it more time with a large
 ONE_WAY_WHY = "motion one way, in which no free run tells friction from a constant force"
 FLOOR_WHY = (
     "the free run is not followed, and bends mass and friction; stick limits and band are not told"
+)
+SURER_WHY = (
+    "the equation of motion shows mass and friction more surely than the run, which a clock or a"
+    " command that is noisy hides; stick limits and band are not told"
 )
 CORRECTIONS = 3  # rounds in which bad samples are looked for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider
@@ -123,6 +127,8 @@ def fit_plant(
         fit = replace(fit, remarks=(ENDED_EARLY, *fit.remarks))
     if beside.none:
         return replace(fit, surroundings=beside)
+    if beside.sampled:  # a measured current, which no period holds
+        fit = replace(fit, command_period=0.0)
     return replace(
         fit, surroundings=beside, effects=beside.effects,
         estimates={**fit.estimates, **surrounding_estimates(beside)},
@@ -268,23 +274,31 @@ def finished(
 
 
 def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
-    """The fit, or that of the equation of motion alone where its run is not followed and it leaves
-    clearly more of that equation than least squares do, on stretches that these have not seen."""
-    if fit.adequate or fit.effects:
+    """The fit, or that of the equation of motion alone where the fit leaves clearly more of that
+    equation than least squares do, on stretches that these have not seen, and its run is not
+    followed, or so little of the noise is in the equation that it sees more than the run."""
+    if fit.effects:
         return fit
     left = left_by(fit, recorded)
     if left is None:
         return fit
     travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
     off = max(one.position_rms for one in fit.logs)
-    astray = goes_astray(off, travel) and bends_the_equation(left[0], left[1])
+    astray = fit.adequate or goes_astray(off, travel)
+    astray = astray and bends_the_equation(left[0], left[1])
     if astray or contradicts_the_equation(left[0], left[1]):
-        try:
-            fit = fit_imposed(recorded, rng, FLOOR_WHY, by_rig=False)
-        except NotIdentifiable:
-            return fit
+        fit = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY) or fit
     share = min(left[0], left[1]) / left[2]
-    return _untold(fit, share) if is_unexplained(share) else fit
+    return untold(fit, share) if is_unexplained(share) else fit
+
+
+def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit | None:
+    """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
+    with suppress(NotIdentifiable):
+        return fit_imposed(recorded, rng, why, by_rig=False)
+    with suppress(NotIdentifiable):
+        return fit_one_way(recorded, rng, why)
+    return None
 
 
 def bends_the_equation(left: float, by_equation: float) -> bool:
@@ -300,27 +314,6 @@ def contradicts_the_equation(left: float, by_equation: float) -> bool:
 def goes_astray(off: float, travel: float) -> bool:
     """Whether a run that is off by so much (rms) follows a motion over that travel no more."""
     return not off <= RUN_ASTRAY * travel
-
-
-def is_unexplained(share: float) -> bool:
-    """Whether a model leaves so much of the force that none of its numbers holds."""
-    return share > MOST_UNEXPLAINED
-
-
-def _untold(fit: KarnoppFit, share: float) -> KarnoppFit:
-    """The fit with none of the nine told: its model leaves this share of the force."""
-    reason = (
-        f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
-        " larger than friction acts (`workbench trace` looks for it), so no number would hold"
-    )
-    values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
-    untold = {
-        name: replace(one, value=None, sd=None, low=None, high=None, at_most=None,
-                      reason=reason, assumed=values[name])
-        if name in NAMES else one
-        for name, one in fit.estimates.items()
-    }  # fmt: skip
-    return replace(fit, estimates=untold)
 
 
 def is_no_run(misfit: float) -> bool:

@@ -30,7 +30,7 @@ from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
-from identification.thresholds import OTHER_WAY, SPEEDS_APART
+from identification.thresholds import MOST_UNEXPLAINED, OTHER_WAY, SPEEDS_APART
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
@@ -96,11 +96,11 @@ def _made(
     samples = np.tile(center, (NORMAL_SETS, 1))
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
-    nine = _assumed(center, firsts)
+    nine = _assumed(center, firsts, float(min(np.min(part.speed, initial=np.inf) for part in rows)))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
-    return KarnoppFit(
+    made = KarnoppFit(
         friction=friction,
         actuator=_motor(recorded),
         estimates=found,
@@ -130,6 +130,28 @@ def _made(
             " force",
         ),
     )
+    return untold(made, fit.relative) if is_unexplained(fit.relative) else made
+
+
+def is_unexplained(share: float) -> bool:
+    """Whether a model leaves so much of the force that none of its numbers holds."""
+    return share > MOST_UNEXPLAINED
+
+
+def untold(fit: KarnoppFit, share: float) -> KarnoppFit:
+    """The fit with none of the nine told: its model leaves this share of the force."""
+    reason = (
+        f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
+        " larger than friction acts (`workbench trace` looks for it), so no number would hold"
+    )
+    values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
+    untold = {
+        name: replace(one, value=None, sd=None, low=None, high=None, at_most=None,
+                      reason=reason, assumed=values[name])
+        if name in NAMES else one
+        for name, one in fit.estimates.items()
+    }  # fmt: skip
+    return replace(fit, estimates=untold)
 
 
 def _motor(recorded: RecordedLogs) -> Motor | None:
@@ -270,15 +292,18 @@ def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     )
 
 
-def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
-    """All nine for simulation: the five of sliding kept to their signs, stick just above slip."""
+def _assumed(center: Array, firsts: Sequence[FirstEstimate], slowest: float) -> Array:
+    """All nine for simulation: the five of sliding kept to their signs, stick just above slip.
+
+    slowest: speed [m/s] of sliding that the equation has been held against, which no band hides.
+    """
     nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
     m = center[0] if center[0] > 0 else nine[0]
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
     fastest = float(np.median([float(np.max(np.abs(f.motion.v))) for f in firsts]))
-    edge = np.minimum(nine[5:7], 0.1 * fastest)
+    edge = np.minimum(nine[5:7], min(0.1 * fastest, slowest))
     stick = coulomb + viscous * edge
     return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 

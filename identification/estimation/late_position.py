@@ -3,7 +3,8 @@
 Windows of sixteen samples last a third of a second at 50 Hz, and in a loop the position's noise is
 in the command too, so least squares draw the lag anywhere. A run does not: it is followed where the
 command acts as late as it does, and nowhere else. So a lag of a motor in a loop is believed where a
-run follows with it, and looked for there where the log is slow; so is that of a measured force.
+run follows with it, and looked for there where the log is slow; so is that of a measured force. A
+lag too short for a run to notice is believed where it explains most of what the equation leaves.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,7 +15,12 @@ import numpy as np
 from identification.errors import UserError
 from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.structure_fit import plain_structure
-from identification.estimation.surroundings import explains, surroundings
+from identification.estimation.surroundings import (
+    explains,
+    explains_most,
+    lag_explains,
+    surroundings,
+)
 from identification.log import Log, Rig
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import Surroundings
@@ -24,7 +30,6 @@ from identification.thresholds import FOLLOWED
 SLOW_LOG = 6e-3  # s between samples, from which the equation's windows are too long to tell a lag
 DOUBLED = (1.0, 2.0, 4.0, 8.0)  # samples, tried in turn
 NEARER = (2.0, 1.0, 0.5)  # samples, to either side of the best so far
-LITTLE_WORSE = 1.1  # times the misfit of the best so far, beyond which no longer lag is tried
 LAG_SD = 0.25  # samples, within which the best of halves is known
 SEED = 0  # the lags are compared on the same draws
 
@@ -53,8 +58,16 @@ def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) ->
             return False
         return explains(without - 1.0, with_it - 1.0)
 
+    def believed(samples: float) -> bool:
+        """Whether a run bears the equation's lag out, or does well either way where the equation
+        hardly leaves anything with it."""
+        if follows(samples):
+            return True
+        without, with_it = lag_explains(logs, rig, found)
+        return explains_most(without**2, with_it**2) and max(left(0.0), left(samples)) <= FOLLOWED
+
     in_loop = not motor or any("r" in log for log in logs)
-    if found.lag.value and in_loop and not follows(found.lag.value / h):
+    if found.lag.value and in_loop and not believed(found.lag.value / h):
         found = replace(found, lag=NOT_SHOWN, sampled=False)  # it is the loop's own noise
     if found.lag.value or not motor or h < SLOW_LOG:
         return found
@@ -70,9 +83,8 @@ def _best_lag(left: Callable[[float], float], halt: Halt) -> float:
     if left(best) <= FOLLOWED:
         return best
     for samples in DOUBLED:
-        if halt.reached() or left(samples) > LITTLE_WORSE * left(best):
-            break
-        best = min(best, samples, key=left)
+        if not halt.reached():  # a lag near by, but not the right one, may leave more than none
+            best = min(best, samples, key=left)
     for step in NEARER:
         for samples in (best - step, best + step):
             if samples > 0.0 and not halt.reached():

@@ -46,6 +46,7 @@ from identification.estimation.windowed_run.windows import (
     walks,
     window_run,
 )
+from identification.log import Log
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant, units_of
@@ -170,7 +171,9 @@ def _of_solution(problem: Problem, solution: Solution) -> Spread:
         noise=solution.noise,
         evaluations=solution.evaluations,
         logs=tuple(_whole_log(problem, optimum, run, i) for i, run in enumerate(runs)),
-        events=events_of([run.mode for run in runs], [run.v for run in runs]),
+        events=events_of(
+            [run.mode for run in runs], [run.v for run in runs], force_of(problem.logs)
+        ),
         remarks=(RESIDUAL_WALK_SAID.format(walk),) if walk else (),
     )
 
@@ -371,9 +374,15 @@ def structure_estimates(
     return dict(estimates(names, values, samples, events, recorded.rig, recorded.name))
 
 
+def force_of(logs: Sequence[Log]) -> float:
+    """Spread of the applied force [N] over all logs."""
+    return float(np.std(np.concatenate([np.asarray(log["F"]) for log in logs])))
+
+
 def _events(plant: Plant, recorded: RecordedLogs) -> Events:
     """What happens in the plant's run in windows."""
     runs = [window_run(plant, one, recorded.drive, starts(one, recorded.drive))
             for one in recorded.logs]  # fmt: skip
     followed = [run for run in runs if run is not None]
-    return events_of([run.mode for run in followed], [run.v for run in followed])
+    modes, speeds = [run.mode for run in followed], [run.v for run in followed]
+    return events_of(modes, speeds, force_of(recorded.plain))

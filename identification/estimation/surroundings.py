@@ -41,6 +41,7 @@ from identification.model.surroundings import (
 from identification.thresholds import (
     BEYOND_FRICTION,
     LAG_FROM,
+    LAG_LEAVES,
     SURE_OF_SURROUNDINGS,
     SURROUNDINGS_LEAVE,
 )
@@ -198,6 +199,12 @@ def _has_gravity(found: _Squares) -> bool:
 def explains(without: float, left: float) -> bool:
     """Whether a term that leaves this of a square, in place of that without it, explains it."""
     return left <= SURROUNDINGS_LEAVE * without
+
+
+def explains_most(without: float, left: float) -> bool:
+    """Whether a lag that leaves this of a square, in place of that without it, is no noise of a
+    loop, which explains less."""
+    return left <= LAG_LEAVES * without
 
 
 def stands_out(size: float, sd: float) -> bool:

@@ -98,6 +98,8 @@ def trace(
         told = replace(told, verdict="unknown", complete=False, next_experiment=MOVE_IT)
     if not beside.none:
         told = with_surroundings(told, beside, *recorded_as, rig)
+    if beside.sampled:  # a measured current, which no period holds
+        told = replace(told, command_period=0.0)
     elastic = told.verdict == "unknown" and not told.effects and not halt.reached()
     if not elastic or chosen_drive(train, rig, None) != "force":
         return told

@@ -242,7 +242,8 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
         rounds.append(longest)
     for seconds in rounds:
         again = unknowns.refined(at.x, seconds, False)
-        at = again if again.followed else at
+        if again.followed and not (seconds == longest and _worse(unknowns, again, at)):
+            at = again
     at, found = _ended(unknowns, at, quick)
     if not (quick or slow):
         at, found = _rescued(unknowns, at, found, rescues, longest if steady else None)
@@ -253,6 +254,12 @@ def _minimum(unknowns: _Unknowns, effort: Effort, rescues: int) -> tuple[Minimum
         if left_by < found:
             at, found = trial, left_by
     return at, found
+
+
+def _worse(unknowns: _Unknowns, again: Minimum, at: Minimum) -> bool:
+    """Whether a minimum over long windows, in which a run may lose a stop, follows the log less."""
+    left = unknowns.misfit(again.x)
+    return left > COMPLETE and left > unknowns.misfit(at.x)
 
 
 def _approached(unknowns: _Unknowns, effort: Effort) -> Minimum:

@@ -11,6 +11,7 @@ from identification.estimation.windowed_run.windows import (
     COARSE,
     RUN_WINDOW,
     WHOLE,
+    Freed,
     freed,
     starts,
     walks,
@@ -19,9 +20,11 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
+from identification.thresholds import FOLLOWED
 
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
 LUCKY_WINDOWS = 0.15  # of the windows, that luck may have spoilt
+FORGIVEN_FROM = 4  # windows, of which luck may have spoilt one
 CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
 ROBUST_FROM = 3.0  # residual in noise units from which it counts less
 Judge = Callable[[Plant], Array]
@@ -33,22 +36,37 @@ def judge(
     """Errors of a plant like this one, in units of the sensors' noise: position (and, by command,
     force) over all logs, less what the windows' unsure states account for.
 
-    bristle [s]: longest sub-step of one.
+    Windows that this plant loses by luck (`misfit`) are left out: 0. bristle [s]: longest sub-step
+    of one.
     """
     free = [freed(plant, one, drive, starts(one, drive, seconds, bristle)) for one in logs]
     sizes = [len(one.log) * (2 if drive == "command" and not one.held else 1) for one in logs]
+    lost = [_lost(plant, one, drive, own) for one, own in zip(logs, free, strict=True)]
 
     def errors_of(tried: Plant) -> Array:
         parts = []
-        for one, own, size in zip(logs, free, sizes, strict=True):
+        for one, own, size, out in zip(logs, free, sizes, lost, strict=True):
             r = window_residual(tried, one, drive, own)
             if r is None or not np.all(np.isfinite(r)):
                 parts.append(np.full(size, CANNOT_BE_FOLLOWED))
                 continue
-            parts.append(np.clip(r, -CANNOT_BE_FOLLOWED, CANNOT_BE_FOLLOWED).ravel())
+            r = np.where(out, 0.0, np.clip(r, -CANNOT_BE_FOLLOWED, CANNOT_BE_FOLLOWED))
+            parts.append(r.ravel())
         return np.concatenate(parts)
 
     return errors_of
+
+
+def _lost(plant: Plant, one: MotionLog, drive: Drive, own: Freed | None) -> BoolArray:
+    """Samples (n,) of the windows that the plant loses by luck, as far as `misfit` forgives it."""
+    out = np.zeros(len(one.log), dtype=np.bool_)
+    r = window_residual(plant, one, drive, own) if loose(plant, drive) and own else None
+    if own is None or r is None or not np.all(np.isfinite(r)):
+        return out
+    window = window_of(own.begun, len(one.log))
+    each, kept = _by_window(r[0], window, one.signals["d"] != 0)
+    spoilt = np.setdiff1d(np.flatnonzero(each > FOLLOWED), kept)
+    return np.isin(window, spoilt)
 
 
 def loss(r: Array) -> float:
@@ -93,9 +111,16 @@ def mean_loss(r: Array, window: IntArray | None = None, moves: BoolArray | None 
     which the worst do not count, of those in which the body moves (n,) at all, so many of them."""
     if window is None:
         return loss(r) / len(r) / NOISE_LOSS
+    each, kept = _by_window(r, window, moves)
+    return float(np.average(each[kept], weights=np.bincount(window)[kept]))
+
+
+def _by_window(r: Array, window: IntArray, moves: BoolArray | None) -> tuple[Array, IntArray]:
+    """Robust mean square of each window, and the windows that count."""
     square = np.log1p((r / ROBUST_FROM) ** 2) * ROBUST_FROM**2 / NOISE_LOSS
     size = np.bincount(window)
     each = np.bincount(window, square) / np.maximum(size, 1)
-    told = len(size) if moves is None else np.count_nonzero(np.bincount(window, moves))
-    kept = np.argsort(each)[: max(1, len(size) - int(LUCKY_WINDOWS * told))]
-    return float(np.average(each[kept], weights=size[kept]))
+    told = len(size) if moves is None else int(np.count_nonzero(np.bincount(window, moves)))
+    spoilt = max(int(LUCKY_WINDOWS * told), int(told >= FORGIVEN_FROM))
+    kept = np.argsort(each)[: max(1, len(size) - spoilt)]
+    return np.asarray(each, dtype=np.float64), kept.astype(np.int64)

@@ -86,3 +86,15 @@ def test_rotary_units() -> None:
     )
     assert found["m"].unit == "kg m^2"
     assert found["dv_p"].unit == "rad/s"
+
+
+def test_next_to_nothing_is_no_friction_however_narrow_its_interval() -> None:
+    tiny = table(1).array.copy()
+    tiny[1], tiny[5] = 1e-6, 1e-8
+    samples = tiny * (1 + 1e-3 * np.random.default_rng(2).standard_normal((500, 9)))
+    pulled = Events((10, 10), (10, 10), (1000, 1000), (0.5, 0.5), force=20.0)
+    found = estimates(NAMES, tiny, samples, pulled, Rig("force"), "log")
+    for name in ("F_cp", "dv_p"):
+        assert found[name].value is None
+        assert "not told from 0" in (found[name].reason or "").replace("cannot tell it", "not told")
+    assert found["F_cn"].value == tiny[2]

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.estimation.windowed_run import windows as module
-from identification.estimation.windowed_run.run_errors import judge, misfit
+from identification.estimation.windowed_run.run_errors import judge, mean_loss, misfit
 from identification.estimation.windowed_run.windows import (
     RUN_WINDOW,
     WHOLE,
@@ -107,3 +107,25 @@ def test_a_run_by_a_noisy_force_is_judged_less_where_it_walks() -> None:
     assert np.min(free.weight) < 0.5 < np.max(free.weight) <= 1.0
     even = module.freed(plant(), by_force, "force", starts(by_force, "force"), even=True)
     assert even is not None and np.all(even.weight == 1.0)
+
+
+def test_a_window_that_a_run_loses_by_luck_bends_no_parameter() -> None:
+    """A bump that no plant explains, in one window: all others count as they did."""
+    one = seen(made(2))
+    t = np.asarray(one.log["t"])
+    bumped = one.log["y"] + 300.0 * NOISE * np.exp(-(((t - 0.5 * t[-1]) / 0.05) ** 2))
+    lost = replace(one, log=one.log.with_signals(y=bumped))
+    assert abs(misfit(plant(), [lost], "command") - 1.0) < 0.1
+    assert misfit(plant(), [lost], "command", every=True) > 3.0
+    r = judge(plant(), [lost], "command", RUN_WINDOW)(plant())
+    own = np.mean(r**2)
+    assert own < 1.1
+    assert 0.05 < np.mean(r == 0.0) < 0.4  # that window alone
+
+
+def test_of_few_windows_none_is_forgiven() -> None:
+    r, window = np.ones(400), np.repeat(np.arange(4), 100).astype(np.int64)
+    r[window == 2] = 100.0
+    assert mean_loss(r, window) < 1.5
+    three = window < 3
+    assert mean_loss(r[three], window[three]) > 10.0
