@@ -73,12 +73,13 @@ docs: environment
 slow: environment
 	$(PYTEST) --dist loadfile -m "slow and not method"
 
-# Traces and fits of many seconds each, for who changes a method; `verdicts` guards every day.
+# Traces and fits of many seconds each, and the longer half of the verdicts, for who changes a method.
 test-method: environment kernels
-	$(PYTEST) --dist worksteal -m method
+	$(PYTEST) --dist worksteal -m "method and not verdicts"
+	$(PYTEST) --dist worksteal -m "verdicts and method" tests/verdicts
 
 verdicts: environment
-	$(PYTEST) --dist worksteal -m verdicts
+	$(PYTEST) --dist worksteal -m "verdicts and not method" tests/verdicts
 
 bench: environment
 	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"

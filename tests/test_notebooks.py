@@ -9,7 +9,7 @@ from nbclient import NotebookClient
 ROOT = Path(__file__).resolve().parent.parent
 NOTEBOOKS = sorted((ROOT / "notebooks").glob("*.ipynb"))
 SECONDS_A_CELL = 300
-LONG = ("04_retuning_after_drift", "05_the_paper", "06_next_run")
+LONG = ("02_closing_the_loop", "04_retuning_after_drift", "05_the_paper", "06_next_run")
 
 each_notebook = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 

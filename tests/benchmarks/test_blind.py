@@ -18,6 +18,7 @@ from identification.effects._library import built_in
 SECONDS = 15.0
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_run_from_case_to_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "blind.jsonl"

@@ -156,6 +156,7 @@ def test_a_bristle_has_no_band_of_its_own() -> None:
     assert truth(made)["dv_p"] is None and truth(made)["m"] == one.nine.m
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_seed_is_always_the_same_machine() -> None:
     first, second = (make("force", ("none",), 0, 0.2) for _ in range(2))

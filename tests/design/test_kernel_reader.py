@@ -86,6 +86,7 @@ def test_the_program_is_the_simulations_step(made: tuple[Servo, bool], seed: int
     assert np.array_equal(bits([step.step(*row) for row in inputs]), bits(run.u))
 
 
+@pytest.mark.method
 @pytest.mark.slow
 @settings(deadline=None, max_examples=30)
 @given(servos())

@@ -60,6 +60,7 @@ def test_imposed_motion_gives_friction_but_no_design(
     assert not (tmp_path / "d").exists()
 
 
+@pytest.mark.method
 def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) -> None:
     logs = [str(data / "pneumatic_seals" / f"PK_{bar}bar.csv") for bar in (1, 5, 7)]
     card, out = tmp_path / "card.toml", tmp_path / "id"
@@ -73,6 +74,7 @@ def test_a_friction_of_the_wrong_sign_is_not_told(data: Path, tmp_path: Path) ->
     assert friction["F_cp"]["assumed"] >= 0.0
 
 
+@pytest.mark.method
 def test_a_rig_that_leads_the_body_is_fitted_on_its_force(data: Path, tmp_path: Path) -> None:
     assert data.is_dir()
     out = tmp_path / "id"

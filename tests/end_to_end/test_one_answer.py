@@ -41,6 +41,7 @@ def both(
     return fit.estimates, found.parameters_after
 
 
+@pytest.mark.method
 @pytest.mark.slow
 @pytest.mark.parametrize("signals", [("t", "y", "F", "u"), ("t", "y", "F")])
 @pytest.mark.parametrize("name", RECIPES)

@@ -39,6 +39,7 @@ def done(capsys: pytest.CaptureFixture[str], *arguments: str, status: int = 0) -
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_its_files_serve_validate_and_export(
     here: Path, capsys: pytest.CaptureFixture[str]

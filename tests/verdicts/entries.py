@@ -67,6 +67,11 @@ class Entry:
         """
         return int(self.tables.get("looks", LOOKS))
 
+    @property
+    def long(self) -> bool:
+        """Whether it is left out of the table that every change has to pass."""
+        return bool(self.tables.get("long", False))
+
 
 def entries(path: Path = TABLE) -> dict[str, Entry]:
     """The entries by name, in the file's order."""

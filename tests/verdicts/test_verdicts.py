@@ -29,7 +29,13 @@ def measured_data() -> Path | None:
 
 
 @pytest.mark.verdicts
-@pytest.mark.parametrize("name", ENTRIES)
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=[pytest.mark.method] * entry.long)
+        for name, entry in ENTRIES.items()
+    ],
+)
 def test_verdict(
     name: str,
     tmp_path: Path,

@@ -73,6 +73,7 @@ def test_table_2_to_table_3_is_found_from_one_log() -> None:
     assert found.state.logs == 0
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_change_within_the_margin_is_no_drift_however_sure() -> None:
     sure = DriftSettings(variation=0.0)

@@ -67,6 +67,7 @@ def test_a_machine_that_the_model_never_followed_has_not_changed() -> None:
     assert cried >= 10
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_worn_machine_is_found_all_the_same_and_its_mass_not_named() -> None:
     found = []

@@ -90,6 +90,7 @@ def test_motor_is_driven_by_its_command() -> None:
     assert fit.actuator == Motor(2.0)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_two_logs_make_one_fit_with_smaller_spread() -> None:
     truth = table(3)
@@ -102,6 +103,7 @@ def test_two_logs_make_one_fit_with_smaller_spread() -> None:
     assert np.trace(both.covariance[:1, :1]) < np.trace(one.covariance[:1, :1])
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
     t = np.arange(8000, dtype=np.float64) * 1e-3
@@ -121,6 +123,7 @@ def test_a_log_that_goes_one_way_says_nothing_of_the_other() -> None:
     assert together.assumed == pytest.approx(table(2).F_cp, rel=0.02)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_same_seed_gives_the_same_fit() -> None:
     log = made_log(table(1), seed=5, seconds=5.0)
@@ -150,6 +153,7 @@ def test_progress_is_reported_by_stage() -> None:
     assert all(0.0 <= share <= 1.0 for _, share in seen)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_wrong_structure_is_not_called_adequate() -> None:
     log = made_log(table(2), seed=8, seconds=6.0)

@@ -97,6 +97,7 @@ def test_what_the_equations_call_for_is_kept_though_the_run_has_not_judged_it(
     assert any("spring" in what for what in found.not_tried)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_nothing_is_missing_only_where_that_is_known() -> None:
     clean = made(11, n=SHORT), made(12, n=SHORT)

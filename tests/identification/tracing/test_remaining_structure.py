@@ -215,6 +215,7 @@ def test_the_plain_machine_leaves_nothing_of_any_size() -> None:
     assert remaining_structure(choice, after, any_size=True).depends_on == ()
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_breakaways_are_judged_by_their_direction_and_not_by_their_own_sign() -> None:
     choice, after = lacking({"rising_stiction": {"F_r": 6.0, "tau": 0.3}})

@@ -92,6 +92,7 @@ def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     assert not any("too alike" in remark for remark in found.remarks)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_motion_that_is_sure_only_as_a_rig_s_is_traced() -> None:
     one, other = (strokes(bar, [1.5e-3] * 4, bar, stroke=0.005) for bar in (1, 2))

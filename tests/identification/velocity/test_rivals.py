@@ -31,6 +31,7 @@ def test_nothing_is_named_where_nothing_is_missing() -> None:
     assert len(found.rivals) == len(RICHER)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 @pytest.mark.parametrize("key", RICHER)
 def test_what_is_missing_is_named(key: str) -> None:

@@ -96,6 +96,7 @@ def test_the_run_has_the_reference_as_given() -> None:
     assert np.max(np.abs(free.F)) > 2.0 * np.max(np.abs(run.F))
 
 
+@pytest.mark.method
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("asked", "goals"),

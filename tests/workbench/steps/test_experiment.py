@@ -62,6 +62,7 @@ def planned() -> Experiment:
     return experiment(controlled(), WANTED, None, quiet, after(80))
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_no_limit_is_exceeded_on_machines_that_it_may_be(planned: Experiment) -> None:
     assert planned.safety.exceeding == 0
@@ -140,6 +141,7 @@ def test_limits_that_are_not_given_are_those_of_the_logs() -> None:
     assert limits.force == pytest.approx(240.0)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_rivals_are_told_apart() -> None:
     wanted = replace(WANTED, rivals=("stribeck", "spring"))

@@ -85,6 +85,7 @@ def test_weak_form_gives_mass_and_sliding_friction() -> None:
     assert np.max(np.abs(found.five / SERVO.array[:5] - 1.0)) < 0.05
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_climb_reaches_the_whole_run() -> None:
     problem = pose([made_log(table(1), seed=2, seconds=6.0)], Rig("force"), "command")

@@ -74,6 +74,7 @@ def test_the_search_finds_what_a_gradient_does_not() -> None:
     assert values_of(found.plant, names) == pytest.approx(values_of(true, names), rel=0.06)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_where_the_equations_tell_all_but_the_band_no_search_from_afar_is_made(
     monkeypatch: pytest.MonkeyPatch,

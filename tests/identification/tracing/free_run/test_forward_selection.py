@@ -67,6 +67,7 @@ def test_play_shows_in_the_run_alone_and_is_named() -> None:
     assert step.rivals and all(c.gain < step.candidate.gain for c in step.rivals)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_what_the_run_does_without_is_contested_anew(monkeypatch: pytest.MonkeyPatch) -> None:
     setting, plain = setting_of(4, 4e-4)
@@ -124,6 +125,7 @@ def test_a_late_command_of_a_motor_is_named() -> None:
     assert delay.value == pytest.approx(0.006, rel=0.15)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_complete_run_of_a_motor_has_nothing_missing() -> None:
     found = trace([made(8)], [made(9)], MOTOR, built_in(), np.random.default_rng(0))

@@ -24,6 +24,7 @@ def test_values_to_begin_from_lie_within_bounds() -> None:
     assert grid(built_in()["spring"], plant(), [one]) == []
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_growth_is_tried_from_what_a_limit_that_falls_tells() -> None:
     effect = built_in()["rising_stiction"]

@@ -65,6 +65,7 @@ def judged(one: Robust, machines: DrawnMachines, seed: int) -> dict[str, float]:
     }
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_what_it_promises_holds_on_machines_that_it_has_not_seen() -> None:
     one = found()
@@ -93,6 +94,7 @@ def test_the_same_seed_gives_the_same_design() -> None:
     assert robust_document(again) == robust_document(found())
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_a_limit_that_no_loop_keeps_is_said_and_nothing_recommended() -> None:
     one = robust_design(uncertain(), replace(WANTED, limits=Limits(tracking=1e-9)), POLES)
@@ -164,6 +166,7 @@ def test_without_a_mass_there_is_nothing_to_draw_around() -> None:
         robust_design(replace(model, friction={**model.friction, "m": mass}), WANTED)
 
 
+@pytest.mark.method
 @pytest.mark.slow
 def test_what_no_log_told_is_named() -> None:
     untold = Estimate(None, "N", reason="no breakaway", assumed=18.0)
