@@ -113,7 +113,7 @@ def _in_equation(
     if np.count_nonzero(keep) < FEWEST_ROWS:
         return None
     every = signals_at(choice.end, equation)
-    way = _upward(choice.end, equation, every)[keep]
+    way = upward(choice.end, equation, every)[keep]
     held = all(one.held for one in choice.end.logs)
     if equation == BREAKAWAY:  # force and command at breakaway are what is judged
         every = {k: v for k, v in every.items() if k not in ("F", "u", "v", "reversal")}
@@ -142,11 +142,14 @@ def _in_equation(
     return named, found.explained * float(np.mean(r**2))
 
 
-def _upward(stage: EffectRows, equation: str, signals: Mapping[str, Array]) -> BoolArray:
+def upward(stage: EffectRows, equation: str, signals: Mapping[str, Array]) -> BoolArray:
     """Whether each row of an equation moves, starts or is pushed in positive direction, (r,)."""
     if equation == BREAKAWAY:
         return np.concatenate([events.direction > 0 for events in stage.events])
-    return np.asarray(signals["F" if equation == REST else "v"] >= 0)
+    pushed = signals.get("F" if equation == REST else "v")
+    if pushed is None:  # the same at every row
+        return np.ones(len(next(iter(signals.values()))), dtype=np.bool_)
+    return np.asarray(pushed >= 0)
 
 
 def _mean(r: Array) -> float:

@@ -7,7 +7,7 @@ what a gain means in workbench/cards/sensors.py.
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
 from identification.errors import BadCard
 from identification.log import Rig, RigKind
@@ -191,6 +191,9 @@ class FileEntry(CardTable):
     """keys of `[rig]` that differ for this file"""
 
 
+EXTRA = "extra"  # table of [signals] with what else was measured
+
+
 class CardFile(CardTable):
     """A card as it is written."""
 
@@ -199,7 +202,8 @@ class CardFile(CardTable):
     rig: RigSection
     """the machine"""
     signals: dict[str, SignalSpec] = Field(default_factory=dict)
-    """what each column is; `t`, `y`, and by kind `p_p` and `p_n`, `F`, or `u` are needed"""
+    """what each column is; `t`, `y`, and by kind `p_p` and `p_n`, `F`, or `u` are needed; what else
+    was measured beside these or in a table `[signals.extra]`: trace tries what depends on it"""
     file: FileSpec = FileSpec()
     """how the files are laid out; all of it is found by looking where it is not given"""
     files: tuple[FileEntry, ...] = ()
@@ -210,3 +214,15 @@ class CardFile(CardTable):
     """in place of a log: what `simulate` makes one from"""
     controller: ControllerSection | None = None
     """the controller that the machine has now"""
+
+    @field_validator("signals", mode="before")
+    @classmethod
+    def _with_extra(cls, given: Any) -> Any:
+        """`[signals.extra]` beside the other signals; raises ValueError where a name is in both."""
+        extra = given.get(EXTRA) if isinstance(given, dict) else None
+        if not isinstance(extra, dict) or "column" in extra:
+            return given
+        own = {name: one for name, one in given.items() if name != EXTRA}
+        if twice := sorted(own.keys() & extra.keys()):
+            raise ValueError(f"{twice[0]} is in [signals] and in [signals.extra]: leave one out")
+        return {**own, **extra}

@@ -11,7 +11,7 @@ from scipy.signal import butter, lfilter
 from identification.arrays import Array
 from identification.effects._library import built_in
 from identification.estimation.recorded_logs import RecordedLogs
-from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL
+from identification.estimation.regression.equation_rows import BREAKAWAY, MECHANICAL, REST
 from identification.estimation.regression.row_fit import RowFit, first_stage
 from identification.estimation.structure_fit import FittedStructure, fitted_structure
 from identification.log import Rig
@@ -26,6 +26,7 @@ from identification.tracing.remaining_structure import (
     too_much,
     unrepeated,
     unsized,
+    upward,
 )
 from tests.identification.motor_logs import K_A, H, made, plant, seen
 
@@ -261,3 +262,12 @@ def test_how_large_an_error_is_tells_where_its_sign_is_a_matter_of_luck() -> Non
     lost = np.cumsum(np.where(slow, 3.0 * sigma * rng.standard_normal(len(slow)), 0.0))
     blurred = replace(one, log=one.log.with_signals(y=one.log["y"] + lost))
     assert "v" in in_run(after, [blurred], "command").depends_on
+
+
+def test_rows_that_all_go_one_way_tell_of_it_without_a_signal() -> None:
+    """A force or speed that never changes is no signal, and its sign is that of all rows."""
+    stage = first_stage([seen(made(1))], by_command=False)[0]
+    same = upward(stage, REST, {"t": np.arange(5, dtype=np.float64)})
+    assert same.shape == (5,) and np.all(same)
+    pushed = upward(stage, REST, {"F": np.array([1.0, -1.0, 2.0])})
+    assert pushed.tolist() == [True, False, True]

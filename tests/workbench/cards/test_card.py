@@ -136,3 +136,12 @@ def test_cards_that_are_no_text_file(tmp_path: Path) -> None:
     (tmp_path / "x.toml").write_bytes(b"\xff\x00\x81")
     with pytest.raises(BadCard, match="not UTF-8"):
         load_card(tmp_path / "x.toml")
+
+
+def test_what_else_was_measured_stands_beside_the_signals_or_in_a_table(tmp_path: Path) -> None:
+    alpha = '\n[signals.extra]\nalpha = { column = "alpha", unit = "rad" }\n'
+    card = load_card(write(tmp_path, CONTRACT + alpha))
+    assert card.signals["alpha"].column == "alpha"
+    assert "extra" not in card.signals
+    twice = '\n[signals.extra]\nu = { column = "other", unit = "V" }\n'
+    assert "u is in [signals] and in [signals.extra]" in refusal(tmp_path, CONTRACT + twice)

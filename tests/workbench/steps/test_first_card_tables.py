@@ -10,10 +10,12 @@ from benchmarks.init_real_tables import fewest_wrong, machine, make_table
 from benchmarks.init_table_words import KINDS
 from identification.arrays import Array
 from identification.errors import BadLog
+from workbench.cards.card import load_card
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.answers import BadAnswer, with_rig, with_signal
 from workbench.steps.first_card.columns import columns_of
 from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.written import written
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 
@@ -182,3 +184,18 @@ def test_a_position_that_only_rises_is_no_clock(tmp_path: Path) -> None:
                header="t,position,current", comments="")  # fmt: skip
     found = columns_of(read_unknown(tmp_path / "run.csv"))
     assert [one.raw.header for one in found.signals] == ["position", "current"]
+
+
+def test_what_else_was_measured_is_offered(
+    joint: dict[str, Array], other: dict[str, Array], tmp_path: Path
+) -> None:
+    """Another angle may be what the rest depends on; whoever knows takes the # away."""
+    found = propose(
+        tmp_path, "t,pos arm,u arm,pos rod", T, joint["y"], joint["u0"], other["y"], axis="arm"
+    )
+    assert found.extra == {"pos_rod": "pos rod"}
+    path = tmp_path / "card.toml"
+    path.write_text(written(found).replace("# [signals.extra]", "[signals.extra]"), "utf-8")
+    text = path.read_text("utf-8").replace("# pos_rod = {", "pos_rod = {")
+    path.write_text(text.replace("# force_per_command = ...", "force_per_command = 1.0"), "utf-8")
+    assert load_card(path).signals["pos_rod"].column == "pos rod"

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
 )
+MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 
@@ -72,7 +73,8 @@ class FileColumn:
 @dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
-    every column of the file, what else was noticed, and the axes that the file holds."""
+    every column of the file, what else was noticed, the axes that the file holds, and what else
+    was measured (name: column)."""
 
     path: Path
     name: str
@@ -85,6 +87,7 @@ class Proposal:
     columns: tuple[FileColumn, ...]
     remarks: tuple[str, ...] = ()
     axes: tuple[str, ...] = ()
+    extra: Mapping[str, str | int] = field(default_factory=dict)
 
     def signal(self, name: str) -> SignalGuess | None:
         """The signal of that name; None where the card has none."""
@@ -148,6 +151,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         ),
         remarks=tuple(remarks_on(columns, roles, units)),
         axes=columns.axes,
+        extra=_extra(columns, roles),
     )
 
 
@@ -317,6 +321,19 @@ def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
     if other is not None and (odds < SURE or not unit.rival):
         return str(other.raw.key)
     return unit.rival
+
+
+def _extra(columns: Columns, roles: Roles) -> dict[str, str | int]:
+    """Columns that are no signal of this rig, those of other axes first, by a name for each."""
+    known = {one.raw.number for one in roles.columns.values()}
+    out: dict[str, str | int] = {}
+    own = ("", roles.columns["y"].axis)
+    others = [one for one in columns.signals if one.raw.number not in known]
+    for one in sorted(others, key=lambda one: one.axis in own)[:MOST_EXTRA]:
+        name = re.sub(r"\W+", "_", one.raw.header.strip().casefold()).strip("_")
+        name = name if name and name not in (*CARD_ORDER, *out) else f"column_{one.raw.number}"
+        out[name] = one.raw.key
+    return out
 
 
 def _unused(columns: Columns, roles: Roles) -> dict[str, str]:

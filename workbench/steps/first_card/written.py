@@ -5,7 +5,7 @@ from pathlib import Path
 
 from identification.errors import UserError
 from workbench.cards.card import load_card
-from workbench.cards.card_text import Line, card_text
+from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
@@ -58,7 +58,16 @@ def _remark(sure: bool, why: str, rival: str) -> str:
 
 def _tail(of: Proposal) -> list[str]:
     lines = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
-    return [*of.remarks, *lines]
+    return [*of.remarks, *lines, *_extra(of)]
+
+
+def _extra(of: Proposal) -> list[str]:
+    """The table with what else was measured, to be taken in by whoever knows what it is."""
+    if not of.extra:
+        return []
+    rows = [f"{name} = {toml({'column': key, 'unit': '1'})}" for name, key in of.extra.items()]
+    said = "take the # from the next lines away, and trace tries whether the rest depends on them:"
+    return [said, "[signals.extra]", *rows]
 
 
 def refusal(log: Path, card: Path) -> str:
