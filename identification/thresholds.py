@@ -52,6 +52,7 @@ IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
 SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
 HEADLINE = 0.5  # share left at most of what was missing there, by effects that are told first
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
+HIDES = 0.1  # of the force, left where it is more than friction too: nothing can be said of either
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure
 CARRIED = 2.0  # times the training logs' force error, that the test logs' may be
 LEAST_DEPENDENCE = 0.08  # share of the rest that a signal explains, or it depends on none

@@ -279,7 +279,7 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
     followed, or so little of the noise is in the equation that it sees more than the run."""
     if fit.effects:
         return fit
-    left = left_by(fit, recorded)
+    left = left_by(fit.friction, recorded)
     if left is None:
         return fit
     travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
@@ -290,6 +290,16 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
         fit = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY) or fit
     share = min(left[0], left[1]) / left[2]
     return untold(fit, share) if is_unexplained(share) else fit
+
+
+def by_equation_if_surer(
+    plant: Plant, recorded: RecordedLogs, rng: np.random.Generator
+) -> KarnoppFit | None:
+    """The fit by the equation of motion, where a plant leaves clearly more of it; else None."""
+    left = left_by(plant.friction, recorded)
+    if left is None or not bends_the_equation(left[0], left[1]):
+        return None
+    return _by_equation(recorded, rng, FLOOR_WHY)
 
 
 def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit | None:

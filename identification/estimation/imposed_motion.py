@@ -320,16 +320,15 @@ def _estimates(
     return _reasoned(told, nine, fit.share, recorded)
 
 
-def left_by(fit: KarnoppFit, recorded: RecordedLogs) -> tuple[float, float, float] | None:
-    """Force [N] that a fit leaves of the equation of motion while sliding, that the equation's own
-    least squares leave on stretches that they have not seen, and the force itself; root mean
+def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | None:
+    """Force [N] that a plant leaves of the equation of motion while sliding, that the equation's
+    own least squares leave on stretches that they have not seen, and the force itself; root mean
     squares.
 
-    None where too little slides. Of rows faster than the fit's band, in which it says something
+    None where too little slides. Of rows faster than the plant's band, in which it says something
     else of friction.
     """
     logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
-    p = fit.friction
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
     rows = stacked([mechanical(one, theta) for one in logs])
     fast = rows.speed > np.where(rows.X[:, 1] > 0.5, p.dv_p, -p.dv_n)

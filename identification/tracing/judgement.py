@@ -9,7 +9,7 @@ from identification.estimation.regression.equation_rows import MECHANICAL, Motio
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
 from identification.remarks import Aside
-from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE
+from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HIDES
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
 from identification.tracing.levels_refitted import levels_refitted
@@ -89,6 +89,9 @@ def judgement(
         levels, how = levels_refitted(plain.plant, told, logs, seen, rows.drive, rig)
         verdict, changed = ("drift", levels) if levels else (verdict, changed)
         doubts = (*doubts, how) if levels else doubts
+    p = after.plant.friction
+    if verdict == "none" and hides_friction(errors_after["test"], max(p.F_cp, p.F_cn)):
+        verdict, doubts = "unknown", (*doubts, AS_LARGE_AS_FRICTION)
     said = (
         *_remarks(choice, after, left, logs, seen, rig),
         *doubts,
@@ -100,6 +103,14 @@ def judgement(
         left if verdict == "unknown" else NOTHING, tuple(changed), said,
         complete=complete, rest=Left(0.0 if complete else share, left.depends_on),
     )  # fmt: skip
+
+
+def hides_friction(left: Errors, coulomb: float) -> bool:
+    """Whether what is left of the force is larger than friction itself, so that an effect of its
+    size would not show."""
+    if left.force_rms is None or left.force_relative is None:
+        return False
+    return left.force_rms > coulomb and left.force_relative > HIDES
 
 
 def _not_its_law(key: str) -> str:
@@ -126,6 +137,10 @@ PIECES = (
 LONGER = "a force is said to repeat over more than the travel shows: it stands in for another"
 UNSURE = "an effect is named of which the logs leave every size open"
 UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
+AS_LARGE_AS_FRICTION = (
+    "what is left of the force is larger than friction itself: by these logs' noise, or by what it"
+    " hides"
+)
 STANDS_IN = (
     "what explains the training logs does not explain the test logs: it stands in for something"
     " else, or the machine differs in them"

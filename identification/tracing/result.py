@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
 from identification.arrays import Array
 from identification.effects._base import Effect
 from identification.model.estimates import Estimate
@@ -11,6 +13,8 @@ from identification.model.plant import Plant
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 
 TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
+
+SMALLEST_LEVEL = 1e-3  # of what is left of the force, of friction that nothing is a share of
 
 
 @dataclass(frozen=True)
@@ -152,3 +156,11 @@ class Trace:
     command_period: float | None = None
     curves: tuple[FreeCurve, ...] = ()
     surroundings: Surroundings = NO_SURROUNDINGS
+
+    def missing(self, errors: Errors) -> float | None:
+        """Root mean square force that a model lacks beyond the sensors' noise, as a share of the
+        Coulomb level; None where no force error was seen, or nothing rubs."""
+        level = max(self.plant.friction.F_cp, self.plant.friction.F_cn)
+        if errors.force_rms is None or not level > SMALLEST_LEVEL * errors.force_rms:
+            return None
+        return float(np.sqrt(max(errors.force_rms**2 - self.noise_force**2, 0.0)) / level)

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.fit import finished
+from identification.estimation.fit import by_equation_if_surer, finished
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.equation_rows import ACTUATOR, MECHANICAL
 from identification.estimation.regression.held_command import share_between
@@ -177,6 +177,9 @@ def settled_plain(
     plain, recorded = chosen.plain, chosen.plain.recorded
     asking = recorded.halt.asking(report)
     fit = recorded.halt.tried(INTERVALS, lambda: finished(plain.model, recorded, rng, asking), None)
+    if fit is None:  # at least no worse than the equation of motion by itself
+        with recorded.halt.closing():
+            fit = by_equation_if_surer(plain.model.plant, recorded, rng)
     if fit is None:
         return chosen, found
     model = replace(plain.model, fit=fit)

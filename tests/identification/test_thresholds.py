@@ -92,6 +92,7 @@ from identification.tracing.free_run.backward_elimination import (
 )
 from identification.tracing.free_run.forward_selection import decisive
 from identification.tracing.free_run.rivals import equal_rivals
+from identification.tracing.judgement import hides_friction
 from identification.tracing.levels_refitted import explains_the_day, follows_worse
 from identification.tracing.model_errors import NoiseFloor, OnTest, carries, share_left
 from identification.tracing.parameter_drift import changes
@@ -851,6 +852,13 @@ def test_sure_of_order() -> None:
 
 def test_follows_as_well() -> None:
     assert follows_worse(1.6, 1.0) and not follows_worse(1.4, 1.0)
+
+
+def test_hides() -> None:
+    """What is left beside friction as small hides an effect, unless it is a trifle of the force."""
+    left = Errors(2.0, 0.15, None, None)
+    assert hides_friction(left, 1.0) and not hides_friction(left, 3.0)
+    assert not hides_friction(Errors(2.0, 0.07, None, None), 1.0)
 
 
 def test_levels_leave() -> None:

@@ -32,10 +32,25 @@ def words(key: str) -> str:
 
 
 def trace_sentence(traced: Traced) -> str:
-    """The verdict in one or two plain sentences, and whether it is one for the time being."""
+    """The verdict in one or two plain sentences, how much of friction the model lacks, and whether
+    it is a verdict for the time being."""
     left_out = traced.trace.not_tried
     early = f" Ended early, so this is for now; not tried: {'; '.join(left_out)}."
-    return _verdict_sentence(traced) + (early if left_out else "")
+    return _verdict_sentence(traced) + _of_friction(traced.trace) + (early if left_out else "")
+
+
+def _of_friction(found: Trace) -> str:
+    """The force that is missing on the held-out logs, as a share of friction."""
+    before, after = (found.missing(one["test"]) for one in (found.before, found.after))
+    if before is None or after is None:
+        return ""
+    if not found.effects:
+        return f" Force missing: {_share(after)} of friction."
+    return f" Force missing: {_share(before)} of friction before, {_share(after)} after."
+
+
+def _share(part: float) -> str:
+    return f"{100 * part:.2g} %" if part < 1.0 else f"{100 * part:.0f} %"
 
 
 def _verdict_sentence(traced: Traced) -> str:

@@ -56,6 +56,7 @@ CONTRACT = {
 BESIDE = {
     "bad_samples", "complete", "curves", "left", "not_tried", "remarks", "parameters", "card",
     "log", "test_log", "versions", "gravity", "constant_force", "lag", "resonance",
+    "missing_of_friction",
 }  # fmt: skip
 ERRORS = {"force_rms", "force_relative", "position_rms", "actuator_rms"}
 NUMBER = {"value", "unit", "sd", "low", "high"}
@@ -231,6 +232,7 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
         traced(shown)
     )
     assert "On stretches left out, error of" in trace_sentence(traced(shown, tested=False))
+    assert "Force missing: 0.079 % of friction before, " in trace_sentence(traced(shown))
     none = {where: Errors(None, None, None, None) for where in before}
     assert trace_sentence(traced(replace(found, before=none))).endswith("(valve overlap).")
 
