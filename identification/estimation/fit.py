@@ -44,7 +44,7 @@ from identification.estimation.structure_fit import (
     search_is_hopeless,
     searched,
 )
-from identification.estimation.surroundings import surrounding_estimates
+from identification.estimation.surroundings import surrounding_estimates, with_force_unsure
 from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
@@ -129,9 +129,10 @@ def fit_plant(
         return replace(fit, surroundings=beside)
     if beside.sampled:  # a measured current, which no period holds
         fit = replace(fit, command_period=0.0)
+    told = {**fit.estimates, **with_force_unsure(fit.estimates, beside, logs)}
     return replace(
         fit, surroundings=beside, effects=beside.effects,
-        estimates={**fit.estimates, **surrounding_estimates(beside)},
+        estimates={**told, **surrounding_estimates(beside)},
     )  # fmt: skip
 
 

@@ -59,12 +59,12 @@ def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) ->
         return explains(without - 1.0, with_it - 1.0)
 
     def believed(samples: float) -> bool:
-        """Whether a run bears the equation's lag out, or does well either way where the equation
-        hardly leaves anything with it."""
-        if follows(samples):
-            return True
+        """Whether a run bears the equation's lag out, or does well with one that explains most of
+        what the equation leaves."""
         without, with_it = lag_explains(logs, rig, found)
-        return explains_most(without**2, with_it**2) and max(left(0.0), left(samples)) <= FOLLOWED
+        if explains_most(without**2, with_it**2) and left(samples) <= FOLLOWED:
+            return True
+        return follows(samples)
 
     in_loop = not motor or any("r" in log for log in logs)
     if found.lag.value and in_loop and not believed(found.lag.value / h):

@@ -10,7 +10,7 @@ Sources: weak form, see `signals/weak_form`; gravity and constant force as terms
 dynamic model, Gautier, Khalil, CDC 1988.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -160,6 +160,35 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
             if p.name not in ("a", "b")
         }
     return known
+
+
+def with_force_unsure(
+    friction: Mapping[str, Estimate], around: Surroundings, logs: Sequence[Log]
+) -> dict[str, Estimate]:
+    """F_cp and F_cn, their intervals with what is unsure of a force that was taken out before them.
+
+    A constant force moves both by all of its error, gravity by the mean that its sine and cosine
+    have in motion that way.
+    """
+    moves = [np.diff(np.asarray(log["y"])) for log in logs]
+    angles = np.concatenate([np.asarray(log["y"])[1:] for log in logs])
+    up = np.concatenate(moves) > 0.0
+    out: dict[str, Estimate] = {}
+    for name, way in (("F_cp", up), ("F_cn", ~up)):
+        one = friction[name]
+        if one.value is None or one.sd is None or one.low is None or one.high is None:
+            continue
+        parts = [around.force.sd]
+        if np.any(way):
+            parts += [
+                size.sd * abs(float(np.mean(wave(angles[way]))))
+                for size, wave in ((around.sine, np.sin), (around.cosine, np.cos))
+            ]
+        more = float(np.linalg.norm(parts))
+        wider = float(np.hypot(one.sd, more)) / one.sd
+        low, high = (one.value + wider * (end - one.value) for end in (one.low, one.high))
+        out[name] = replace(one, sd=wider * one.sd, low=max(low, 0.0), high=high)
+    return out
 
 
 def lag_estimate(around: Surroundings) -> Estimate | None:

@@ -10,7 +10,11 @@ from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.regression.equation_rows import MECHANICAL
 from identification.estimation.surroundings import explains as explains_much
-from identification.estimation.surroundings import lag_explains, surrounding_estimates
+from identification.estimation.surroundings import (
+    lag_explains,
+    surrounding_estimates,
+    with_force_unsure,
+)
 from identification.estimation.turn_orders import orders_explain
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
@@ -39,7 +43,8 @@ def with_surroundings(
     logs as they were recorded.
     """
     plant = replace(of.plant, effects=(*of.plant.effects, *around.effects))
-    of = replace(of, plant=plant, surroundings=around)
+    after = {**of.parameters_after, **with_force_unsure(of.parameters_after, around, train)}
+    of = replace(of, plant=plant, surroundings=around, parameters_after=after)
     delay = tuple(one for one in around.effects if one.key == DELAY)
     for named, explain in ((delay, lag_explains), (around.cogging, orders_explain)):
         if not named:

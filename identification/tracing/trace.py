@@ -12,6 +12,7 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import NotIdentifiable
+from identification.estimation.imposed_motion import way_of
 from identification.estimation.late_position import what_acts_beside
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
@@ -30,7 +31,7 @@ from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
 from identification.tracing.judgement import Judgement, judgement
-from identification.tracing.model_errors import row_noise
+from identification.tracing.model_errors import errors_of, row_noise
 from identification.tracing.plain_model import plain_model
 from identification.tracing.predictive_check import predicts_worse
 from identification.tracing.recorded_rows import RecordedRows, recorded_rows
@@ -60,6 +61,9 @@ from identification.tracing.verdict import (
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
 MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing is proved"
+ONE_WAY_ALONE = (
+    "motion one way, in which nothing but cogging is told from friction and a constant force"
+)
 FOR_NOW = "for now, since the trace ended early"
 
 
@@ -88,6 +92,8 @@ def trace(
     still = bool(test) and not any(_slides(log, rig) for log in test)
     if still:  # nothing could be proved of an effect
         library = {}
+    if beside.orders and way_of(train, held=rig.kind == "motor") is not None:
+        return orders_alone(NotIdentifiable(ONE_WAY_ALONE), beside, *recorded_as, rig, rng)
     try:
         told = _traced(train, test, rig, library, rng, report, halt)
     except NotIdentifiable as refused:
@@ -118,12 +124,13 @@ def _traced(
     chosen = _chosen(train, rig, library, (begin, choose), report, halt)
     report("refitting", 0.0)
     found = refinement(chosen, report)
+    with halt.closing():
+        seen = [chosen.plain.rows.recorded.given(log) for log in test]
+        found, doubt = _proved(chosen, found, seen)
     report("settling", 0.0)
     chosen, found = settled_plain(chosen, found, settle, report)
     report("telling", 0.0)
     with halt.closing():
-        seen = [chosen.plain.rows.recorded.given(log) for log in test]
-        found, doubt = _proved(chosen, found, seen)
         judged = judgement(chosen, found, seen, rig)
         told = _told(chosen, found, judged, seen, halt.not_tried)
     return replace(told, remarks=(*told.remarks, doubt)) if doubt else told
@@ -141,8 +148,10 @@ def _proved(
     """The refinement, or the plain model where that predicts the held-out position better; and
     what to say of it."""
     plain, after = chosen.plain.model, found.model
-    if not (seen and found.choice.steps) or plain.imposed or after.imposed:
+    if not (seen and found.choice.steps):
         return found, ""
+    if plain.imposed or after.imposed:
+        return _proved_by_force(chosen, found, seen)
     worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
     if worse is None:
         return found, ""
@@ -153,6 +162,24 @@ def _proved(
         " noise): not named"
     )
     return Refinement(without_effects(chosen.plain, found.choice), plain), said
+
+
+def _proved_by_force(
+    chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
+) -> tuple[Refinement, str]:
+    """As `_proved` where a rig leads the body, whose force alone is predicted."""
+    plain, choice, rows = chosen.plain.model, found.choice, chosen.plain.rows
+    slowest, logs = choice.base[MECHANICAL].slowest, list(rows.logs)
+    was = errors_of(plain, slowest, (), logs, seen, rows.drive)["test"].force_rms
+    now = errors_of(found.model, slowest, choice.steps, logs, seen, rows.drive)["test"].force_rms
+    if was is None or now is None or now < was:
+        return found, ""
+    names = " and ".join(step.candidate.effect.key for step in choice.steps)
+    said = (
+        f"the equations call for {names}, but with it the force of the test logs is predicted no"
+        f" better ({was:.3g} -> {now:.3g}): not named"
+    )
+    return Refinement(without_effects(chosen.plain, choice), plain), said
 
 
 def _chosen(

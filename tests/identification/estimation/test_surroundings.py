@@ -1,12 +1,15 @@
 """Gravity, a constant force and columns of two instants are found, with what friction is beside."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
-from identification.estimation.surroundings import lag_estimate, surroundings
+from identification.estimation.surroundings import lag_estimate, surroundings, with_force_unsure
 from identification.log import Log, Rig
+from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.model.size import Size
@@ -113,3 +116,18 @@ def test_friction_is_told_beside_gravity() -> None:
     for name, true in (("m", 0.15), ("F_cp", 0.3), ("F_cn", 0.3)):
         assert fit.estimates[name].value == pytest.approx(true, rel=0.05), name
     assert [one.key for one in fit.effects] == ["gravity"]
+
+
+def test_what_is_unsure_of_a_force_taken_out_is_unsure_of_friction() -> None:
+    """A constant force moves both levels by all of its error, gravity by its mean that way."""
+    t = np.asarray(np.arange(4000) * 2e-3, dtype=np.float64)
+    log = Log("swing", {"t": t, "y": 0.3 * np.sin(t), "F": np.sin(t)})
+    one = Estimate(0.3, "N m", 0.001, 0.298, 0.302)
+    around = Surroundings(force=Size(1.0, 0.003), cosine=Size(0.1, 0.004), sine=Size(3.0, 0.001))
+    wider = with_force_unsure({"F_cp": one, "F_cn": replace(one, value=None)}, around, [log])
+    assert set(wider) == {"F_cp"}
+    sd = wider["F_cp"].sd
+    assert sd is not None and abs(sd - np.hypot(0.001, np.hypot(0.003, 0.004 * 0.98))) < 2e-4
+    low, high = wider["F_cp"].low, wider["F_cp"].high
+    assert low is not None and high is not None
+    assert abs(0.5 * (low + high) - 0.3) < 1e-12 and high - low > 0.004 * 4.5
