@@ -44,7 +44,7 @@ from identification.estimation.structure_fit import (
     search_is_hopeless,
     searched,
 )
-from identification.estimation.surroundings import surrounding_estimates, with_force_unsure
+from identification.estimation.surroundings import surrounding_estimates, widened_friction
 from identification.estimation.two_masses import of_two_masses, two_masses
 from identification.estimation.windowed_run.parameters import even
 from identification.estimation.windowed_run.refinement import RESCUES, Refit, refit
@@ -129,7 +129,7 @@ def fit_plant(
         return replace(fit, surroundings=beside)
     if beside.sampled:  # a measured current, which no period holds
         fit = replace(fit, command_period=0.0)
-    told = {**fit.estimates, **with_force_unsure(fit.estimates, beside, logs)}
+    told = {**fit.estimates, **widened_friction(fit.estimates, beside, logs)}
     return replace(
         fit, surroundings=beside, effects=beside.effects,
         estimates={**told, **surrounding_estimates(beside)},
@@ -275,9 +275,9 @@ def finished(
 
 
 def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
-    """The fit, or that of the equation of motion alone where the fit leaves clearly more of that
-    equation than least squares do, on stretches that these have not seen, and its run is not
-    followed, or so little of the noise is in the equation that it sees more than the run."""
+    """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
+    equation than least squares do on stretches that they have not seen: its run is not followed,
+    or only down to a noise that the equation averages out."""
     if fit.effects:
         return fit
     left = left_by(fit.friction, recorded)

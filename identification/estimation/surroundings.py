@@ -162,7 +162,7 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
     return known
 
 
-def with_force_unsure(
+def widened_friction(
     friction: Mapping[str, Estimate], around: Surroundings, logs: Sequence[Log]
 ) -> dict[str, Estimate]:
     """F_cp and F_cn, their intervals with what is unsure of a force that was taken out before them.

@@ -13,7 +13,7 @@ from identification.estimation.surroundings import explains as explains_much
 from identification.estimation.surroundings import (
     lag_explains,
     surrounding_estimates,
-    with_force_unsure,
+    widened_friction,
 )
 from identification.estimation.turn_orders import orders_explain
 from identification.log import Log, Rig
@@ -43,7 +43,7 @@ def with_surroundings(
     logs as they were recorded.
     """
     plant = replace(of.plant, effects=(*of.plant.effects, *around.effects))
-    after = {**of.parameters_after, **with_force_unsure(of.parameters_after, around, train)}
+    after = {**of.parameters_after, **widened_friction(of.parameters_after, around, train)}
     of = replace(of, plant=plant, surroundings=around, parameters_after=after)
     delay = tuple(one for one in around.effects if one.key == DELAY)
     for named, explain in ((delay, lag_explains), (around.cogging, orders_explain)):

@@ -7,7 +7,7 @@ import pytest
 
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
-from identification.estimation.surroundings import lag_estimate, surroundings, with_force_unsure
+from identification.estimation.surroundings import lag_estimate, surroundings, widened_friction
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.karnopp import Karnopp
@@ -124,7 +124,7 @@ def test_what_is_unsure_of_a_force_taken_out_is_unsure_of_friction() -> None:
     log = Log("swing", {"t": t, "y": 0.3 * np.sin(t), "F": np.sin(t)})
     one = Estimate(0.3, "N m", 0.001, 0.298, 0.302)
     around = Surroundings(force=Size(1.0, 0.003), cosine=Size(0.1, 0.004), sine=Size(3.0, 0.001))
-    wider = with_force_unsure({"F_cp": one, "F_cn": replace(one, value=None)}, around, [log])
+    wider = widened_friction({"F_cp": one, "F_cn": replace(one, value=None)}, around, [log])
     assert set(wider) == {"F_cp"}
     sd = wider["F_cp"].sd
     assert sd is not None and abs(sd - np.hypot(0.001, np.hypot(0.003, 0.004 * 0.98))) < 2e-4
