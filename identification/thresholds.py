@@ -77,6 +77,7 @@ VANISHED = 0.99  # of its value, that a mass or friction parameter loses where i
 # What the equation of motion's own least squares are to a fit (real.py).
 WORSE_THAN_EQUATION = 1.05  # times what they leave of the force unseen, that a fit may leave
 CONTRADICTS_EQUATION = 1.3  # the same, from which a run's nearness to the log does not matter
+BEYOND_EQUATION = 0.01  # of the Coulomb level, left beyond it by a run followed to the noise
 RUN_ASTRAY = 0.02  # of the travel, that a run is off by (rms), from which the equation decides
 MOST_UNEXPLAINED = 0.5  # of the force that a model leaves, beyond which none of its numbers holds
 

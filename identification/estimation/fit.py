@@ -57,6 +57,7 @@ from identification.signals.check import check_driven
 from identification.thresholds import (
     ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
+    BEYOND_EQUATION,
     COMPLETE,
     CONTRADICTS_EQUATION,
     NO_RUN,
@@ -285,9 +286,13 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
         return fit
     travel = max(float(np.ptp(log["y"])) for log in recorded.plain)
     off = max(one.position_rms for one in fit.logs)
-    astray = fit.adequate or goes_astray(off, travel)
-    astray = astray and bends_the_equation(left[0], left[1])
-    if astray or contradicts_the_equation(left[0], left[1]):
+    if fit.adequate:
+        level = max(fit.friction.F_cp, fit.friction.F_cn)
+        wrong = bends_the_equation(left[0], left[1]) and is_material(left[0], left[1], level)
+    else:
+        wrong = goes_astray(off, travel) and bends_the_equation(left[0], left[1])
+        wrong = wrong or contradicts_the_equation(left[0], left[1])
+    if wrong:
         fit = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY) or fit
     share = min(left[0], left[1]) / left[2]
     return untold(fit, share) if is_unexplained(share) else fit
@@ -320,6 +325,11 @@ def bends_the_equation(left: float, by_equation: float) -> bool:
 def contradicts_the_equation(left: float, by_equation: float) -> bool:
     """Whether a fit leaves so much more force that its run follows something else, however near."""
     return left > CONTRADICTS_EQUATION * by_equation
+
+
+def is_material(left: float, by_equation: float, coulomb: float) -> bool:
+    """Whether what a fit leaves beyond the equation of motion is of account beside friction."""
+    return left**2 - by_equation**2 > (BEYOND_EQUATION * coulomb) ** 2
 
 
 def goes_astray(off: float, travel: float) -> bool:

@@ -30,6 +30,7 @@ from identification.estimation.fit import (
     bends_the_equation,
     contradicts_the_equation,
     goes_astray,
+    is_material,
     is_no_run,
     leaves_much,
 )
@@ -864,6 +865,11 @@ def test_hides() -> None:
 def test_levels_leave() -> None:
     assert explains_the_day(1.6, 1.25, 1.0) and not explains_the_day(1.6, 1.3, 1.0)
     assert not explains_the_day(4.0, 1.6, 1.0)
+
+
+def test_beyond_equation() -> None:
+    """What a followed run leaves beyond the equation counts where friction would feel it."""
+    assert is_material(0.015, 0.009, 1.0) and not is_material(0.015, 0.0115, 1.0)
 
 
 def test_lag_leaves() -> None:
