@@ -35,6 +35,7 @@ from identification.thresholds import MOST_UNEXPLAINED, OTHER_WAY, SPEEDS_APART
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
+WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
@@ -96,7 +97,7 @@ def _made(
     samples = np.tile(center, (NORMAL_SETS, 1))
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
-    nine = _assumed(center, firsts, float(min(np.min(part.speed, initial=np.inf) for part in rows)))
+    nine = _assumed(center, firsts)
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -292,18 +293,15 @@ def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     )
 
 
-def _assumed(center: Array, firsts: Sequence[FirstEstimate], slowest: float) -> Array:
-    """All nine for simulation: the five of sliding kept to their signs, stick just above slip.
-
-    slowest: speed [m/s] of sliding that the equation has been held against, which no band hides.
-    """
+def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
+    """All nine for simulation: the five of sliding kept to their signs, stick just above slip."""
     nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
     m = center[0] if center[0] > 0 else nine[0]
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
     fastest = float(np.median([float(np.max(np.abs(f.motion.v))) for f in firsts]))
-    edge = np.minimum(nine[5:7], min(0.1 * fastest, slowest))
+    edge = np.minimum(nine[5:7], WIDEST_ASSUMED * fastest)
     stick = coulomb + viscous * edge
     return np.array([m, *coulomb, *viscous, edge[0], -edge[1], stick[0], -stick[1]])
 
