@@ -14,6 +14,8 @@ ADEQUATE = 1.5  # hardly more than noise: a fit is adequate, a structure found i
 FOLLOWED = 2.0  # a stop lost here or there: the structure still follows the log
 ASTRAY = 3.0  # something is missing, or a measured force's noise has walked as far
 NEARLY_FOLLOWED = 8.0  # not followed, but near; beyond, a plain plant's sets are averaged
+LUCKY_WINDOWS = 0.15  # of a free motor's windows, that luck may have spoilt
+FORGIVEN_FROM = 4  # windows, of which luck may have spoilt one
 NO_RUN = 50.0  # a run by the measured force is not the body's own motion
 LIKE = 4.0  # times the misfit of the model in force, where that leaves more than noise
 
@@ -96,6 +98,8 @@ BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to
 
 # What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
+NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
+SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 GATE_MARGIN = 3.0  # times the information's deviation, that a log is said to tell a parameter by

@@ -18,14 +18,13 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
 from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
-from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
+from identification.thresholds import EVENTS_NEEDED, NOTHING_OF, WIDEST_SD
 
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
-NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "held at its default: the logs call for no other value"
 SILENT = "no interval: nothing that these logs show changes with it"

@@ -130,11 +130,10 @@ def fit_plant(
         return replace(fit, surroundings=beside)
     if beside.sampled:  # a measured current, which no period holds
         fit = replace(fit, command_period=0.0)
-    told = {**fit.estimates, **widened_friction(fit.estimates, beside, logs)}
+    told = widened_friction(fit.estimates, beside, logs) | surrounding_estimates(beside)
     return replace(
-        fit, surroundings=beside, effects=beside.effects,
-        estimates={**told, **surrounding_estimates(beside)},
-    )  # fmt: skip
+        fit, surroundings=beside, effects=beside.effects, estimates={**fit.estimates, **told}
+    )
 
 
 def _fit(

@@ -11,10 +11,9 @@ from identification.effects._base import Effect
 from identification.model.estimates import Estimate
 from identification.model.plant import Plant
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
+from identification.thresholds import SMALLEST_LEVEL
 
 TraceVerdict = Literal["none", "effect", "drift", "unknown", "inseparable"]
-
-SMALLEST_LEVEL = 1e-3  # of what is left of the force, of friction that nothing is a share of
 
 
 @dataclass(frozen=True)
@@ -161,6 +160,11 @@ class Trace:
         """Root mean square force that a model lacks beyond the sensors' noise, as a share of the
         Coulomb level; None where no force error was seen, or nothing rubs."""
         level = max(self.plant.friction.F_cp, self.plant.friction.F_cn)
-        if errors.force_rms is None or not level > SMALLEST_LEVEL * errors.force_rms:
+        if errors.force_rms is None or not rubs(level, errors.force_rms):
             return None
         return float(np.sqrt(max(errors.force_rms**2 - self.noise_force**2, 0.0)) / level)
+
+
+def rubs(level: float, left: float) -> bool:
+    """Whether a Coulomb level [N] is enough for what is left of the force to be a share of it."""
+    return level > SMALLEST_LEVEL * left

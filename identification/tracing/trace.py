@@ -155,31 +155,34 @@ def _proved(
     worse = predicts_worse(plain.plant, after.plant, seen, chosen.plain.rows.drive)
     if worse is None:
         return found, ""
-    names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
-    said = (
-        f"the equations call for {names}, but with it the position of the test logs is predicted"
-        f" worse over {worse.seconds:g} s ({worse.before:.3g} -> {worse.after:.3g} times its"
-        " noise): not named"
-    )
-    return Refinement(without_effects(chosen.plain, found.choice), plain), said
+    return _unproved(
+        chosen, found,
+        f"position of the test logs is predicted worse over {worse.seconds:g} s"
+        f" ({worse.before:.3g} -> {worse.after:.3g} times its noise)",
+    )  # fmt: skip
 
 
 def _proved_by_force(
     chosen: Selection, found: Refinement, seen: Sequence[MotionLog]
 ) -> tuple[Refinement, str]:
     """As `_proved` where a rig leads the body, whose force alone is predicted."""
-    plain, choice, rows = chosen.plain.model, found.choice, chosen.plain.rows
+    choice, rows = found.choice, chosen.plain.rows
     slowest, logs = choice.base[MECHANICAL].slowest, list(rows.logs)
-    was = errors_of(plain, slowest, (), logs, seen, rows.drive)["test"].force_rms
-    now = errors_of(found.model, slowest, choice.steps, logs, seen, rows.drive)["test"].force_rms
+    was, now = (
+        errors_of(model, slowest, steps, logs, seen, rows.drive)["test"].force_rms
+        for model, steps in ((chosen.plain.model, ()), (found.model, choice.steps))
+    )
     if was is None or now is None or now < was:
         return found, ""
-    names = " and ".join(step.candidate.effect.key for step in choice.steps)
-    said = (
-        f"the equations call for {names}, but with it the force of the test logs is predicted no"
-        f" better ({was:.3g} -> {now:.3g}): not named"
-    )
-    return Refinement(without_effects(chosen.plain, choice), plain), said
+    said = f"force of the test logs is predicted no better ({was:.3g} -> {now:.3g})"
+    return _unproved(chosen, found, said)
+
+
+def _unproved(chosen: Selection, found: Refinement, said: str) -> tuple[Refinement, str]:
+    """The plain model in place of effects that do not carry over, and what to say of it."""
+    names = " and ".join(step.candidate.effect.key for step in found.choice.steps)
+    plain = Refinement(without_effects(chosen.plain, found.choice), chosen.plain.model)
+    return plain, f"the equations call for {names}, but with it the {said}: not named"
 
 
 def _chosen(

@@ -13,7 +13,7 @@ import pytest
 from scipy.stats import norm
 
 from identification import thresholds
-from identification.arrays import Array
+from identification.arrays import Array, IntArray
 from identification.drift.drift_test import DriftSettings, at_bound, too_coarse
 from identification.drift.log_estimate import LogEstimate, allowed_misfit
 from identification.drift.mewma import Mean
@@ -24,7 +24,7 @@ from identification.drift.single_log import seen_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.estimation import contradicted
-from identification.estimation.estimates import Events, estimates
+from identification.estimation.estimates import Events, estimates, normal_samples
 from identification.estimation.fit import (
     are_few,
     bends_the_equation,
@@ -61,6 +61,7 @@ from identification.estimation.surroundings import (
 from identification.estimation.turn_orders import are_most, is_sure, turns
 from identification.estimation.two_masses import are_two, shows_a_load
 from identification.estimation.walking_residual import walk_size
+from identification.estimation.windowed_run.run_errors import mean_loss
 from identification.estimation.windowed_run.windows import Freed, Starts
 from identification.experiment import identifiability
 from identification.experiment.information import Information
@@ -110,7 +111,7 @@ from identification.tracing.regression.stepwise import (
     merit,
 )
 from identification.tracing.remaining_structure import in_pieces, is_slight, too_much
-from identification.tracing.result import Dependence, Errors
+from identification.tracing.result import Dependence, Errors, rubs
 from identification.tracing.structure_search import useless
 from identification.tracing.verdict import is_headline, other_law
 from tests.identification.motor_logs import K_A, NOISE, H, made, plant, seen
@@ -893,6 +894,38 @@ def test_resonance_apart() -> None:
 def test_other_way() -> None:
     assert is_one_way(0.015) and is_one_way(0.985)
     assert not is_one_way(0.03) and not is_one_way(0.5)
+
+
+def test_lucky_windows() -> None:
+    """Of twenty windows three may be lost to luck, and no more."""
+    assert mean_loss(*lost_windows(20, 3)) < 1.5 and mean_loss(*lost_windows(20, 4)) > 2.0
+
+
+def test_forgiven_from() -> None:
+    """Of four windows one may be, of three none."""
+    assert mean_loss(*lost_windows(4, 1)) < 1.5 and mean_loss(*lost_windows(3, 1)) > 2.0
+
+
+def lost_windows(windows: int, lost: int) -> tuple[Array, IntArray]:
+    """Errors of so many windows, of which some are far off, and the window of each."""
+    errors, window = np.ones(100 * windows), np.repeat(np.arange(windows), 100)
+    errors[window < lost] = 100.0
+    return errors, window.astype(np.int64)
+
+
+def test_nothing_of() -> None:
+    """A Coulomb level that is next to none of the force is not told, however narrow."""
+    happened = Events((9, 9), (9, 9), (900, 900), (1.0, 1.0), force=10.0)
+    for level, told in ((1.5e-3, True), (0.7e-3, False)):
+        values = np.array([level])
+        samples = normal_samples(values, 0.01 * values)
+        found = estimates(("F_cp",), values, samples, happened, Rig("force"), "log")
+        assert (found["F_cp"].value is not None) is told
+
+
+def test_smallest_level() -> None:
+    """What is left of the force is a share of friction only where something rubs."""
+    assert rubs(1.5e-3, 1.0) and not rubs(0.7e-3, 1.0)
 
 
 def test_every_threshold_has_a_test() -> None:

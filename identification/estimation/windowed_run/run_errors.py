@@ -20,11 +20,9 @@ from identification.estimation.windowed_run.windows import (
 )
 from identification.model.estimates import Drive
 from identification.model.plant import Plant
-from identification.thresholds import FOLLOWED
+from identification.thresholds import FOLLOWED, FORGIVEN_FROM, LUCKY_WINDOWS
 
 NOISE_LOSS = 0.8732  # mean robust square of white noise of unit variance
-LUCKY_WINDOWS = 0.15  # of the windows, that luck may have spoilt
-FORGIVEN_FROM = 4  # windows, of which luck may have spoilt one
 CANNOT_BE_FOLLOWED = 1e6  # error of a run that cannot be followed
 ROBUST_FROM = 3.0  # residual in noise units from which it counts less
 Judge = Callable[[Plant], Array]
