@@ -271,10 +271,10 @@ def finished(
     except Halted:
         with recorded.halt.closing():
             fit = settled(found.plant, recorded, found.misfit, settle, report, quick=True)
-    return _on_the_floor(fit, recorded, other)
+    return on_the_floor(fit, recorded, other)
 
 
-def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
+def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generator) -> KarnoppFit:
     """The fit, or that of the equation of motion alone, where the fit leaves clearly more of that
     equation than least squares do on stretches that they have not seen: its run is not followed,
     or only down to a noise that the equation averages out."""
@@ -292,7 +292,9 @@ def _on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Genera
         wrong = goes_astray(off, travel) and bends_the_equation(left[0], left[1])
         wrong = wrong or contradicts_the_equation(left[0], left[1])
     if wrong:
-        fit = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY) or fit
+        other = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY)
+        # A run that is followed to the noise lacks nothing, whatever tells its numbers.
+        fit = fit if other is None else replace(other, adequate=fit.adequate)
     share = min(left[0], left[1]) / left[2]
     return untold(fit, share) if is_unexplained(share) else fit
 

@@ -1,6 +1,8 @@
 """The nine-parameter fit on logs of known plants, and its honesty where a log is silent."""
 
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +15,7 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.structure_fit import FittedStructure, plain_structure
 from identification.estimation.windowed_run.refinement import Refit
 from identification.log import Log, Rig
-from identification.model.estimates import KarnoppFit
+from identification.model.estimates import KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from tests.identification.plants import ACTUATOR, made_log, table
@@ -213,3 +215,34 @@ def test_refusals() -> None:
     alone = Log("alone", {key: log[key] for key in ("t", "y", "F")})
     with pytest.raises(BadLog, match="no command u"):
         fit_plant([alone], rng, rig=FORCE, drive="command")
+
+
+@dataclass(frozen=True)
+class Told:
+    """What is asked of a fit before the equation of motion takes its place."""
+
+    friction: Karnopp
+    adequate: bool
+    name: str
+    logs: tuple[LogFit, ...]
+    effects: tuple[()] = ()
+
+
+@pytest.mark.parametrize(("adequate", "left", "by"), [
+    (True, 2.0, "equation"),  # more than 1 % of the Coulomb level beyond it
+    (True, 1.02, "run"),
+    (False, 2.0, "equation"),
+])  # fmt: skip
+def test_the_equation_takes_the_place_of_a_run_that_leaves_more_of_it(
+    monkeypatch: pytest.MonkeyPatch, adequate: bool, left: float, by: str
+) -> None:
+    """Where the run is followed to the noise, nothing is missing beside the equation's numbers."""
+    log = made_log(table(1), seconds=0.5)
+    near = LogFit("made", (0.0, 0.0, 0.0), 1e-9, None, 1.0)
+    run: Any = Told(table(1), adequate, "run", (near,))
+    other = replace(run, adequate=False, name="equation")
+    recorded: Any = SimpleNamespace(plain=[log])
+    monkeypatch.setattr(fitting, "left_by", lambda *_: (left, 1.0, 100.0))
+    monkeypatch.setattr(fitting, "_by_equation", lambda *_: other)
+    found: Any = fitting.on_the_floor(run, recorded, np.random.default_rng(0))
+    assert (found.name, found.adequate) == (by, adequate)
