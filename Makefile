@@ -10,6 +10,10 @@ NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
+# Where Python may not keep its bytecode, each of some hundred processes compiles scipy, numba and
+# the rest anew: 7 s every time.
+export PYTHONDONTWRITEBYTECODE :=
+
 # uv installs five times as fast as pip, which does it where uv cannot.
 UV := $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constraints.txt
 install = $(UV) $(1) 2>/dev/null || $(PIP) install --constraint constraints.txt $(1)
