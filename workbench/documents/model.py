@@ -260,9 +260,15 @@ class Model(ModelFile):
         return float(f"{min(entry.period or entry.h for entry in self.log):.4g}")
 
     @property
-    def imposed(self) -> bool:
-        """Whether the logged motion was imposed, so that only the force equation was fitted."""
+    def by_equation(self) -> bool:
+        """Whether the equation of motion was fitted alone, since no free run follows the logs."""
         return all(entry.position_rms is None for entry in self.log)
+
+    @property
+    def imposed(self) -> bool:
+        """Whether a rig led the body along a path: no drive of its own shows in the logs."""
+        driven = self.rig.kind == "motor" or self.actuator is not None
+        return self.by_equation and not driven
 
     @property
     def present(self) -> Present | None:

@@ -123,7 +123,7 @@ def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
     for log in logs:
         window = WINDOW if log.duration >= 2 * WINDOW else None
         one = predict(model, log, drive=drive, window=window)
-        position = None if model.imposed else one.position_rms
+        position = None if model.by_equation else one.position_rms
         found.append((len(log), position, one.force_predicted_rms))
     return HeldOut(
         _pooled([(n, position) for n, position, _ in found]),

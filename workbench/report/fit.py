@@ -52,8 +52,8 @@ def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
 
 def _caption(model: Model) -> str:
     inverse = " The model's force is that of the inverse model: what this motion needs."
-    if model.imposed:
-        return f"The motion is imposed, so no position is simulated.{inverse}"
+    if model.by_equation:
+        return f"No free run follows these logs, so no position is simulated.{inverse}"
     if model.fit.drive == "command":
         return (
             "The model is driven by the logged command alone, from the start of the log; it never"

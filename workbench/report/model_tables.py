@@ -187,7 +187,7 @@ def fit_lines(model: Model) -> list[str]:
         for e in model.log
         if e.position_rms is not None
     ]
-    if model.imposed:
+    if model.by_equation:
         lines.append("the equation of motion was fitted, not a free run")
     if model.fit.force_relative is not None and model.resonance is None:  # of one body
         share = 100 * model.fit.force_relative

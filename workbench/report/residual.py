@@ -93,8 +93,8 @@ def _force_residual(model: Model, log: Log) -> tuple[Array, Array]:
 
 
 def _caption(model: Model) -> str:
-    if model.imposed:
-        return "No position is simulated where the motion is imposed; this is the force's residual."
+    if model.by_equation:
+        return "No free run follows these logs: this is what the equation of motion leaves."
     if model.fit.adequate:
         how = times(float(np.sqrt(model.fit.chi_square)))
         return f"What is left is {how} the sensors' noise: nothing is missing."

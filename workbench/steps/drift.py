@@ -122,7 +122,7 @@ def model_in_force(model: Model, key: str) -> InForce:
         rig=model.rig,
         drive=model.fit.drive,
         chi_square=model.fit.chi_square,
-        imposed=model.imposed,
+        imposed=model.by_equation,
         untold=untold,
         key=key,
         fastest=max((entry.speed or 0.0 for entry in model.log), default=0.0),

@@ -233,9 +233,9 @@ def as_driven(model: Model, log: Log, drive: Drive) -> Log:
 def fitted_run(model: Model, log: Log, index: int) -> FreeRun | None:
     """The run that the fit compared with one of its logs: from its start, coupled as it was.
 
-    None where the motion was imposed: then no run was compared.
+    None where the equation of motion was fitted alone.
     """
-    if model.imposed:
+    if model.by_equation:
         return None
     drive = model.fit.drive
     restarts = _restarts(log, FORCE_WINDOW) if drive == "force" else None
