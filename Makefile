@@ -8,6 +8,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 PYTEST := $(BIN)/pytest -n $(WORKERS) --no-loadscope-reorder
 NEEDED := import sys; v = sys.version_info; v >= (3, 11) or sys.exit( \
 	f"Python {v[0]}.{v[1]} found, 3.11 or newer needed: make PYTHON=python3.12 ...")
+KERNELS := $(shell find identification design -name '*.py')
 BENCHMARKS := $(filter-out benchmarks/_%,$(wildcard benchmarks/*.py))
 
 # Where Python may not keep its bytecode, each of some hundred processes compiles scipy, numba and
@@ -60,8 +61,11 @@ types: environment
 floors: environment
 	$(BIN)/lint-imports
 
-kernels: environment
+kernels: $(VENV)/.kernels
+
+$(VENV)/.kernels: $(VENV)/.installed-dev $(KERNELS)
 	$(BIN)/python tools/compile_kernels.py
+	touch $@
 
 tests: environment
 	$(PYTEST) --dist loadfile -m "not slow and not verdicts and not method"

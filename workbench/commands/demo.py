@@ -43,6 +43,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     from workbench.report.trace import trace_report
     from workbench.report.validation_tables import missed
     from workbench.steps.demo import demonstrate
+    from workbench.steps.kernels_ahead import servo_compiled_ahead
     from workbench.steps.trace import trace_document
     from workbench.steps.validate import validation_document
 
@@ -50,7 +51,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     with OutputFolder("demo", out, now=datetime.now()) as folder:
         with progress("demo", 1.0, as_json=as_json) as bar:
             course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
-            with moving(course):
+            with moving(course), servo_compiled_ahead():
                 found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
         folder.write_json("trace.json", trace_document(traced))
