@@ -36,7 +36,7 @@ from identification.estimation.recorded_logs import (
     led_by_rig,
     recorded_logs,
 )
-from identification.estimation.regression.equation_rows import MotionLog
+from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
@@ -295,8 +295,16 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generat
         other = _by_equation(recorded, rng, SURER_WHY if fit.adequate else FLOOR_WHY)
         # A run that is followed to the noise lacks nothing, whatever tells its numbers.
         fit = fit if other is None else replace(other, adequate=fit.adequate)
+    elif not fit.adequate:  # of a run that is not followed, windows may tell next to nothing
+        other = _by_equation(recorded, rng, FLOOR_WHY)
+        fit = other if other is not None and _told(other) > _told(fit) else fit
     share = min(left[0], left[1]) / left[2]
     return untold(fit, share) if is_unexplained(share) else fit
+
+
+def _told(fit: KarnoppFit) -> int:
+    """How many of mass and sliding friction a fit tells."""
+    return sum(fit.estimates[name].value is not None for name in FIVE)
 
 
 def by_equation_if_surer(

@@ -1,7 +1,6 @@
 """The likelihood by which a fit was settled, with its noise and bounds, for a walk around the fit.
 
-The same four ways as of the fit: white noise over whole runs, its level taken from what is left;
-where a plain run leaves more than noise, so many independent samples as its correlation grants;
+The same three ways as of the fit: white noise over whole runs, its level taken from what is left;
 windows from measured states, whose uncertainty is integrated out, and with it the walk of a
 measured force; the rows of the force equation where the motion is imposed. Priors are flat.
 """
@@ -16,17 +15,14 @@ from identification.estimation.contradicted import corrected
 from identification.estimation.imposed_motion import force_fit
 from identification.estimation.likely_windows import LikelyWindows
 from identification.estimation.plain_search.likely_sets import (
-    granted_samples,
     log_cost,
     reweighed,
-    trusted_box,
 )
 from identification.estimation.plain_search.local_search import Optimum, pack, refine
-from identification.estimation.plain_search.problem import Problem
 from identification.estimation.plain_search.search import opened
 from identification.estimation.plain_search.search_bounds import Box
 from identification.estimation.recorded_logs import RecordedLogs, recorded_logs
-from identification.estimation.settling import BETWEEN, kernel_row, nearest, posed
+from identification.estimation.settling import BETWEEN, nearest, posed
 from identification.estimation.windowed_run.parameters import values_of
 from identification.estimation.windowed_run.run_errors import misfit
 from identification.estimation.windowed_run.windows import walks
@@ -34,12 +30,11 @@ from identification.log import Log, Rig
 from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Plant
-from identification.thresholds import ADEQUATE, FOLLOWED, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, FOLLOWED
 
 LOOKED_FOR = 3  # rounds in which a fit's bad samples are looked for again, as in the fit
 ROOM = 4.0  # times the search's box, in which parameters of a whole run may lie
 WHOLE_RUNS = "the run over the whole of each log"
-LIKELY_SETS = "the run over the whole of each log, of which more than noise is left"
 IN_WINDOWS = "the run in windows from measured states"
 BY_FORCE = "the force equation"
 
@@ -75,13 +70,10 @@ def likelihood_of(fit: KarnoppFit, logs: Sequence[Log], rig: Rig) -> Likelihood:
         recorded = corrected(plant, recorded, left).recorded
         left = misfit(plant, recorded.logs, recorded.drive)
     walking = any(walks(one, recorded.drive) and not one.held for one in recorded.logs)
-    if recorded.drive == "command" and not plant.effects and not walking:
-        if left <= FOLLOWED:
-            found = _over_whole_runs(plant, recorded)
-            if found is not None:
-                return found
-        elif left > NEARLY_FOLLOWED:
-            return _over_likely_sets(plant, recorded)
+    if recorded.drive == "command" and not plant.effects and not walking and left <= FOLLOWED:
+        found = _over_whole_runs(plant, recorded)
+        if found is not None:
+            return found
     return _over_windows(fit, plant, recorded)
 
 
@@ -95,39 +87,17 @@ def _over_whole_runs(plant: Plant, recorded: RecordedLogs) -> Likelihood | None:
     runs = [reweighed(run, optimum.p) for run in optimum.runs(problem.long_runs)]
     optimum = refine(runs, optimum.p, problem.free)
     box = _around(problem.box.wider(ROOM), optimum)
-    return _of_runs(problem, optimum, box, None, WHOLE_RUNS)
-
-
-def _over_likely_sets(plant: Plant, recorded: RecordedLogs) -> Likelihood:
-    """So many independent samples of the misfit as its correlation leaves."""
-    problem = posed(recorded)
-    box = trusted_box(problem)
-    row = kernel_row(problem, plant)
-    row[box.free] = box.moved_inside(row[np.newaxis, box.free])[0]
-    optimum = refine(problem.long_runs, row, problem.free)
-    granted = granted_samples(problem, optimum)
-    # A misfit's curvature counts each sample; walkers spread from there to what is granted.
-    wider = replace(optimum, covariance=optimum.covariance * optimum.cost / granted)
-    return _of_runs(problem, wider, _around(box, optimum), granted, LIKELY_SETS)
+    names = tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free)
+    return Likelihood(
+        names, pack(runs, optimum.p, optimum.starts, optimum.free), optimum.covariance,
+        log_cost(runs, optimum, box), np.zeros(len(names)), WHOLE_RUNS,
+    )  # fmt: skip
 
 
 def _around(box: Box, optimum: Optimum) -> Box:
     """The box with the optimum in it, which a refinement may have led out of it."""
     size = np.abs(optimum.p[box.free])
     return replace(box, low=np.minimum(box.low, 0.5 * size), high=np.maximum(box.high, 2.0 * size))
-
-
-def _of_runs(
-    problem: Problem, optimum: Optimum, box: Box, granted: float | None, way: str
-) -> Likelihood:
-    runs = problem.long_runs
-    if granted is None:
-        runs = tuple(reweighed(run, optimum.p) for run in optimum.runs(problem.long_runs))
-    names = tuple((*NAMES, "k1", "k2")[int(i)] for i in problem.free)
-    return Likelihood(
-        names, pack(runs, optimum.p, optimum.starts, optimum.free), optimum.covariance,
-        log_cost(problem, runs, optimum, box, granted), np.zeros(len(names)), way,
-    )  # fmt: skip
 
 
 def _over_windows(fit: KarnoppFit, plant: Plant, recorded: RecordedLogs) -> Likelihood:

@@ -1,9 +1,8 @@
 """The last step of a fit: from a plant that follows the logs to values, intervals and reasons.
 
 Where a plain plant follows whole runs by the command down to the sensors' noise, nothing tells
-more than they do: their likelihood has the last word. Where it leaves much more than noise whatever
-its parameters are, the mean of all that do about as well is given. Everywhere else (driven by a
-measured force, by a command with noise of its own, with effects) runs in windows from measured
+more than they do: their likelihood has the last word. Everywhere else (more than noise is left, it
+is driven by a measured force or a noisy command, or has effects) runs in windows from measured
 states tell, and by how much one window differs from the next.
 """
 
@@ -23,7 +22,6 @@ from identification.estimation.estimates import (
 )
 from identification.estimation.plain_search.likely_sets import (
     Solution,
-    weigh_misfit,
     weigh_noise,
 )
 from identification.estimation.plain_search.local_search import Optimum, refine
@@ -55,13 +53,12 @@ from identification.remarks import Aside
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
-from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED, NEARLY_FOLLOWED
+from identification.thresholds import ADEQUATE, COMPLETE, FOLLOWED
 
 # Relative deviations that the force between its samples adds where it drives the run (where it
 # corrects one, so much less as its gain squared), by name;
 # from the errors seen on simulated logs without a command (benchmarks/nine_parameters.py).
 BETWEEN = dict(zip(NAMES, (1e-3, 1e-3, 1e-3, 5e-4, 5e-4, 1e-2, 1e-2, 3e-3, 3e-3), strict=True))
-SPREAD = 0.15  # of the search's box, in which sets that do about as well are looked for
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +91,6 @@ def settled(
     spread = None
     if exact and misfit <= FOLLOWED:
         spread = _over_whole_runs(plant, recorded, rng, report)
-    elif exact and misfit > NEARLY_FOLLOWED:
-        spread = _over_likely_sets(plant, recorded, rng, report)
     if spread is None:
         spread = _over_windows(plant, recorded, misfit, rng, refined)
     return _told(spread, recorded)
@@ -127,22 +122,6 @@ def nearest(problem: Problem, plant: Plant) -> Optimum:
     # Its start first, or the first step goes astray.
     begun = refine(problem.long_runs, row, problem.free[:0])
     return refine(begun.runs(problem.long_runs), row, problem.free)
-
-
-def _over_likely_sets(
-    plant: Plant, recorded: RecordedLogs, rng: np.random.Generator, report: Progress
-) -> Spread:
-    """By the mean over all sets that explain whole runs about as well."""
-    # Begun in the measured state: a fitted one would take up what the model lacks.
-    problem = posed(recorded)
-    box = problem.box.wider(2.0)
-    row = kernel_row(problem, plant)
-    row[box.free] = box.moved_inside(row[np.newaxis, box.free])[0]
-    optimum = refine(problem.long_runs, row, problem.free, cap=problem.cap)
-    optimum = refine(optimum.runs(problem.long_runs), optimum.p, problem.free)
-    members = box.rows(box.around(row, 64, SPREAD, rng))
-    solution = weigh_misfit(problem, optimum, members, rng, optimum.evaluations, report)
-    return _of_solution(problem, solution)
 
 
 def posed(recorded: RecordedLogs) -> Problem:

@@ -20,7 +20,7 @@ from identification.simulation.karnopp_step import DV_N, DV_P, F_CN, F_CP, F_SN,
 TRIALS = WIDTH - 1
 FREEDOM = 8.0  # degrees of freedom of the sampling t-distribution
 CLOUD = 256
-REFINE_ROUNDS = 12
+REFINE_ROUNDS = 40
 MANY_RUNS = 16  # runs from which their own unknowns are eliminated one by one
 SETTLED_SHARE = 0.2  # effective share of a cloud that ends the sampling
 STEP_WIDTHS = (0.01, 0.1, 1.0, 10.0)  # widths of the last differences, in the usual one
