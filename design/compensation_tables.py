@@ -66,9 +66,9 @@ class SlidingFriction:
 
     @property
     def constant_share(self) -> float:
-        """Mean of half the difference of the two ways [N]: what a constant force could hold."""
-        v = self.speeds
-        return float(np.mean(self.positive(v) - self.negative(v))) / 2.0
+        """The constant force [N] that leaves the least of half the difference of the two ways."""
+        half = 0.5 * (self.positive(self.speeds) - self.negative(self.speeds))
+        return 0.5 * float(np.max(half) + np.min(half))
 
     def _one(self, v: Array, way: int) -> Array:
         v = np.abs(np.asarray(v, dtype=np.float64))

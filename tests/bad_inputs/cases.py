@@ -426,13 +426,15 @@ def _using(name: str, path: str, shop: Shop, number: int) -> list[str]:
     if name == "design":
         targets = [["--to", one] for one in ("c", "st", "plcopen", "fmu", "json", "mat")]
         return [["validate", model, path], ["export", path, *chain(*targets)]][number // 4 % 2]
+    tables = [["--to", one] for one in ("friction-table", "csv", "c", "st")]
     return [
+        ["export", path, *chain(*tables), "--rated", "2"],
         ["design", path],
         ["predict", path, *log],
         ["validate", path, design],
         ["drift", path, *log],
         ["validate", model, design, "--plant", path],
-    ][number % 5]
+    ][number % 6]
 
 
 def result_values(rng: np.random.Generator) -> Family:

@@ -259,6 +259,41 @@ def test_export_writes_code(shop: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert said in refusal(capsys, ["export", design, *arguments], 2)
 
 
+def test_export_writes_the_tables_of_a_model(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, design, out = str(shop / "id/model.json"), str(shop / "design/design.json"), tmp_path
+    command = ["export", model, "--name", "X", "--out", str(out / "e")]
+    asked = ["--rated", "2.4 N m", "--per-turn", "10 mm"]
+    found = as_json(capsys, [*command, "--to", "friction-table", "--to", "c", *asked])
+    assert files(out / "e") == {one["file"] for one in found["files"]}
+    assert {one["control"] for one in found["files"]} == {None, "twincat", "sinumerik", "linuxcnc"}
+    assert all(one["error"] < 0.01 for one in found["files"])
+    (cost, *_) = [
+        one
+        for each in found["files"]
+        for one in each["costs"]
+        if one["what"].startswith("asymmetry")
+    ]
+    assert cost["unit"] == "N" and cost["value"] > 1.0
+    assert found["left_out"] and "codesys" not in {one["control"] for one in found["files"]}
+    assert main([*command, "--to", "csv"]) == 0
+    assert "X_friction.csv" in capsys.readouterr().out
+    for file, arguments, said in (
+        (model, ["--to", "backlash"], "the model has no backlash"),
+        (model, ["--to", "cogging-table"], "the model has no cogging"),
+        (model, ["--to", "friction-table", "--control", "codesys"], "no friction table"),
+        (model, ["--to", "friction-table", "--control", "fanuc"], "'fanuc' is not one of"),
+        (model, ["--to", "friction-table", "--rated", "2 kg"], "of another kind"),
+        (model, ["--to", "friction-table", "--precision", "single"], "--precision has no meaning"),
+        (model, ["--to", "friction-table", "--to", "fmu"], "--to fmu of a design"),
+        (model, ["--to", "fmu"], "'design/1' needed"),
+        (design, ["--to", "friction-table"], "'model/1' needed"),
+        (design, ["--to", "c", "--speed", "3"], "--speed has no meaning"),
+    ):
+        assert said in refusal(capsys, ["export", file, *arguments], 2), said
+
+
 def test_validate_passes_and_fails_with_its_status(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

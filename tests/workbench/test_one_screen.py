@@ -354,3 +354,20 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     chosen = ["--controller", "rst", "--compensator"]
     chosen += [word for name in ("c", "st", "plcopen", "json") for word in ("--to", name)]
     assert "written: " in held_by_command("export", "design.json", *chosen, "--out", "code")
+
+
+def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear
+    from workbench.documents.model_file import model_document
+    from workbench.output import dumps
+
+    monkeypatch.chdir(tmp_path)
+    slow = {"warmup": {"a": -0.2, "tau": 100.0}, "rising_stiction": {"F_r": 1.0, "tau": 1.0}}
+    full = linear({**STRIBECK, **COGGING, **PLACE, **PLAY, **slow})
+    full = replace(full, fit=replace(full.fit, adequate=False))
+    Path("model.json").write_text(dumps(model_document(full)), "utf-8")
+    every = ("friction-table", "cogging-table", "backlash", "csv", "c", "st")
+    asked = ["--rated", "2 N m", "--per-turn", "48 mm", "--encoder", "motor", "--speed", "0.5 m/s"]
+    asked += [word for one in every for word in ("--to", one)]
+    text = held_by_command("export", "model.json", *asked, "--out", "tables")
+    assert "asymmetry" in text and "written: tables" in text

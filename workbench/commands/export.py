@@ -113,16 +113,19 @@ def command(
 ) -> int:
     """Write a design's controller as code, or a model's friction as the tables of its control.
 
-    The code takes the measured position, its reference and, above a force loop, the measured force, and
-    gives the command with its limit and anti-windup, as the simulation does, in every bit (c, fmu)
-    or within rounding (st, plcopen). Each file holds a vector that tests it on the machine.
+    The code takes the measured position, its reference and, above a force loop, the measured
+    force, and gives the command with its limit and anti-windup, as the simulation does, in every
+    bit (c, fmu) or within rounding (st, plcopen). Each file holds a vector that tests it on the
+    machine.
 
     The tables are those of which a control compensates friction, cogging and backlash, in its own
     units; what a table cannot hold is said in newtons.
     """
     if _is_of_model(file, targets):
         _refuse_given("controller", "compensator", "precision")
-        return _tables(file, targets, controls, (name, speed, per_turn, rated, encoder), as_json, out)
+        return _tables(
+            file, targets, controls, (name, speed, per_turn, rated, encoder), as_json, out
+        )
     _refuse_given("controls", "speed", "per_turn", "rated", "encoder")
     from workbench.documents.design_read import read_design
     from workbench.export.exported import exported

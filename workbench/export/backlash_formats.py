@@ -1,6 +1,7 @@
 """The play of an axis in the formats of controls, each by a template of its own."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -13,13 +14,13 @@ from workbench.export.filled import filled
 CNC_UNITS = {False: (1e7, "0.0001 mm"), True: (1.8e6 / np.pi, "0.0001 deg")}  # P-AXIS-00103
 CNC_LARGEST = 32767  # SGN16
 WHICH_SIDE = (
-    "the sign of the value depends on where the control's encoder is; say by --encoder motor (before"
-    " the play, the usual case) or --encoder load (the transducer of the logs, behind it)"
+    "the sign of the value depends on where the control's encoder is; say by --encoder motor"
+    " (before the play, the usual case) or --encoder load (the transducer of the logs, behind it)"
 )
 MOTOR_SIDE = "the control positions by an encoder before the play"
 LOAD_SIDE = (
-    "the control positions by the transducer behind the play: the drive's side is ahead of it, so the"
-    " value is negative; a tool on the transducer's side needs no compensation at all"
+    "the control positions by the transducer behind the play: the drive's side is ahead of it, so"
+    " the value is negative; a tool on the transducer's side needs no compensation at all"
 )
 ONLY_BEFORE = (
     "has a value for play behind the encoder alone; with --encoder load there is none to write"
@@ -155,7 +156,7 @@ def _before(what: Compensation, who: str) -> tuple[float, str, float]:
     return width, unit, factor
 
 
-def _lead(what: Compensation) -> dict[str, object]:
+def _lead(what: Compensation) -> dict[str, Any]:
     """What stands at the head of every file of a control."""
     side = MOTOR_SIDE if what.asked.encoder == "motor" else LOAD_SIDE
     return {"card": what.model.card, "side": side}

@@ -1,6 +1,7 @@
 """Cogging by its orders and over one turn, and in the format of a drive."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -14,6 +15,11 @@ AX8000_HARMONICS = 9
 AX8000_HIGHEST = 200  # order n of an object 32CB
 WHOLE = 0.02  # by which an order may miss a whole number: 2 % of a period over one turn
 FIRST_OBJECT = 7  # subindex of the first n; phi and r follow it
+UNSAID = (
+    "AX8000: the manual does not say whether phi is of a cosine, nor the sign of r; the file has r"
+    " cos(n angle - phi) as the torque that the motor adds. Compare 3241:0C with the table on a"
+    " slow turn before you rely on it"
+)
 NO_COGGING_TABLE = {
     "sinumerik": "sinumerik: no cogging table is written, as no public page says its format;"
     " take the CSV",
@@ -92,15 +98,15 @@ def ax8000_cogging(what: Compensation) -> TableFile:
              one.amplitude)
         for one in left
     )  # fmt: skip
-    rows = [row for at, (order, one) in enumerate(fitting) for row in _objects(what, at, order, one)]
+    rows = [
+        row for at, (order, one) in enumerate(fitting) for row in _objects(what, at, order, one)
+    ]
     text = filled("ax8000_cogging.csv", **_lead(what, costs), rows=rows, motor=motor.words)
     return TableFile(
         f"{what.name}_ax8000_cogging.csv", text, "cogging-table", "twincat",
-        f"N m, deg; {motor.words}", "TwinCAT drive AX8000: startup list or objects 0x32CB",
+        "N m, deg", "TwinCAT drive AX8000: startup list or objects 0x32CB",
         len(fitting), None, costs,
-        ("AX8000: the manual does not say whether phi is of a cosine, nor the sign of r; the file"
-         " has r cos(n angle - phi) as the torque that the motor adds. Compare 3241:0C with the"
-         " table on a slow turn before you rely on it",),
+        (what.at, UNSAID),
     )  # fmt: skip
 
 
@@ -130,5 +136,5 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
     return what.harmonics
 
 
-def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, object]:
+def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
     return {"card": what.model.card, "costs": in_file(costs, what.force_unit)}

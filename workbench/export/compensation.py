@@ -28,6 +28,7 @@ Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
 Encoder = Literal["motor", "load"]
 SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
+MOST_OF_IT = 0.5  # of the asymmetry, from which a constant force is worth saying
 PLACES_ALONG = 400  # of the travel, at which a force of place is looked at
 CHANGES = "what it adds depends on what was before, so no table holds it"
 
@@ -142,6 +143,17 @@ class Compensation:
                 )
 
     @property
+    def missing(self) -> tuple[str, ...]:
+        """A remark where the model leaves much of the force."""
+        left = self.model.fit.force_relative
+        if self.model.fit.adequate or left is None:
+            return ()
+        return (
+            f"the model leaves {100 * left:.2g} % of the force while sliding, which is more than"
+            " noise: 'workbench trace' finds what it lacks",
+        )
+
+    @property
     def beyond(self) -> tuple[str, ...]:
         """A remark where the tables go further than the logs."""
         seen, unit = self.model.speed, self.speed_unit
@@ -203,6 +215,11 @@ class Compensation:
         return "a turn of the axis" if self.rotary else "the longest period of the cogging"
 
     @property
+    def at(self) -> str:
+        """What the speeds and torques of a drive's files are of, in words."""
+        return f"speeds and torques of a drive are {self.at_motor.words}"
+
+    @property
     def at_motor(self) -> "AtMotor":
         """How forces and speeds of the axis are at its motor."""
         return AtMotor(self.rotary, self.asked.per_turn)
@@ -249,8 +266,8 @@ class AtMotor:
         """What was taken for it."""
         if self.per_turn is not None:
             unit, factor = shown_unit("rad" if self.rotary else "m")
-            return f"at the motor, {number(factor * self.per_turn, 6)} {unit} of the axis a turn"
-        return "the axis is the motor's shaft" if self.rotary else "of a linear motor"
+            return f"of the motor, {number(factor * self.per_turn, 6)} {unit} of the axis a turn"
+        return "of a motor on the axis itself" if self.rotary else "of a linear motor"
 
 
 def first_of(reason: str | None) -> str:
@@ -264,7 +281,7 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
     if not signed:
         off, constant = curve.asymmetry, curve.constant_share
         said = "asymmetry: the table is the mean of both directions, off either way by up to"
-        if off > 0 and abs(constant) > 0.1 * off:
+        if abs(constant) > MOST_OF_IT * off > 0:
             said = (
                 f"asymmetry: the table is the mean of both directions (a constant"
                 f" {number(constant)} {what.force_unit} beside it would take most of it), off"
@@ -289,7 +306,7 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
 
 
 def other_costs(what: Compensation) -> Iterator[Cost]:
-    """Effects of the model that a friction table does not hold, each with its size if it has one."""
+    """Effects of the model that a friction table does not hold, with their sizes where known."""
     for one in what.model.acting:
         effect = one.effect
         if is_of_speed(one) or effect.place.shows or effect.place.in_actuator:

@@ -1,6 +1,7 @@
 """Feed-forward of acceleration, velocity and friction as C99 and Structured Text."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -94,7 +95,7 @@ def _costs(what: Compensation) -> tuple[Cost, ...]:
     )
 
 
-def _values(what: Compensation, language: str) -> dict[str, object]:
+def _values(what: Compensation, language: str) -> dict[str, Any]:
     """What the templates are filled with."""
     what.need("a feed-forward", ("m",))
     model = what.model

@@ -1,6 +1,7 @@
 """Friction against speed in the formats of controls, each by a template of its own."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from workbench.export.filled import filled
 
 NEUTRAL_POINTS = 40
 CNC_POINTS = 20  # P-COMP-00062: the default upper limit, of which (0, 0) takes one
-CNC_PARTS = 100  # of 0.1 %: its torque is a whole number, which scaling_factor 10 divides by
+CNC_PARTS = 1000  # of 0.1 %: its torque is a whole number, which scaling_factor 1 divides by
 SINAMICS_POINTS = 10
 CURVE_OF_HAL = 16  # points of lincurve, half of them each way
 CNC_SPEED = {False: (1e6, "0.001 mm/s"), True: (180e3 / np.pi, "0.001 deg/s")}
@@ -80,6 +81,9 @@ def twincat_cnc(what: Compensation) -> TableFile:
     factor, unit = CNC_SPEED[what.rotary]
     share = 1e3 * CNC_PARTS * motor.travel / rated
     pairs = [(round(factor * v), round(share * F)) for v, F in zip(points.x, points.y, strict=True)]
+    written, curve = np.array(pairs) / np.array([factor, share]), what.friction
+    found = np.interp(curve.speeds, *written.T)
+    error = float(np.max(np.abs(found / curve.mean(curve.speeds) - 1.0)))
     costs = friction_costs(what, signed=False)
     text = filled(
         "twincat_cnc_friction.lis",
@@ -92,10 +96,9 @@ def twincat_cnc(what: Compensation) -> TableFile:
     )
     return TableFile(
         f"{what.name}_twincat_cnc_friction.lis", text, "friction-table", "twincat",
-        f"{unit}, 0.001 % of {number(rated, 6)} {motor.torque_unit} (scaling_factor 10);"
-        f" {motor.words}",
-        "TwinCAT CNC: the axis's compensation value list", len(pairs) + 1, points.error, costs,
-        _remarks(what),
+        f"{unit}, 0.0001 % of {number(rated, 6)} {motor.torque_unit}",
+        "TwinCAT CNC: the axis's compensation value list", len(pairs) + 1, error, costs,
+        (what.at, *_remarks(what)),
     )  # fmt: skip
 
 
@@ -132,10 +135,9 @@ def ax8000(what: Compensation) -> TableFile:
     )
     return TableFile(
         f"{what.name}_ax8000_friction.csv", text, "friction-table", "twincat",
-        f"{motor.torque_unit}, {motor.torque_unit} s/{'rad' if motor.turns else 'm'};"
-        f" {motor.words}",
+        f"{motor.torque_unit}, {motor.torque_unit} s/{'rad' if motor.turns else 'm'}",
         "TwinCAT drive AX8000: startup list or objects 0x3144", 2,
-        float(np.max(off * weight)), costs, _remarks(what),
+        float(np.max(off * weight)), costs, (what.at, *_remarks(what)),
     )  # fmt: skip
 
 
@@ -159,9 +161,9 @@ def sinamics(what: Compensation) -> TableFile:
     )
     return TableFile(
         f"{what.name}_sinamics_friction.txt", text, "friction-table", "sinumerik",
-        f"{unit}, {motor.torque_unit}; {motor.words}",
+        f"{unit}, {motor.torque_unit}",
         "SINAMICS S120 of the axis: expert list, p3820 to p3839", len(rows), found.error, costs,
-        _remarks(what),
+        (what.at, *_remarks(what)),
     )  # fmt: skip
 
 
@@ -196,7 +198,7 @@ def _remarks(what: Compensation) -> tuple[str, ...]:
     return (*what.small(SLIDING), *what.beyond)
 
 
-def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, object]:
+def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
     """What stands at the head of every file."""
     (unit, factor), curve = what.speed_unit, what.friction
     return {

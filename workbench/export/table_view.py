@@ -11,7 +11,7 @@ from workbench.export.table_targets import Tables
 from workbench.output import written
 from workbench.screen import Screen, instead, listed, more, screen, tabled
 
-HEAD = ("file", "for", "units", "points", "off the model by")
+HEAD = ("file", "units", "points", "off the model by")
 TABLES_SCHEMA = "tables/1"
 
 
@@ -43,18 +43,15 @@ def tables_document(what: Compensation, found: Tables, folder: Path) -> dict[str
 
 def tables_view(what: Compensation, found: Tables, folder: Path) -> Screen:
     """The answer in words, what each file holds, and what none of them can."""
-    rows = [
-        (one.name, one.where.partition(":")[0], one.units, str(one.points), _percent(one.error))
-        for one in found.files
-    ]
+    rows = [(one.name, one.units, str(one.points), _percent(one.error)) for one in found.files]
     costs = _costs(found)
     remarks = dict.fromkeys(line for one in found.files for line in one.remarks)
     paste = [f"{one.name}: {one.where}" for one in found.files]
     return screen(
         _sentence(what, found),
-        tabled(HEAD, [(name, *rest) for name, *rest in rows], right=(3, 4)),
+        tabled(HEAD, rows, right=(2, 3)),
         listed(f"not in {_whose(names)}: {line}" for line, names in _lines(what, costs)),
-        listed(f"note: {line}" for line in remarks),
+        listed(f"note: {line}" for line in (*what.missing, *remarks)),
         listed((f"left out: {line}" for line in found.left_out), most=6),
         instead((), paste),
         more("the manual page Compensation tables says where each file is pasted"),
@@ -78,9 +75,9 @@ def _sentence(what: Compensation, found: Tables) -> str:
     up, down = curve.positive(ends), curve.negative(ends)
     slow, fast = (number(factor * v) for v in ends)
     return (
-        f"{said}; sliding takes {number(float(up[0]))} to {number(float(up[1]))} {what.force_unit}"
-        f" in positive and {number(float(down[0]))} to {number(float(down[1]))} {what.force_unit} in"
-        f" negative direction, {slow} to {fast} {unit}."
+        f"{said}; sliding from {slow} to {fast} {unit} takes {number(float(up[0]))} to"
+        f" {number(float(up[1]))} {what.force_unit} in positive and {number(float(down[0]))} to"
+        f" {number(float(down[1]))} {what.force_unit} in negative direction."
     )
 
 
