@@ -38,7 +38,7 @@ COMMANDS = {
     "design": "Design PID and RST controllers for a model.",
     "experiment": "Find the run to make next: the reference that tells most.",
     "validate": "Check a design on a plant in simulation.",
-    "export": "Write a design as code (C, PLC, FMU), a model as tables of its control.",
+    "export": "Write a design as code, a model as tables for its control.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "effects": "List the effects that 'trace' knows; check your own.",
     "paper": "Run the paper in simulation, its figures beside ours.",

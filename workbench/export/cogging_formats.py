@@ -13,7 +13,7 @@ from workbench.export.filled import filled
 
 AX8000_HARMONICS = 9
 AX8000_HIGHEST = 200  # order n of an object 32CB
-WHOLE = 0.02  # by which an order may miss a whole number: 2 % of a period over one turn
+WHOLE_ORDER = 0.02  # by which an order may miss a whole number: 2 % of a period over one turn
 FIRST_OBJECT = 7  # subindex of the first n; phi and r follow it
 UNSAID = (
     "AX8000: the manual does not say whether phi is of a cosine, nor the sign of r; the file has r"
@@ -82,7 +82,7 @@ def ax8000_cogging(what: Compensation) -> TableFile:
     fitting, left = list[tuple[int, Harmonic]](), list[Harmonic]()
     for one in known_harmonics(what):
         order = round(what.turn / one.period)
-        whole = abs(what.turn / one.period - order) <= WHOLE and 0 < order <= AX8000_HIGHEST
+        whole = abs(what.turn / one.period - order) <= WHOLE_ORDER and 0 < order <= AX8000_HIGHEST
         if whole and len(fitting) < AX8000_HARMONICS:
             fitting.append((order, one))
         else:

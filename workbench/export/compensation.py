@@ -27,10 +27,10 @@ from workbench.export.exported import identifier
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
 Encoder = Literal["motor", "load"]
-SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
+TOLD_BY_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
 MOST_OF_IT = 0.5  # of the asymmetry, from which a constant force is worth saying
 PLACES_ALONG = 400  # of the travel, at which a force of place is looked at
-CHANGES = "what it adds depends on what was before, so no table holds it"
+NO_TABLE_HOLDS = "what it adds depends on what was before, so no table holds it"
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Compensation:
     @cached_property
     def friction(self) -> SlidingFriction:
         """Friction while sliding; raises BadModel where a number of it is not identified."""
-        self.need("a friction table", SLIDING)
+        self.need("a friction table", TOLD_BY_SLIDING)
         return SlidingFriction(self.model.simulated, LOWEST_SHARE * self.high, self.high)
 
     @property
@@ -313,7 +313,7 @@ def other_costs(what: Compensation) -> Iterator[Cost]:
             continue
         said = one.key.replace("_", " ")
         if effect.place.unit != "N" or effect.evolve is not None or effect.signals:
-            yield Cost(f"{said}: {CHANGES}", None)
+            yield Cost(f"{said}: {NO_TABLE_HOLDS}", None)
         elif set(effect.depends_on) <= {"y", "v"}:
             kind = "a force of place, not friction" if is_of_place(one) else "varies with place"
             yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))

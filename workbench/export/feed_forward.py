@@ -11,7 +11,7 @@ from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.plant import Motor
 from workbench.export.compensation import (
-    SLIDING,
+    TOLD_BY_SLIDING,
     Compensation,
     Cost,
     TableFile,
@@ -83,7 +83,7 @@ def _file(what: Compensation, name: str, text: str, where: str) -> TableFile:
     units = ("rad, rad/s, rad/s^2, N m" if what.rotary else "m, m/s, m/s^2, N") + " of the axis"
     return TableFile(
         name, text, "feed-forward", "", units, where, len(v), error, _costs(what),
-        (*what.small((*SLIDING, "m")), *what.beyond),
+        (*what.small((*TOLD_BY_SLIDING, "m")), *what.beyond),
     )  # fmt: skip
 
 
@@ -109,7 +109,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
         "card": model.card,
         "name": what.name,
         "costs": in_file(_costs(what), what.force_unit),
-        "remarks": (*what.small((*SLIDING, "m")), *what.beyond),
+        "remarks": (*what.small((*TOLD_BY_SLIDING, "m")), *what.beyond),
         "length": "rad" if what.rotary else "m",
         "force": what.force_unit,
         "mass_unit": "kg m^2" if what.rotary else "kg",

@@ -57,6 +57,9 @@ def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) 
         else:
             files += [one(what) for one in NEUTRAL[target]]
             _for_controls(target, what, controls, files, left)
+    for control in controls:
+        if left and not any(one.control == control for one in files):
+            raise BadModel("; ".join(left))
     kept = {one.name: one for one in files}
     return Tables(tuple(kept.values()), tuple(dict.fromkeys(left)))
 

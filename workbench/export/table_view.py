@@ -11,7 +11,7 @@ from workbench.export.table_targets import Tables
 from workbench.output import written
 from workbench.screen import Screen, instead, listed, more, screen, tabled
 
-HEAD = ("file", "units", "points", "off the model by")
+FILES_HEAD = ("file", "units", "points", "off the model by")
 TABLES_SCHEMA = "tables/1"
 
 
@@ -49,7 +49,7 @@ def tables_view(what: Compensation, found: Tables, folder: Path) -> Screen:
     paste = [f"{one.name}: {one.where}" for one in found.files]
     return screen(
         _sentence(what, found),
-        tabled(HEAD, rows, right=(2, 3)),
+        tabled(FILES_HEAD, rows, right=(2, 3)),
         listed(f"not in {_whose(names)}: {line}" for line, names in _lines(what, costs)),
         listed(f"note: {line}" for line in (*what.missing, *remarks)),
         listed((f"left out: {line}" for line in found.left_out), most=6),
