@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from design.compensation_tables import TURN_POINTS, Harmonic, summed
+from design.compensation_tables import TURN_POINTS, Harmonic, is_cogging, summed
 from identification.errors import BadModel
 from workbench.cards.readable import number, shown_unit
 from workbench.export.compensation import Compensation, Cost, TableFile, in_file
@@ -49,6 +49,7 @@ def cogging_csv(what: Compensation) -> TableFile:
     return TableFile(
         f"{what.name}_cogging.csv", text, "cogging-table", "",
         f"{what.force_unit}, deg, {unit} of the axis", "any program that reads CSV", len(rows), 0.0,
+        (), _untold(what),
     )  # fmt: skip
 
 
@@ -68,6 +69,7 @@ def turn_csv(what: Compensation) -> TableFile:
     return TableFile(
         f"{what.name}_cogging_turn.csv", text, "cogging-table", "",
         f"{unit}, {what.force_unit} of the axis", "any program that reads CSV", TURN_POINTS, 0.0,
+        (), _untold(what),
     )  # fmt: skip
 
 
@@ -106,7 +108,7 @@ def ax8000_cogging(what: Compensation) -> TableFile:
         f"{what.name}_ax8000_cogging.csv", text, "cogging-table", "twincat",
         "N m, deg", "TwinCAT drive AX8000: startup list or objects 0x32CB",
         len(fitting), None, costs,
-        (what.at, UNSAID),
+        (what.at, UNSAID, *_untold(what)),
     )  # fmt: skip
 
 
@@ -129,6 +131,9 @@ def _objects(what: Compensation, at: int, order: int, one: Harmonic) -> list[tup
 def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
     """The waves of the cogging; raises BadModel where the model has none."""
     if not what.harmonics:
+        if any(is_cogging(one) for one in what.model.acting):
+            why = "; ".join(_untold(what))
+            raise BadModel(f"{what.model.card}: no cogging table, as {why}")
         raise BadModel(
             f"{what.model.card}: the model has no cogging, so there is no cogging table; 'workbench"
             " trace' looks for one"
@@ -137,4 +142,10 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
 
 
 def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
-    return {"card": what.model.card, "costs": in_file(costs, what.force_unit)}
+    costs_in_file = in_file(costs, what.force_unit)
+    return {"card": what.model.card, "costs": costs_in_file, "remarks": _untold(what)}
+
+
+def _untold(what: Compensation) -> tuple[str, ...]:
+    """Lines on what of the cogging no log tells."""
+    return tuple(line for line in what.untold_places if line.startswith("cogging"))

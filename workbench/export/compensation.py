@@ -13,7 +13,6 @@ from design.compensation_tables import (
     SlidingFriction,
     along,
     cogging_harmonics,
-    is_cogging,
     is_of_place,
     is_of_speed,
 )
@@ -108,6 +107,10 @@ class Compensation:
     def friction(self) -> SlidingFriction:
         """Friction while sliding; raises BadModel where a number of it is not identified."""
         self.need("a friction table", TOLD_BY_SLIDING)
+        for one in filter(is_of_speed, self.model.acting):
+            for name, found in self.model.effects[one.key].items():
+                if not found.known:
+                    raise BadModel(self.untold("a friction table", f"{one.key}.{name}", found))
         return SlidingFriction(self.model.simulated, LOWEST_SHARE * self.high, self.high)
 
     @property
@@ -126,10 +129,14 @@ class Compensation:
         for name in names:
             found = self.model.friction[name]
             if not found.known:
-                raise BadModel(
-                    f"{self.model.card}: {what} needs {name}, which is not identified"
-                    f" ({first_of(found.reason)}); no number is assumed for it"
-                )
+                raise BadModel(self.untold(what, name, found))
+
+    def untold(self, what: str, name: str, found: Estimate) -> str:
+        """The refusal of what needs a number that no log tells."""
+        return (
+            f"{self.model.card}: {what} needs {name}, which is not identified"
+            f" ({first_of(found.reason)}); no number is assumed for it"
+        )
 
     def small(self, names: Iterable[str]) -> Iterator[str]:
         """A line for each parameter of which the logs tell no more than that it is small."""
@@ -165,25 +172,37 @@ class Compensation:
         )
 
     @cached_property
-    def harmonics(self) -> tuple[Harmonic, ...]:
-        """Cogging of the axis by its waves, the largest first; empty where the model has none.
-
-        Raises BadModel where it has one whose size or period no log tells.
-        """
-        for key, found in self.cogging_estimates.items():
-            for name, one in found.items():
-                if not one.known:
-                    raise BadModel(
-                        f"{self.model.card}: a cogging table needs {key}.{name}, which is not"
-                        f" identified ({first_of(one.reason)}); no number is assumed for it"
-                    )
-        return cogging_harmonics(self.model.acting)
+    def places(self) -> tuple[Acting, ...]:
+        """Effects that are forces of place, with the sizes that the logs tell; `untold_places` has
+        the others, which are 0 here."""
+        return tuple(one for one, _ in self._places if one is not None)
 
     @property
-    def cogging_estimates(self) -> dict[str, dict[str, Estimate]]:
-        """Parameters of the model's cogging, by the effects' keys."""
-        keys = [one.key for one in self.model.acting if is_cogging(one)]
-        return {key: dict(self.model.effects[key]) for key in keys}
+    def untold_places(self) -> tuple[str, ...]:
+        """A line for each number of a force of place that no log tells."""
+        return tuple(line for _, lines in self._places for line in lines)
+
+    @cached_property
+    def _places(self) -> list[tuple[Acting | None, list[str]]]:
+        return [self._told(one) for one in self.model.acting if is_of_place(one)]
+
+    def _told(self, one: Acting) -> tuple[Acting | None, list[str]]:
+        """The effect without the sizes that no log tells; None where its shape is not told."""
+        found, lines, values = self.model.effects[one.key], list[str](), dict(one.values)
+        for p in one.effect.params:
+            if found[p.name].known:
+                continue
+            why = f"{one.key}.{p.name} is not identified ({first_of(found[p.name].reason)})"
+            if not p.linear:
+                return None, [f"{why}, so {one.key} is left out"]
+            values[p.name] = 0.0
+            lines.append(f"{why}, so it is 0 in the table")
+        return one.effect.acting(values), lines
+
+    @cached_property
+    def harmonics(self) -> tuple[Harmonic, ...]:
+        """Cogging of the axis by its waves, the largest first; empty where none is told."""
+        return cogging_harmonics(self.places)
 
     @cached_property
     def play(self) -> Estimate | None:

@@ -83,8 +83,12 @@ def _file(what: Compensation, name: str, text: str, where: str) -> TableFile:
     units = ("rad, rad/s, rad/s^2, N m" if what.rotary else "m, m/s, m/s^2, N") + " of the axis"
     return TableFile(
         name, text, "feed-forward", "", units, where, len(v), error, _costs(what),
-        (*what.small((*TOLD_BY_SLIDING, "m")), *what.beyond),
+        _remarks_of(what),
     )  # fmt: skip
+
+
+def _remarks_of(what: Compensation) -> tuple[str, ...]:
+    return (*what.small((*TOLD_BY_SLIDING, "m")), *what.untold_places, *what.beyond)
 
 
 def _costs(what: Compensation) -> tuple[Cost, ...]:
@@ -100,7 +104,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     what.need("a feed-forward", ("m",))
     model = what.model
     v, F, _ = both_ways(what, FEED_FORWARD_POINTS)
-    held = place_force(tuple(one for one in model.acting if is_held(one)))
+    held = place_force(tuple(one for one in what.places if is_held(one)))
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
@@ -109,7 +113,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
         "card": model.card,
         "name": what.name,
         "costs": in_file(_costs(what), what.force_unit),
-        "remarks": (*what.small((*TOLD_BY_SLIDING, "m")), *what.beyond),
+        "remarks": _remarks_of(what),
         "length": "rad" if what.rotary else "m",
         "force": what.force_unit,
         "mass_unit": "kg m^2" if what.rotary else "kg",

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from identification.errors import BadModel, UserError
+from identification.model.estimates import Estimate
 from identification.model.karnopp import slip_friction
 from tests.workbench.export import table_readers as read
 from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear, lost, rotary
@@ -22,6 +23,7 @@ from workbench.export.compensation import Compensation, TableFile, TablesAsked
 from workbench.export.table_targets import Tables, tables
 
 ONE_PER_CENT = 0.01
+UNTOLD = Estimate(None, "N", reason="too weak; log longer", assumed=0.02)
 SCREW = 0.01  # m a turn
 
 
@@ -355,6 +357,31 @@ def test_what_else_a_model_lacks() -> None:
                     assumed=1e-4)  # fmt: skip
     with pytest.raises(BadModel, match=r"its width, which is not identified \(too short\)"):
         made(replace(blind, effects={"backlash": {"width": width}}), "backlash")
+
+
+def test_a_wave_of_which_a_part_is_not_told_keeps_the_rest() -> None:
+    model = linear(COGGING)
+    first = {**model.effects["cogging"], "b": UNTOLD}
+    found = made(replace(model, effects={**model.effects, "cogging": first}), "cogging-table")
+    _, orders = read.neutral(one(found, "known_cogging.csv").text)
+    assert sorted(orders[:, 2]) == pytest.approx(
+        sorted((0.3, np.hypot(0.1, 0.05), np.hypot(0.2, 0.1)))
+    )
+    assert any("cogging.b is not identified (too weak)" in line for line in found.files[0].remarks)
+    assert "cogging.b is not identified" in found.files[0].text
+    shape = {**model.effects["cogging"], "period": UNTOLD}
+    found = made(replace(model, effects={**model.effects, "cogging": shape}), "cogging-table", "st")
+    assert len(read.neutral(one(found, "known_cogging.csv").text)[1]) == 1
+    assert "so cogging is left out" in one(found, ".st").text
+    with pytest.raises(BadModel, match=r"no cogging table, as cogging\.period is not identified"):
+        made(replace(model, effects={"cogging": shape}), "cogging-table")
+
+
+def test_an_effect_of_speed_is_needed_whole() -> None:
+    model = linear(STRIBECK)
+    shape = {**model.effects["stribeck"], "v_s": UNTOLD}
+    with pytest.raises(BadModel, match=r"needs stribeck\.v_s, which is not identified"):
+        made(replace(model, effects={"stribeck": shape}), "friction-table")
 
 
 def test_a_parameter_that_is_only_small_is_said() -> None:
