@@ -1,0 +1,356 @@
+"""One log of an axis as a maintenance engineer reads it: its numbers, their limits, and a light.
+
+A number is green within its limits, red where its whole 95 % interval lies beyond one, yellow
+where the log cannot tell on which side it is. Limits are the card's, else what the machine's own
+logs have shown.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy.stats import norm, t
+
+from identification.arrays import Array
+from identification.estimation.axis_equation import AxisEquation, axis_equation
+from identification.estimation.estimates import told_estimate
+from identification.estimation.surroundings import surroundings
+from identification.model.estimates import Estimate
+from identification.model.surroundings import Surroundings
+from identification.thresholds import MOST_UNEXPLAINED
+from workbench.cards.limits import limit_units
+from workbench.cards.readable import number, shown_unit
+from workbench.logs.sources import Source, Sources
+
+AXIS_SCHEMA = "axis_test/1"
+FEWEST_EARLIER = 5  # logs from which a machine's own limits come
+HISTORY_SIGMAS = 3.0
+LEAST_ROOM = 0.02  # of the mean, nearer than which no limit of the logs lies: `drift --margin`
+LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
+PLACES = 24  # along the travel
+FEWEST_THERE = 3  # windows of sliding at a place
+MEANING_OF = {
+    "F_cp": "Coulomb friction, positive",
+    "F_cn": "Coulomb friction, negative",
+    "F_vp": "viscous friction, positive",
+    "F_vn": "viscous friction, negative",
+    "F_sp": "breakaway, positive",
+    "F_sn": "breakaway, negative",
+    "m": "moving mass",
+    "constant_force": "constant force",
+    "backlash": "backlash",
+    "explained": "force explained",
+    "along_travel": "variation along travel",
+}
+NO_BACKLASH = "no model with a play is in force; `workbench trace` finds one in this log"
+
+Light = Literal["green", "yellow", "red", ""]
+WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
+
+
+@dataclass(frozen=True)
+class Allowed:
+    """Lowest and highest value, in SI, and where they come from; logs: how many of the machine's,
+    mean and sd of these."""
+
+    low: float
+    high: float
+    source: Literal["card", "registry", "usual"]
+    logs: int = 0
+    mean: float | None = None
+    sd: float | None = None
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One line of the test: its estimate, its limits, its light ("": no limits, or not told)."""
+
+    name: str
+    meaning: str
+    estimate: Estimate
+    allowed: Allowed | None
+    light: Light
+    why: str
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What the registry has of a machine: values of its last logs by quantity, oldest first, with
+    the seconds since 1970 at which they were recorded; version: of the model in force.
+
+    estimates: of this log, by the fit of the model in force, where that has effects which the
+    equation of motion alone does not hold. said: why there are no limits, where there are none;
+    remarks: on these, a line each.
+    """
+
+    machine: str
+    values: Mapping[str, Sequence[tuple[float, float]]]
+    version: int | None = None
+    estimates: Mapping[str, Estimate] | None = None
+    said: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Coulomb friction along the travel, both directions as sizes: place [m], mean [N] and sd of
+    it at each, (p,); NaN where a direction hardly passes."""
+
+    place: Array
+    positive: Array
+    negative: Array
+    positive_sd: Array
+    negative_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class AxisTest:
+    """The test of one log."""
+
+    machine: str
+    source: Source
+    rotary: bool
+    quantities: tuple[Quantity, ...]
+    travel: Travel
+    breakaways: tuple[int, int]
+    earlier: Earlier | None
+    remarks: tuple[str, ...]
+
+    @property
+    def light(self) -> Light:
+        """The worst light; yellow where nothing has limits, or no Coulomb friction is told."""
+        found = {one.light for one in self.quantities}
+        worst = next(light for light in WORST if light in found)
+        if worst == "red" or not (self.unjudged or self.blind):
+            return worst
+        return "yellow"
+
+    @property
+    def blind(self) -> bool:
+        """Whether the log tells Coulomb friction of neither direction."""
+        return all(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
+
+    @property
+    def unjudged(self) -> bool:
+        """Whether no number of the machine has limits."""
+        return all(one.allowed is None or one.allowed.source == "usual" for one in self.quantities)
+
+    def of(self, name: str) -> Quantity:
+        """The quantity of that name."""
+        return next(one for one in self.quantities if one.name == name)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is not green, the worst first."""
+        order = sorted(self.quantities, key=lambda one: WORST.index(one.light))
+        out = [one.why for one in order if one.light in ("red", "yellow")]
+        if self.blind:
+            why = self.of("F_cp").estimate.reason or ""
+            out.append(f"Coulomb friction is not told: {why.partition(';')[0]}")
+        if self.unjudged:
+            why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"
+            out.append(f"no limits to judge by: {why}")
+        return tuple(out)
+
+
+def axis_test(
+    sources: Sources, earlier: Earlier | None = None, machine: str | None = None
+) -> AxisTest:
+    """The test of the longest run of the log.
+
+    earlier: what the registry has of the machine. Raises NotIdentifiable where too little slides.
+    """
+    source = max(sources.runs, key=lambda one: one.log.duration)
+    around = surroundings([source.log], sources.rig)
+    found = axis_equation(around.taken_out(source.log), held=sources.rig.kind == "motor")
+    units = limit_units(sources.rig)
+    told = told_of(found, around, units)
+    if earlier is not None and earlier.estimates is not None:
+        told |= earlier.estimates
+    travel = friction_along(found)
+    told["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
+    allowed = {**_of_earlier(earlier), **_of_card(sources.card.limits)}
+    allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
+    runs = len(sources.runs)
+    longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
+    return AxisTest(
+        machine or sources.card.name, source, sources.rig.motion == "rotary",
+        tuple(judged(name, told[name], allowed.get(name)) for name in MEANING_OF),
+        travel, found.breakaways, earlier,
+        (*(earlier.remarks if earlier else ()), *longest, *sources.remarks),
+    )  # fmt: skip
+
+
+def told_of(
+    found: AxisEquation, around: Surroundings, units: Mapping[str, str]
+) -> dict[str, Estimate]:
+    """Every quantity of the test, by name, as far as the equation of motion tells it."""
+    out = {}
+    scale = max(abs(found.values["F_cp"]), abs(found.values["F_cn"]))
+    unheld = (
+        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no number holds;"
+        " `workbench trace` looks for what acts"
+    )
+    for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
+        if name not in found.values:
+            many = found.breakaways[0 if name == "F_sp" else 1]
+            why = f"{many} breakaways seen, too few; add starts from rest"
+            out[name] = Estimate(None, units[name], reason=why)
+        elif found.relative > MOST_UNEXPLAINED:
+            out[name] = Estimate(None, units[name], reason=unheld)
+        else:
+            out[name] = told_estimate(
+                found.values[name], units[name], found.sd[name], bounds=(0.0, np.inf)
+            )
+    value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
+    half = float(norm.ppf(0.975)) * sd
+    constant = Estimate(value, units["constant_force"], sd, value - half, value + half)
+    if found.relative > MOST_UNEXPLAINED or not half < scale:
+        constant = Estimate(None, units["constant_force"], reason=unheld)
+    out["constant_force"] = constant
+    out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)
+    out["explained"] = Estimate(1.0 - found.relative, "1")
+    return out
+
+
+def friction_along(found: AxisEquation) -> Travel:
+    """Coulomb friction of each direction at places along the travel."""
+    edges = np.linspace(float(np.min(found.position)), float(np.max(found.position)), PLACES + 1)
+    at = np.clip(np.searchsorted(edges, found.position, side="right") - 1, 0, PLACES - 1)
+    columns = []
+    for own in (found.up, ~found.up):
+        count = np.bincount(at[own], minlength=PLACES)
+        enough = np.where(count >= FEWEST_THERE, count, np.nan)
+        mean = np.bincount(at[own], found.level[own], PLACES) / enough
+        square = np.bincount(at[own], found.level[own] ** 2, PLACES) / enough
+        columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0) / enough)]
+    up, up_sd, down, down_sd = columns
+    return Travel(0.5 * (edges[1:] + edges[:-1]), up, down, up_sd, down_sd)
+
+
+def _deviation(travel: Travel) -> float | None:
+    """Largest deviation of either direction from its own mean along the travel [N]."""
+    sizes = [
+        float(np.nanmax(np.abs(one - np.nanmean(one))))
+        for one in (travel.positive, travel.negative)
+        if np.count_nonzero(np.isfinite(one)) > 1
+    ]
+    return max(sizes, default=None)
+
+
+def _of_card(limits: Mapping[str, tuple[float, float]]) -> dict[str, Allowed]:
+    return {name: Allowed(low, high, "card") for name, (low, high) in limits.items()}
+
+
+def _of_earlier(earlier: Earlier | None) -> dict[str, Allowed]:
+    """The machine's own limits: mean +- 3 sd of its last logs."""
+    found = {}
+    for name, values in (earlier.values if earlier else {}).items():
+        one = own_limits(np.array([value for _, value in values]))
+        if one is not None:
+            found[name] = one
+    return found
+
+
+def own_limits(values: Array) -> Allowed | None:
+    """Limits by the values of earlier logs (n,); None of too few.
+
+    The mean +- 3 sd of many logs; of few wider, so that as many good logs lie within (Student's t
+    of a further value), and never nearer than 2 % of the mean.
+    """
+    n = len(values)
+    if n < FEWEST_EARLIER:
+        return None
+    mean, sd = float(np.mean(values)), float(np.std(values, ddof=1))
+    wide = float(t.ppf(norm.cdf(HISTORY_SIGMAS), n - 1)) * (1.0 + 1.0 / n) ** 0.5
+    room = max(wide * sd, LEAST_ROOM * abs(mean))
+    return Allowed(mean - room, mean + room, "registry", n, mean, sd)
+
+
+def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
+    """A quantity with its light and, where it is not green, the reason in a sentence."""
+    meaning = MEANING_OF[name]
+    if told.value is None and allowed is not None and allowed.source == "card":
+        why = (told.reason or "the log does not tell it").partition(";")[0]
+        said = f"{_whole(meaning)} is not told, and the card has limits for it: {why}"
+        return Quantity(name, meaning, told, allowed, "yellow", said)
+    if told.value is None or allowed is None:
+        return Quantity(name, meaning, told, allowed, "", "")
+    low = told.value if told.low is None else told.low
+    high = told.value if told.high is None else told.high
+    if low > allowed.high or high < allowed.low:
+        return Quantity(name, meaning, told, allowed, "red", _said(meaning, told, allowed, ""))
+    outside = not allowed.low <= told.value <= allowed.high
+    if outside or low < allowed.low or high > allowed.high:
+        unsure = ", though this log is not sure of it" if outside else " within its interval"
+        return Quantity(name, meaning, told, allowed, "yellow",
+                        _said(meaning, told, allowed, unsure))  # fmt: skip
+    return Quantity(name, meaning, told, allowed, "green", "")
+
+
+def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:
+    """Why a light is not green."""
+    (unit, factor), value = shown_unit(told.unit), told.value or 0.0
+    above = value > 0.5 * (allowed.low + allowed.high)
+    limit = allowed.high if above else allowed.low
+    if told.unit == "1":
+        unit, factor = "%", 100.0
+    side = "above" if above else "below"
+    whose = {
+        "card": "the card's",
+        "registry": f"its last {allowed.logs} logs'",
+        "usual": "the usual",
+    }
+    moved = ""
+    if allowed.mean:
+        moved = f" ({100 * (value / allowed.mean - 1):+.0f} % of their mean)"
+    may = "perhaps " if unsure == " within its interval" else ""
+    return (
+        f"{_whole(meaning)} is {number(factor * value)} {unit}, {may}{side} {whose[allowed.source]}"
+        f" limit {number(factor * limit)} {unit}{moved}{unsure}"
+    )
+
+
+def _whole(meaning: str) -> str:
+    """A meaning as it stands in a sentence."""
+    name, _, way = meaning.partition(", ")
+    return f"{name} in {way} direction" if way else name
+
+
+def axis_document(test: AxisTest) -> dict[str, Any]:
+    """The test for a PLC or SCADA: the light first, then every number with its limits."""
+    return {
+        "schema": AXIS_SCHEMA,
+        "light": test.light,
+        "machine": test.machine,
+        "log": {"file": test.source.file, "sha256": test.source.sha256, "rows": test.source.rows,
+                "duration": test.source.log.duration, "h": test.source.log.h},
+        "reasons": test.reasons,
+        "quantities": {one.name: _number(one) for one in test.quantities},
+        "breakaways": test.breakaways,
+        "travel": {
+            "place": test.travel.place,
+            "positive": test.travel.positive,
+            "negative": test.travel.negative,
+        },
+        "version": test.earlier.version if test.earlier else None,
+        "remarks": test.remarks,
+    }  # fmt: skip
+
+
+def _number(one: Quantity) -> dict[str, Any]:
+    told, allowed = one.estimate, one.allowed
+    return {
+        "value": told.value,
+        "unit": told.unit,
+        "sd": told.sd,
+        "low": told.low,
+        "high": told.high,
+        **({"reason": told.reason} if told.value is None else {}),
+        "light": one.light or None,
+        "limits": None if allowed is None else {
+            "low": allowed.low, "high": allowed.high, "source": allowed.source,
+            "logs": allowed.logs, "mean": allowed.mean, "sd": allowed.sd,
+        },
+    }  # fmt: skip
