@@ -1,6 +1,5 @@
 """The axis test on one page: a light, why, the numbers with their limits, and two pictures."""
 
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +14,10 @@ from workbench.screen import Screen, listed, screen, tabled
 from workbench.steps.axis_test import AxisTest, Earlier, Quantity
 
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
-WORDS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
-SOURCE = {"card": "card", "registry": "own logs", "usual": "usual"}
-AXIS_HEIGHT = 210
-HISTORY_NAMES = (
-    ("F_cp", "positive direction", "measured"),
-    ("F_cn", "negative direction", "other"),
-)
+LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
+SOURCE_OF_LIMITS = {"card": "card", "registry": "logs", "usual": "usual"}
+AXIS_HEIGHT = 160
+EACH_DIRECTION = (("F_cp", "positive direction"), ("F_cn", "negative direction"))
 
 
 def axis_sentence(test: AxisTest) -> str:
@@ -30,9 +26,13 @@ def axis_sentence(test: AxisTest) -> str:
     judged = sum(1 for one in test.quantities if one.light)
     if test.light == "green":
         return f"{light}: {test.machine} is within its limits in {judged} of {judged} numbers."
+    return f"{light}: {_first(test)}."
+
+
+def _first(test: AxisTest) -> str:
+    """The first reason, and how many more there are."""
     first, *rest = test.reasons
-    more = f" (and {len(rest)} more)" if rest else ""
-    return f"{light}: {first}{more}."
+    return f"{first} (and {len(rest)} more)" if rest else first
 
 
 def axis_rows(test: AxisTest) -> list[Row]:
@@ -46,18 +46,18 @@ def _row(one: Quantity) -> Row:
     limits = "-"
     if one.allowed is not None:
         low, high = (number(factor * x, 4) for x in (one.allowed.low, one.allowed.high))
-        limits = f"{low} to {high} ({SOURCE[one.allowed.source]})"
+        limits = f"{low} to {high} ({SOURCE_OF_LIMITS[one.allowed.source]})"
     if told.value is None:
         why = (told.reason or "not told").partition(";")[0]
-        return one.meaning, "-", unit, why, limits, WORDS[one.light]
+        return one.meaning, "-", unit, why, limits, LAMPS[one.light]
     if told.low is None or told.high is None:
-        return one.meaning, number(factor * told.value, 4), unit, "", limits, WORDS[one.light]
+        return one.meaning, number(factor * told.value, 4), unit, "", limits, LAMPS[one.light]
     spread = 0.25 * (told.high - told.low)
     value, low, high = in_digits(
         [factor * x for x in (told.value, told.low, told.high)], factor * told.value,
         factor * spread,
     )  # fmt: skip
-    return one.meaning, value, unit, f"{low} to {high}", limits, WORDS[one.light]
+    return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]
 
 
 def axis_view(test: AxisTest, folder: Path) -> Screen:
@@ -85,68 +85,59 @@ def axis_report(test: AxisTest, tested: str) -> str:
         reasons=test.reasons if len(test.reasons) > 1 else (),
         head=AXIS_HEAD, rows=list(zip(axis_rows(test), test.quantities, strict=True)),
     )  # fmt: skip
-    charts = chart_html(axis_chart(test), _caption(test))
+    charts = [chart_html(one) for one in axis_charts(test)]
     end = render("axis_test_end", facts=[one for one in facts if one], remarks=test.remarks)
     lead = f"{test.machine}: friction, breakaway, mass and play of one log, each with its limits."
-    return page(
-        f"Axis test of {test.machine}", lead,
-        [Section("Result", body), Section("Friction", str(charts)), Section("Test", end)],
-    )  # fmt: skip
+    drawn = "".join(map(str, charts))
+    parts = [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
+    return page(f"Axis test of {test.machine}", lead, parts)
 
 
-def axis_chart(test: AxisTest) -> Chart:
+def axis_charts(test: AxisTest) -> list[Chart]:
     """Friction along the travel and, where there is a past, over the last logs."""
-    panels = [along_panel(test)]
-    past = history_panel(test)
-    if past is not None:
-        panels.append(past)
-    return Chart("axis", "friction along the travel, and over the last logs", panels,
-                 columns=2 if past else 1, shared_x=False)  # fmt: skip
+    along = Chart("travel", "Coulomb friction of each direction along the travel",
+                  [along_panel(test)], shared_x=False)  # fmt: skip
+    past = [panel for name, said in EACH_DIRECTION if (panel := history_panel(test, name, said))]
+    if not past:
+        return [along]
+    return [along, Chart("logs", "Coulomb friction over the last logs, with its limits", past,
+                         columns=2)]  # fmt: skip
 
 
 def along_panel(test: AxisTest) -> Panel:
     """Coulomb friction of both directions along the travel, as sizes."""
     units, travel = units_of(test.rotary), test.travel
     x = units.position.factor * travel.place
-    lines, areas = [], []
-    for name, level, sd, colour in (
-        ("positive direction", travel.positive, travel.positive_sd, "measured"),
-        ("negative direction", travel.negative, travel.negative_sd, "other"),
-    ):
-        areas.append(Area("", x, level - 2 * sd, level + 2 * sd))
-        lines.append(Line(name, x, level, colour))  # type: ignore[arg-type]
+    up, down = travel.positive, travel.negative
     return Panel(
-        f"position [{units.position.name}]", f"Coulomb friction [{units.force.name}]", lines,
-        "along the travel", areas=areas, y_range=_from_zero(*(one.y for one in lines)),
-        height=AXIS_HEIGHT,
+        f"position [{units.position.name}]", f"friction [{units.force.name}]",
+        [Line("positive direction", x, up, "measured"),
+         Line("negative direction", x, down, "other")],
+        "along the travel",
+        areas=[Area("", x, up - 2 * travel.positive_sd, up + 2 * travel.positive_sd),
+               Area("", x, down - 2 * travel.negative_sd, down + 2 * travel.negative_sd)],
+        y_range=_from_zero(up, down), height=AXIS_HEIGHT,
     )  # fmt: skip
 
 
-def history_panel(test: AxisTest) -> Panel | None:
-    """Coulomb friction over the last logs and this one, with its limits; None without a past."""
-    if test.earlier is None:
+def history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
+    """A Coulomb level over the last logs and this one, with its limits; None without a past."""
+    one = test.of(name)
+    past = [value for _, value in test.earlier.values.get(name, ())] if test.earlier else []
+    if not past:
         return None
-    lines, bands = [], []
-    for name, said, colour in HISTORY_NAMES:
-        one = test.of(name)
-        past = [value for _, value in test.earlier.values.get(name, ())]
-        if not past:
-            continue
-        now = [] if one.estimate.value is None else [one.estimate.value]
-        at = np.arange(1.0 - len(past), 1.0)
-        values = np.array(past)
-        lines.append(Line(f"{said}, earlier logs", at - 1, values, colour))  # type: ignore[arg-type]
-        if now:
-            lines.append(Line(f"{said}, this log", np.zeros(1), np.array(now), "model", "dots"))
-        if one.allowed is not None:
-            bands.append(Band(f"limits, {said}", one.allowed.low, one.allowed.high))
-    if not lines:
-        return None
-    edges = [np.array([band.low, band.high]) for band in bands]
+    own = [] if one.estimate.value is None else [one.estimate.value]
+    values = np.array([*past, *own])
+    lines = [Line("earlier logs", np.arange(-len(past), len(own), 1.0), values, "measured")]
+    if own:
+        lines.append(Line("this log", np.array([-0.4, 0.4]), np.repeat(own, 2), "model", "bold"))
+    limits = one.allowed
+    bands = [] if limits is None else [Band("limits", limits.low, limits.high)]
+    edges = [] if limits is None else [limits.low, limits.high]
     return Panel(
-        "logs before this one", f"Coulomb friction [{units_of(test.rotary).force.name}]", lines,
-        "over the last logs", bands=bands, y_range=_close(*(one.y for one in lines), *edges),
-        height=AXIS_HEIGHT,
+        "logs before this one", f"friction [{units_of(test.rotary).force.name}]", lines,
+        f"{said}, over the last logs", bands=bands, x_range=(-len(past) - 0.5, 0.6),
+        y_range=_close(values, np.array(edges)), height=AXIS_HEIGHT,
     )  # fmt: skip
 
 
@@ -156,8 +147,9 @@ def _from_zero(*values: Array) -> tuple[float, float]:
     return 0.0, 1.2 * most
 
 
-def _close(*values: Sequence[float] | Array) -> tuple[float, float]:
-    every = np.concatenate([np.asarray(one, dtype=np.float64) for one in values])
+def _close(*values: Array) -> tuple[float, float]:
+    """From a little below the lowest to a little above the highest."""
+    every = np.concatenate(values)
     low, high = float(np.nanmin(every)), float(np.nanmax(every))
     room = 0.1 * (high - low) or 0.1 * abs(high)
     return low - room, high + room
@@ -171,13 +163,3 @@ def _limits_said(earlier: Earlier | None) -> str:
         f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of few"
         " logs, and never nearer than 2 %)"
     )
-
-
-def _caption(test: AxisTest) -> str:
-    text = (
-        "Coulomb friction of each direction along the travel, with twice its deviation: a hump is a"
-        " tight spot, a slope a guide out of true."
-    )
-    if test.earlier is not None and test.earlier.values.get("F_cp"):
-        text += " Right: over the machine's last logs, within the shaded limits."
-    return text

@@ -246,15 +246,20 @@ def _of_card(limits: Mapping[str, tuple[float, float]]) -> dict[str, Allowed]:
 def _of_earlier(earlier: Earlier | None) -> dict[str, Allowed]:
     """The machine's own limits: mean +- 3 sd of its last logs."""
     found = {}
-    for name, values in (earlier.values if earlier else {}).items():
-        one = own_limits(np.array([value for _, value in values]))
+    every = earlier.values if earlier else {}
+    coulomb = [value for name in ("F_cp", "F_cn") for _, value in every.get(name, ())]
+    for name, values in every.items():
+        # Of a force that may be nought, what does not matter is a share of friction.
+        least = LEAST_ROOM * float(np.mean(coulomb)) if name == "constant_force" and coulomb else 0
+        one = own_limits(np.array([value for _, value in values]), least)
         if one is not None:
             found[name] = one
     return found
 
 
-def own_limits(values: Array) -> Allowed | None:
-    """Limits by the values of earlier logs (n,); None of too few.
+def own_limits(values: Array, least: float = 0.0) -> Allowed | None:
+    """Limits by the values of earlier logs (n,), no nearer to their mean than `least`; None of too
+    few.
 
     The mean +- 3 sd of many logs; of few wider, so that as many good logs lie within (Student's t
     of a further value), and never nearer than 2 % of the mean.
@@ -264,7 +269,7 @@ def own_limits(values: Array) -> Allowed | None:
         return None
     mean, sd = float(np.mean(values)), float(np.std(values, ddof=1))
     wide = float(t.ppf(norm.cdf(HISTORY_SIGMAS), n - 1)) * (1.0 + 1.0 / n) ** 0.5
-    room = max(wide * sd, LEAST_ROOM * abs(mean))
+    room = max(wide * sd, LEAST_ROOM * abs(mean), least)
     return Allowed(mean - room, mean + room, "registry", n, mean, sd)
 
 
@@ -303,12 +308,13 @@ def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:
         "usual": "the usual",
     }
     moved = ""
-    if allowed.mean:
+    if allowed.mean and told.unit not in ("1", "") and "constant" not in meaning:
         moved = f" ({100 * (value / allowed.mean - 1):+.0f} % of their mean)"
     may = "perhaps " if unsure == " within its interval" else ""
+    found, bound = (f"{number(factor * x, 4)} {unit}" for x in (value, limit))
     return (
-        f"{_whole(meaning)} is {number(factor * value)} {unit}, {may}{side} {whose[allowed.source]}"
-        f" limit {number(factor * limit)} {unit}{moved}{unsure}"
+        f"{_whole(meaning)} is {found}, {may}{side} {whose[allowed.source]} limit"
+        f" {bound}{moved}{unsure}"
     )
 
 
