@@ -23,6 +23,7 @@ from identification.log import Log
 SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
 FEWEST_SLIDING = 8  # windows of sliding in each direction
 FEWEST_BREAKAWAYS = 3  # of a direction, from which they tell its limit
+SLOWEST = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
 
@@ -96,17 +97,25 @@ def _left_out(rows: Rows) -> Array:
 def _breakaway(
     one: MotionLog, m: float
 ) -> tuple[dict[str, float], dict[str, float], tuple[int, int]]:
-    """Breakaway forces as sizes [N], the medians of what was seen, their deviations, and how many
-    there were up and down."""
+    """Breakaway forces as sizes [N], their deviations, and how many there were up and down.
+
+    Of each direction the median of the quarter in which the force rose most slowly: the motion is
+    seen late, and by then a fast force has gone further. The deviation holds half of what the force
+    rises in a sample.
+    """
     if not m > 0:
         return {}, {}, (0, 0)
     events = breakaways(one, m)
     values, sd, count = dict[str, float](), dict[str, float](), list[int]()
     for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
-        force = np.abs(events.force[events.direction == way])
-        count.append(len(force))
-        if len(force) >= FEWEST_BREAKAWAYS:
+        own = events.direction == way
+        count.append(int(np.count_nonzero(own)))
+        if count[-1] >= FEWEST_BREAKAWAYS:
+            order = np.argsort(np.abs(events.rate[own]), kind="stable")
+            slow = order[: max(FEWEST_BREAKAWAYS, count[-1] // SLOWEST)]
+            force, rate = np.abs(events.force[own])[slow], np.abs(events.rate[own])[slow]
             values[name] = float(np.median(force))
             off = float(np.median(np.abs(force - values[name])))
-            sd[name] = OF_MEDIAN * OF_OFF * off / len(force) ** 0.5
+            late = 0.5 * one.log.h * float(np.median(rate))
+            sd[name] = float(np.hypot(OF_MEDIAN * OF_OFF * off / len(force) ** 0.5, late))
     return values, sd, (count[0], count[1])

@@ -161,5 +161,6 @@ def _limits_said(earlier: Earlier | None) -> str:
     many = max((len(values) for values in earlier.values.values()), default=0)
     return (
         f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of few"
-        " logs, and never nearer than 2 %)"
+        " logs; never nearer than 2 %, of"
+        " breakaway 5 %)"
     )

@@ -27,6 +27,7 @@ AXIS_SCHEMA = "axis_test/1"
 FEWEST_EARLIER = 5  # logs from which a machine's own limits come
 HISTORY_SIGMAS = 3.0
 LEAST_ROOM = 0.02  # of the mean, nearer than which no limit of the logs lies: `drift --margin`
+BREAKAWAY_ROOM = 0.05  # the same of breakaway, which one log shows no better
 LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
 PLACES = 24  # along the travel
 FEWEST_THERE = 3  # windows of sliding at a place
@@ -249,9 +250,13 @@ def _of_earlier(earlier: Earlier | None) -> dict[str, Allowed]:
     every = earlier.values if earlier else {}
     coulomb = [value for name in ("F_cp", "F_cn") for _, value in every.get(name, ())]
     for name, values in every.items():
-        # Of a force that may be nought, what does not matter is a share of friction.
-        least = LEAST_ROOM * float(np.mean(coulomb)) if name == "constant_force" and coulomb else 0
-        one = own_limits(np.array([value for _, value in values]), least)
+        past = np.array([value for _, value in values])
+        least = 0.0
+        if name == "constant_force" and coulomb:  # may be nought: a share of friction counts
+            least = LEAST_ROOM * float(np.mean(coulomb))
+        elif name in ("F_sp", "F_sn"):
+            least = BREAKAWAY_ROOM * float(np.mean(past))
+        one = own_limits(past, least)
         if one is not None:
             found[name] = one
     return found
