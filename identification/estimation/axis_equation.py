@@ -23,7 +23,7 @@ from identification.log import Log
 SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
 FEWEST_SLIDING = 8  # windows of sliding in each direction
 FEWEST_BREAKAWAYS = 3  # of a direction, from which they tell its limit
-SLOWEST = 4  # a quarter of the breakaways
+SLOW_QUARTER = 4  # a quarter of the breakaways
 OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
 OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
 
@@ -112,7 +112,7 @@ def _breakaway(
         count.append(int(np.count_nonzero(own)))
         if count[-1] >= FEWEST_BREAKAWAYS:
             order = np.argsort(np.abs(events.rate[own]), kind="stable")
-            slow = order[: max(FEWEST_BREAKAWAYS, count[-1] // SLOWEST)]
+            slow = order[: max(FEWEST_BREAKAWAYS, count[-1] // SLOW_QUARTER)]
             force, rate = np.abs(events.force[own])[slow], np.abs(events.rate[own])[slow]
             values[name] = float(np.median(force))
             off = float(np.median(np.abs(force - values[name])))

@@ -224,8 +224,26 @@ def doctor() -> Iterator[Screen]:
     yield installation_view(look_over(), {"where": "x" * 150, "answers": False}, LOGS)
 
 
+def axis_test() -> Iterator[Screen]:
+    """Every number beyond its limits, of a log of many runs."""
+    from tests.chain import short_recipe
+    from workbench.logs.sources import Source, Sources
+    from workbench.report.axis_test import axis_view
+    from workbench.steps import axis_test as step
+    from workbench.steps.simulate import record
+
+    card, recipe = short_recipe()
+    log = record("short", recipe, 7)
+    runs = (Source(log, "a long name of a file " * 3, "0" * 64, len(log)),) * 3
+    limits = dict.fromkeys(step.MEANING_OF, (1e6, 2e6))
+    for given in ({}, limits):
+        found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
+        yield axis_view(step.axis_test(found), OUT)
+
+
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
     identify, trace, validate, design, demo, drift, experiment, predict, reidentify, fleet, doctor,
+    axis_test,
 )  # fmt: skip
 BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # run below
 ELSEWHERE = {"paper": "tests/workbench/paper/test_study.py"}  # as it takes long to make
@@ -233,7 +251,8 @@ NO_SCREEN = ("serve", "work", "watch")  # events as JSON lines, until they are s
 
 
 def test_every_command_is_held() -> None:
-    held = {view.__name__ for view in BY_VIEW} | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
+    views = {view.__name__.replace("_", "-") for view in BY_VIEW}
+    held = views | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
     assert held == set(cli.COMMANDS)
     for path in ELSEWHERE.values():
         assert "one_screen(" in (Path(__file__).parents[2] / path).read_text("utf-8")

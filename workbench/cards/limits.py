@@ -17,8 +17,8 @@ from workbench.cards.table import CardTable
 
 Bound = Annotated[float, Strict()] | str
 Pair = tuple[Bound, Bound]
-SHARES = ("explained",)
-LENGTHS, FORCES = ("backlash",), ("constant_force", "along_travel")
+LIMITED_SHARES = ("explained",)
+LIMITED_LENGTHS, LIMITED_FORCES = ("backlash",), ("constant_force", "along_travel")
 
 
 class LimitsSection(CardTable):
@@ -68,7 +68,7 @@ def limit_units(rig: Rig) -> Mapping[str, str]:
     nine = units_of(rig.motion, rig.command_unit)
     return {
         **{name: nine[name] for name in ("m", "F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn")},
-        **dict.fromkeys(FORCES, plain.force),
-        **dict.fromkeys(LENGTHS, plain.position),
-        **dict.fromkeys(SHARES, "1"),
+        **dict.fromkeys(LIMITED_FORCES, plain.force),
+        **dict.fromkeys(LIMITED_LENGTHS, plain.position),
+        **dict.fromkeys(LIMITED_SHARES, "1"),
     }

@@ -29,7 +29,7 @@ HISTORY_SIGMAS = 3.0
 LEAST_ROOM = 0.02  # of the mean, nearer than which no limit of the logs lies: `drift --margin`
 BREAKAWAY_ROOM = 0.05  # the same of breakaway, which one log shows no better
 LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
-PLACES = 24  # along the travel
+ALONG_PLACES = 24  # along the travel
 FEWEST_THERE = 3  # windows of sliding at a place
 MEANING_OF = {
     "F_cp": "Coulomb friction, positive",
@@ -217,14 +217,16 @@ def told_of(
 
 def friction_along(found: AxisEquation) -> Travel:
     """Coulomb friction of each direction at places along the travel."""
-    edges = np.linspace(float(np.min(found.position)), float(np.max(found.position)), PLACES + 1)
-    at = np.clip(np.searchsorted(edges, found.position, side="right") - 1, 0, PLACES - 1)
+    edges = np.linspace(
+        float(np.min(found.position)), float(np.max(found.position)), ALONG_PLACES + 1
+    )
+    at = np.clip(np.searchsorted(edges, found.position, side="right") - 1, 0, ALONG_PLACES - 1)
     columns = []
     for own in (found.up, ~found.up):
-        count = np.bincount(at[own], minlength=PLACES)
+        count = np.bincount(at[own], minlength=ALONG_PLACES)
         enough = np.where(count >= FEWEST_THERE, count, np.nan)
-        mean = np.bincount(at[own], found.level[own], PLACES) / enough
-        square = np.bincount(at[own], found.level[own] ** 2, PLACES) / enough
+        mean = np.bincount(at[own], found.level[own], ALONG_PLACES) / enough
+        square = np.bincount(at[own], found.level[own] ** 2, ALONG_PLACES) / enough
         columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0) / enough)]
     up, up_sd, down, down_sd = columns
     return Travel(0.5 * (edges[1:] + edges[:-1]), up, down, up_sd, down_sd)
