@@ -5,7 +5,7 @@ the equation in weak form; no free run, no search. Deviations are the jackknife'
 the log, so they hold what varies in it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from identification.estimation.regression.weighted_rows import (
 )
 from identification.log import Log
 
+LEVELS = ("F_cp", "F_cn")
+COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
+MOST_SPREAD = 0.25  # deviation of mass and viscous friction, of their values, that is told
 SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
 FEWEST_SLIDING = 8  # windows of sliding in each direction
 FEWEST_BREAKAWAYS = 3  # of a direction, from which they tell its limit
@@ -32,10 +35,10 @@ OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
 class AxisEquation:
     """What the equation of motion tells of one log.
 
-    values, sd: by name, m [kg], F_cp, F_cn [N], F_vp, F_vn [N s/m], and F_sp, F_sn [N], sizes, of
-    directions with enough breakaways. offset: (F_cn - F_cp)/2 [N], a constant force towards +y if
-    friction is alike both ways, with its sd. breakaways: how many, up and down. relative: share of
-    the force that is left while sliding. position [m], level [N] (size) and up, (r,): Coulomb
+    values, sd: by name, F_cp, F_cn [N], and where they are told m [kg], F_vp, F_vn [N s/m], and the
+    breakaway forces F_sp, F_sn [N], sizes. offset: (F_cn - F_cp)/2 [N], a constant force towards +y
+    if friction is alike both ways, with its sd. breakaways: how many, up and down. relative: share
+    of the force that is left while sliding. position [m], level [N] (size) and up, (r,): Coulomb
     friction of each window of sliding.
     """
 
@@ -63,19 +66,22 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
             f" least {FEWEST_SLIDING} of each needed; log strokes in both directions"
         )
     rows, theta = _settled(one)
-    each = _left_out(rows)
+    used, theta, each = _told_apart(rows)
     spread = spread_of_left_out(each)
-    offset = spread_of_left_out(0.5 * (each[:, 2] - each[:, 1])[:, np.newaxis])
-    values = dict(zip(rows.names, theta.tolist(), strict=True))
-    sd = dict(zip(rows.names, spread.tolist(), strict=True))
-    limits, limit_sd, count = _breakaway(one, values["m"])
-    left = rows.b - rows.X @ theta
-    level = (rows.b - rows.X[:, [0, 3, 4]] @ theta[[0, 3, 4]]) * np.where(one.up, 1.0, -1.0)
+    names = [rows.names[k] for k in used]
+    values = dict(zip(names, theta.tolist(), strict=True))
+    sd = dict(zip(names, spread.tolist(), strict=True))
+    up_at, down_at = names.index("F_cp"), names.index("F_cn")
+    offset = spread_of_left_out(0.5 * (each[:, [down_at]] - each[:, [up_at]]))
+    limits, limit_sd, count = _breakaway(one, values.get("m", 0.0))
+    left = rows.b - rows.X[:, used] @ theta
+    beside = [k for k in range(len(used)) if k not in (up_at, down_at)]
+    level = rows.b - rows.X[:, [used[k] for k in beside]] @ theta[beside]
     return AxisEquation(
         {**values, **limits}, {**sd, **limit_sd},
         (0.5 * (values["F_cn"] - values["F_cp"]), float(offset[0])), count,
         float(np.linalg.norm(left) / max(float(np.linalg.norm(rows.b)), 1e-300)),
-        np.asarray(log["y"])[one.sliding.middle], level, one.up,
+        np.asarray(log["y"])[one.sliding.middle], level * np.where(one.up, 1.0, -1.0), one.up,
     )  # fmt: skip
 
 
@@ -87,11 +93,22 @@ def _settled(one: MotionLog) -> tuple[Rows, Array]:
     return mechanical(one, np.maximum(theta, 0.0)), theta
 
 
-def _left_out(rows: Rows) -> Array:
-    """The parameters of the rows without each stretch of the log in turn (k, p)."""
-    return np.array(
-        [solve_rows(rows, rows.block != block).theta for block in np.unique(rows.block)]
-    )
+def _told_apart(rows: Rows) -> tuple[list[int], Array, Array]:
+    """The columns that the log tells apart, their parameters (k,), and these without each stretch
+    of the log in turn (b, k): all, else without mass, else without viscous friction too.
+
+    A column that is not told would take its neighbours' parameters with it.
+    """
+    for used in COLUMNS_TRIED:
+        some = replace(rows, X=rows.X[:, used])
+        theta = solve_rows(some).theta
+        blocks = np.unique(rows.block)
+        each = np.array([solve_rows(some, rows.block != block).theta for block in blocks])
+        further = [k for k, column in enumerate(used) if rows.names[column] not in LEVELS]
+        wide = spread_of_left_out(each)[further] > MOST_SPREAD * theta[further]
+        if not np.any(wide):  # nor below 0
+            break
+    return used, theta, each
 
 
 def _breakaway(

@@ -18,6 +18,7 @@ from identification.estimation.estimates import told_estimate
 from identification.estimation.surroundings import surroundings
 from identification.model.estimates import Estimate
 from identification.model.surroundings import Surroundings
+from identification.signals.check import check_driven
 from identification.thresholds import MOST_UNEXPLAINED
 from workbench.cards.limits import limit_units
 from workbench.cards.readable import number, shown_unit
@@ -163,6 +164,7 @@ def axis_test(
     earlier: what the registry has of the machine. Raises NotIdentifiable where too little slides.
     """
     source = max(sources.runs, key=lambda one: one.log.duration)
+    check_driven(source.log)
     around = surroundings([source.log], sources.rig)
     found = axis_equation(around.taken_out(source.log), held=sources.rig.kind == "motor")
     units = limit_units(sources.rig)
@@ -195,9 +197,7 @@ def told_of(
     )
     for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
         if name not in found.values:
-            many = found.breakaways[0 if name == "F_sp" else 1]
-            why = f"{many} breakaways seen, too few; add starts from rest"
-            out[name] = Estimate(None, units[name], reason=why)
+            out[name] = Estimate(None, units[name], reason=_why_not(name, found))
         elif found.relative > MOST_UNEXPLAINED:
             out[name] = Estimate(None, units[name], reason=unheld)
         else:
@@ -213,6 +213,18 @@ def told_of(
     out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)
     out["explained"] = Estimate(1.0 - found.relative, "1")
     return out
+
+
+def _why_not(name: str, found: AxisEquation) -> str:
+    """Why a number is not told."""
+    if name == "m":
+        return "inertia is too small a part of the force; add faster reversals"
+    if name.startswith("F_v"):
+        return "speeds too alike to tell it from Coulomb friction; add strokes at others"
+    if "m" not in found.values:
+        return "without mass a start from rest is not placed; add faster reversals"
+    many = found.breakaways[0 if name == "F_sp" else 1]
+    return f"{many} breakaways seen, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:
@@ -291,11 +303,13 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
         return Quantity(name, meaning, told, allowed, "", "")
     low = told.value if told.low is None else told.low
     high = told.value if told.high is None else told.high
-    if low > allowed.high or high < allowed.low:
+    if allowed.source != "usual" and (low > allowed.high or high < allowed.low):
         return Quantity(name, meaning, told, allowed, "red", _said(meaning, told, allowed, ""))
     outside = not allowed.low <= told.value <= allowed.high
     if outside or low < allowed.low or high > allowed.high:
         unsure = ", though this log is not sure of it" if outside else " within its interval"
+        if allowed.source == "usual":
+            unsure = ": something else acts"
         return Quantity(name, meaning, told, allowed, "yellow",
                         _said(meaning, told, allowed, unsure))  # fmt: skip
     return Quantity(name, meaning, told, allowed, "green", "")
