@@ -20,7 +20,7 @@ from identification.estimation.regression.weighted_rows import (
 )
 from identification.log import Log
 
-LEVELS = ("F_cp", "F_cn")
+COULOMB_LEVELS = ("F_cp", "F_cn")
 COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
 MOST_SPREAD = 0.25  # deviation of mass and viscous friction, of their values, that is told
 SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
@@ -104,7 +104,7 @@ def _told_apart(rows: Rows) -> tuple[list[int], Array, Array]:
         theta = solve_rows(some).theta
         blocks = np.unique(rows.block)
         each = np.array([solve_rows(some, rows.block != block).theta for block in blocks])
-        further = [k for k, column in enumerate(used) if rows.names[column] not in LEVELS]
+        further = [k for k, column in enumerate(used) if rows.names[column] not in COULOMB_LEVELS]
         wide = spread_of_left_out(each)[further] > MOST_SPREAD * theta[further]
         if not np.any(wide):  # nor below 0
             break

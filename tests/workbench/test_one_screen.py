@@ -230,12 +230,13 @@ def axis_test() -> Iterator[Screen]:
     from workbench.logs.sources import Source, Sources
     from workbench.report.axis_test import axis_view
     from workbench.steps import axis_test as step
+    from workbench.steps.axis_limits import MEANING_OF
     from workbench.steps.simulate import record
 
     card, recipe = short_recipe()
     log = record("short", recipe, 7)
     runs = (Source(log, "a long name of a file " * 3, "0" * 64, len(log)),) * 3
-    limits = dict.fromkeys(step.MEANING_OF, (1e6, 2e6))
+    limits = dict.fromkeys(MEANING_OF, (1e6, 2e6))
     for given in ({}, limits):
         found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
         yield axis_view(step.axis_test(found), OUT)

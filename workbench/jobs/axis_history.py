@@ -14,14 +14,14 @@ from workbench.documents.model_file import read_model
 from workbench.jobs.drift_by_chart import drift_by_chart
 from workbench.jobs.drift_verdict import Reading
 from workbench.logs.sources import Sources
-from workbench.registry.results import JudgedLog, last_logs
+from workbench.registry.axis_past import LAST_ON_PAGE, NAMED, history
+from workbench.registry.results import last_logs
 from workbench.registry.store import Registry
-from workbench.steps.axis_test import FEWEST_EARLIER, MEANING_OF, Earlier
+from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
+from workbench.steps.axis_test import Earlier
 
-LAST_ON_PAGE = 30
 # Effects that the equation of motion takes out, and those that it does not see
 HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
-NAMED = {"constant_force.F_0": "constant_force", "backlash.width": "backlash"}
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
@@ -58,21 +58,6 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
         estimates = {**(estimates or {}), "backlash": in_force}
         remarks.append(f"backlash is that of version {state.in_force.number}, in force")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
-
-
-def history(logs: Sequence[JudgedLog]) -> dict[str, list[tuple[float, float]]]:
-    """Values of the logs by quantity, each with the moment at which its log was recorded."""
-    out: dict[str, list[tuple[float, float]]] = {}
-    for one in logs:
-        found = {str(each["name"]): float(each["after"]) for each in one.parameters}
-        if "F_cp" in found and "F_cn" in found and "constant_force.F_0" not in found:
-            found["constant_force.F_0"] = 0.5 * (found["F_cn"] - found["F_cp"])
-        for name, value in found.items():
-            name = NAMED.get(name, name)
-            if name in MEANING_OF:
-                size = abs(value) if name == "F_sn" else value
-                out.setdefault(name, []).append((one.recorded_at, size))
-    return out
 
 
 def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:

@@ -7,10 +7,10 @@ logs have shown.
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from scipy.stats import norm, t
+from scipy.stats import norm
 
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
@@ -23,45 +23,15 @@ from identification.thresholds import MOST_UNEXPLAINED
 from workbench.cards.limits import limit_units
 from workbench.cards.readable import number, shown_unit
 from workbench.logs.sources import Source, Sources
+from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 
 AXIS_SCHEMA = "axis_test/1"
-FEWEST_EARLIER = 5  # logs from which a machine's own limits come
-HISTORY_SIGMAS = 3.0
-LEAST_ROOM = 0.02  # of the mean, nearer than which no limit of the logs lies: `drift --margin`
-BREAKAWAY_ROOM = 0.05  # the same of breakaway, which one log shows no better
 LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
 ALONG_PLACES = 24  # along the travel
 FEWEST_THERE = 3  # windows of sliding at a place
-MEANING_OF = {
-    "F_cp": "Coulomb friction, positive",
-    "F_cn": "Coulomb friction, negative",
-    "F_vp": "viscous friction, positive",
-    "F_vn": "viscous friction, negative",
-    "F_sp": "breakaway, positive",
-    "F_sn": "breakaway, negative",
-    "m": "moving mass",
-    "constant_force": "constant force",
-    "backlash": "backlash",
-    "explained": "force explained",
-    "along_travel": "variation along travel",
-}
 NO_BACKLASH = "no model with a play is in force; `workbench trace` finds one in this log"
 
-Light = Literal["green", "yellow", "red", ""]
 WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
-
-
-@dataclass(frozen=True)
-class Allowed:
-    """Lowest and highest value, in SI, and where they come from; logs: how many of the machine's,
-    mean and sd of these."""
-
-    low: float
-    high: float
-    source: Literal["card", "registry", "usual"]
-    logs: int = 0
-    mean: float | None = None
-    sd: float | None = None
 
 
 @dataclass(frozen=True)
@@ -173,7 +143,7 @@ def axis_test(
         told |= earlier.estimates
     travel = friction_along(found)
     told["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
-    allowed = {**_of_earlier(earlier), **_of_card(sources.card.limits)}
+    allowed = {**_of_past(earlier), **_of_card(sources.card.limits)}
     allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
     runs = len(sources.runs)
     longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
@@ -258,38 +228,9 @@ def _of_card(limits: Mapping[str, tuple[float, float]]) -> dict[str, Allowed]:
     return {name: Allowed(low, high, "card") for name, (low, high) in limits.items()}
 
 
-def _of_earlier(earlier: Earlier | None) -> dict[str, Allowed]:
-    """The machine's own limits: mean +- 3 sd of its last logs."""
-    found = {}
-    every = earlier.values if earlier else {}
-    coulomb = [value for name in ("F_cp", "F_cn") for _, value in every.get(name, ())]
-    for name, values in every.items():
-        past = np.array([value for _, value in values])
-        least = 0.0
-        if name == "constant_force" and coulomb:  # may be nought: a share of friction counts
-            least = LEAST_ROOM * float(np.mean(coulomb))
-        elif name in ("F_sp", "F_sn"):
-            least = BREAKAWAY_ROOM * float(np.mean(past))
-        one = own_limits(past, least)
-        if one is not None:
-            found[name] = one
-    return found
-
-
-def own_limits(values: Array, least: float = 0.0) -> Allowed | None:
-    """Limits by the values of earlier logs (n,), no nearer to their mean than `least`; None of too
-    few.
-
-    The mean +- 3 sd of many logs; of few wider, so that as many good logs lie within (Student's t
-    of a further value), and never nearer than 2 % of the mean.
-    """
-    n = len(values)
-    if n < FEWEST_EARLIER:
-        return None
-    mean, sd = float(np.mean(values)), float(np.std(values, ddof=1))
-    wide = float(t.ppf(norm.cdf(HISTORY_SIGMAS), n - 1)) * (1.0 + 1.0 / n) ** 0.5
-    room = max(wide * sd, LEAST_ROOM * abs(mean), least)
-    return Allowed(mean - room, mean + room, "registry", n, mean, sd)
+def _of_past(earlier: Earlier | None) -> dict[str, Allowed]:
+    past = earlier.values if earlier else {}
+    return limits_of({name: [value for _, value in every] for name, every in past.items()})
 
 
 def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
@@ -303,16 +244,15 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
         return Quantity(name, meaning, told, allowed, "", "")
     low = told.value if told.low is None else told.low
     high = told.value if told.high is None else told.high
-    if allowed.source != "usual" and (low > allowed.high or high < allowed.low):
-        return Quantity(name, meaning, told, allowed, "red", _said(meaning, told, allowed, ""))
+    light = light_of(told.value, low, high, allowed)
+    if light in ("green", "red"):
+        said = _said(meaning, told, allowed, "") if light == "red" else ""
+        return Quantity(name, meaning, told, allowed, light, said)
     outside = not allowed.low <= told.value <= allowed.high
-    if outside or low < allowed.low or high > allowed.high:
-        unsure = ", though this log is not sure of it" if outside else " within its interval"
-        if allowed.source == "usual":
-            unsure = ": something else acts"
-        return Quantity(name, meaning, told, allowed, "yellow",
-                        _said(meaning, told, allowed, unsure))  # fmt: skip
-    return Quantity(name, meaning, told, allowed, "green", "")
+    unsure = ", though this log is not sure of it" if outside else " within its interval"
+    if allowed.source == "usual":
+        unsure = ": something else acts"
+    return Quantity(name, meaning, told, allowed, light, _said(meaning, told, allowed, unsure))
 
 
 def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:

@@ -16,14 +16,13 @@ from workbench.cards.card_tables import CardFile
 from workbench.cards.limits import LimitsSection
 from workbench.logs.sources import Source, Sources
 from workbench.report.axis_test import axis_charts, axis_report, axis_sentence, axis_view
+from workbench.steps.axis_limits import Allowed, own_limits
 from workbench.steps.axis_test import (
-    Allowed,
     AxisTest,
     Earlier,
     axis_document,
     axis_test,
     judged,
-    own_limits,
 )
 from workbench.steps.simulate import record
 
