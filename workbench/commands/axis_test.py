@@ -1,6 +1,6 @@
 """`workbench axis-test`: one log of an axis -> a light, its numbers with limits, one page."""
 
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -53,7 +53,6 @@ def command(
     from workbench.report.next_steps import looked_over
     from workbench.steps.axis_test import axis_document, axis_test
 
-    now = datetime.now(UTC)
     sources = read_sources([log], card)
     name = machine or sources.card.name
     earlier = None
@@ -70,9 +69,9 @@ def command(
         OutputFolder("axis-test", out, now=datetime.now()) as folder,
     ):
         test = axis_test(sources, earlier, name)
-        document = {**axis_document(test), "tested_at": now}
+        document = axis_document(test)
         folder.write_json("axis_test.json", document)
-        folder.write_text("report.html", axis_report(test, f"{now:%Y-%m-%d %H:%M} UTC"))
+        folder.write_text("report.html", axis_report(test))
     emit(
         {**document, "out": folder.final},
         as_json,

@@ -1,7 +1,7 @@
 """What a control compensates by: a model's numbers for its tables, and what a table cannot hold."""
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -212,10 +212,7 @@ class Compensation:
         """
         found = self.model.effects.get("backlash", {}).get("width")
         if found is not None and found.value is None:
-            raise BadModel(
-                f"{self.model.card}: backlash needs its width, which is not identified"
-                f" ({first_of(found.reason)}); no number is assumed for it"
-            )
+            raise BadModel(self.untold("backlash", "its width", found))
         return found
 
     @property
@@ -242,10 +239,6 @@ class Compensation:
     def at_motor(self) -> "AtMotor":
         """How forces and speeds of the axis are at its motor."""
         return AtMotor(self.rotary, self.asked.per_turn)
-
-    def force(self, value: float) -> str:
-        """A force in words."""
-        return f"{number(value)} {self.force_unit}"
 
 
 @dataclass(frozen=True)
@@ -356,8 +349,3 @@ def in_file(costs: Iterable[Cost], unit: str) -> list[str]:
 def cost_line(one: Cost, unit: str) -> str:
     """A cost in words."""
     return one.what if one.force is None else f"{one.what} {number(one.force)} {unit}"
-
-
-def with_remarks(file: TableFile, *remarks: str) -> TableFile:
-    """The file with further remarks."""
-    return replace(file, remarks=(*file.remarks, *remarks))

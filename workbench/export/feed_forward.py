@@ -20,6 +20,7 @@ from workbench.export.compensation import (
 )
 from workbench.export.filled import filled, rows
 from workbench.export.friction_formats import both_ways
+from workbench.export.st_syntax import st_syntax
 
 FEED_FORWARD_POINTS = 20  # of the friction curve, each way
 
@@ -108,7 +109,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")
-    form = _c_number if language == "C" else _st_number
+    form = _c_number if language == "C" else st_syntax("double").number
     return {
         "card": model.card,
         "name": what.name,
@@ -137,9 +138,3 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
 
 def _c_number(value: float) -> str:
     return repr(float(value))
-
-
-def _st_number(value: float) -> str:
-    digits, _, power = repr(float(value)).upper().partition("E")
-    mantissa = digits if "." in digits else digits + ".0"
-    return f"{mantissa}E{int(power)}" if power else mantissa

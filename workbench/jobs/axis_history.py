@@ -20,6 +20,7 @@ from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
 
+LOOKED_AT = 120  # of a machine's last logs, among which those are that tell its parameters
 # Effects that the equation of motion takes out, and those that it does not see
 HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
@@ -31,7 +32,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     """
     state = registry.machine(machine)
     own = {source.sha256 for source in sources.runs}
-    logs = [one for one in last_logs(registry.database, machine, LAST_ON_PAGE + len(own))
+    logs = [one for one in last_logs(registry.database, machine, LOOKED_AT)
             if one.sha256 not in own and one.parameters]  # fmt: skip
     values = history(list(reversed(logs[:LAST_ON_PAGE])))
     said = ""
@@ -51,13 +52,22 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
             f" {', '.join(further)}"
         )
         found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
-        estimates = by_quantity(found.parameters)
+        estimates = untold(model, found.reason) | by_quantity(found.parameters)
     width = model.effects.get("backlash", {}).get("width")
     if width is not None and width.value is not None and "backlash" not in (estimates or {}):
         in_force = Estimate(width.value, width.unit, width.sd, width.low, width.high)
         estimates = {**(estimates or {}), "backlash": in_force}
         remarks.append(f"backlash is that of version {state.in_force.number}, in force")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
+
+
+def untold(model: Model, why: str) -> dict[str, Estimate]:
+    """The nine as a log has them that the fit of the model in force does not tell."""
+    return {
+        name: Estimate(None, one.unit, reason=why)
+        for name, one in model.friction.items()
+        if name in MEANING_OF
+    }
 
 
 def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:

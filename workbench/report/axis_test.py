@@ -60,25 +60,24 @@ def _row(one: Quantity) -> Row:
     return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]
 
 
-def axis_view(test: AxisTest, folder: Path) -> Screen:
+def axis_view(test: AxisTest, folder: Path | None) -> Screen:
     """The light, the numbers and the reasons, for a terminal."""
     return screen(
         axis_sentence(test),
         tabled(AXIS_HEAD, axis_rows(test)),
         listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
         listed((f"note: {line}" for line in test.remarks), most=4),
-        written(folder, "axis_test.json", "report.html"),
+        *([] if folder is None else [written(folder, "axis_test.json", "report.html")]),
     )
 
 
-def axis_report(test: AxisTest, tested: str) -> str:
-    """HTML of one printed page; tested: when, in words."""
+def axis_report(test: AxisTest) -> str:
+    """HTML of one printed page."""
     log = test.source.log
     facts = [
         f"log {test.source.file}, {number(log.duration, 4)} s at {number(1.0 / log.h, 4)} Hz",
         f"{test.breakaways[0]} breakaways in positive, {test.breakaways[1]} in negative direction",
         _limits_said(test.earlier),
-        f"tested {tested}",
     ]
     body = render(
         "axis_test", light=test.light, sentence=axis_sentence(test).partition(": ")[2],

@@ -91,7 +91,7 @@ class AxisTest:
 
     @property
     def light(self) -> Light:
-        """The worst light; yellow where nothing has limits, or no Coulomb friction is told."""
+        """The worst light; yellow where nothing has limits, or a Coulomb friction is not told."""
         found = {one.light for one in self.quantities}
         worst = next(light for light in WORST if light in found)
         if worst == "red" or not (self.unjudged or self.blind):
@@ -100,8 +100,8 @@ class AxisTest:
 
     @property
     def blind(self) -> bool:
-        """Whether the log tells Coulomb friction of neither direction."""
-        return all(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
+        """Whether the log does not tell Coulomb friction of both directions."""
+        return any(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
 
     @property
     def unjudged(self) -> bool:
@@ -118,7 +118,8 @@ class AxisTest:
         order = sorted(self.quantities, key=lambda one: WORST.index(one.light))
         out = [one.why for one in order if one.light in ("red", "yellow")]
         if self.blind:
-            why = self.of("F_cp").estimate.reason or ""
+            found = (self.of(name).estimate for name in ("F_cp", "F_cn"))
+            why = next(one.reason or "" for one in found if one.value is None)
             out.append(f"Coulomb friction is not told: {why.partition(';')[0]}")
         if self.unjudged:
             why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"

@@ -149,8 +149,8 @@ def test_its_document_page_and_screen(tmp_path: Path) -> None:
     assert document["quantities"]["m"]["limits"]["logs"] == 30
     assert document["quantities"]["backlash"]["value"] is None
     assert document["version"] == 3
-    html = axis_report(test, "today")
-    assert '<div class="lamp red"' in html and "@page { size: A4" in html and "today" in html
+    html = axis_report(test)
+    assert '<div class="lamp red"' in html and "@page { size: A4" in html and ">signature<" in html
     along, past = axis_charts(test)
     assert len(along.panels) == 1 and len(past.panels) == 2
     assert list(past.panels[0].lines[0].x) == [float(k) for k in range(-30, 1)]
