@@ -310,10 +310,10 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
             out.append(Cost(f"breakaway in {way} direction, not identified, so not told", None))
             continue
         limit = abs(found.value if found.value is not None else found.assumed or 0.0)
-        out.append(
-            Cost(f"stiction: breakaway in {way} direction needs more than the table, by",
-                 max(limit - float(level[0]), 0.0))
-        )  # fmt: skip
+        more = limit - float(level[0])
+        if more > 0:
+            said = f"stiction: breakaway in {way} direction needs more than the table, by"
+            out.append(Cost(said, more))
     return (*out, *other_costs(what))
 
 
