@@ -169,9 +169,7 @@ def test_what_a_table_cannot_hold_is_said_in_newtons() -> None:
             assert asymmetry == [pytest.approx(half, rel=1e-3)]
         else:
             assert asymmetry == []
-        assert not any(
-            what.startswith("stiction") for what in costs
-        )  # Stribeck's is above breakaway
+        assert not any(what.startswith("stiction") for what in costs)
         (size,) = (force for what, force in costs.items() if what.startswith("cogging:"))
         assert size is not None and 0.4 < size < 0.75
         (none,) = (force for what, force in costs.items() if what.startswith("rising stiction"))
