@@ -1,13 +1,17 @@
 """What the registry gives an axis test: the last logs of a machine, and its model in force."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 import pytest
 
+from identification.effects._library import built_in
+from identification.model.estimates import Estimate
 from identification.model.plant import Actuator
 from tests.chain import TABLES, model_of, short_recipe
+from workbench.cards.effect_values import written_effect
 from workbench.documents.model_file import model_document
 from workbench.jobs.axis_history import by_quantity, earlier_of
 from workbench.jobs.drift_verdict import Reading
@@ -84,3 +88,27 @@ def test_readings_of_the_drift_test_by_quantity() -> None:
     assert set(found) == {"F_sn", "backlash"}
     one = found["F_sn"]
     assert (one.value, one.low, one.high) == (20.0, 18.5, 21.5)
+
+
+@pytest.mark.slow
+def test_a_model_with_further_effects_tells_this_log_by_its_fit(tmp_path: Path) -> None:
+    values = {"F_s": 5.0, "v_s": 0.03}
+    model = model_of(TABLES["paper_table1"], Actuator(19530.0, 10405.0))
+    whole = written_effect("stribeck", values, built_in())
+    units = {"F_s": "N", "v_s": "m/s"}
+    known = {
+        name: Estimate(value, units.get(name, "1"), *([0.01 * value] if name in units else []))
+        for name, value in whole.values.items()
+    }
+    document = strict(model_document(replace(model, effects={"stribeck": known})))
+    card, recipe = short_recipe(12.0)
+    log = record("s", replace(recipe, plant=replace(recipe.plant, effects=(whole,))), 77)
+    of = Sources(card, card.rig(), (Source(log, "s.csv", "a" * 64, len(log)),), ())
+    with Registry(str(tmp_path / "r.db")) as found:
+        found.add("m", Candidate(document), reason="f", by="t", now=NOW)  # type: ignore[arg-type]
+        found.promote("m", 1, reason="f", by="t", now=NOW)
+        earlier = earlier_of(found, "m", of)
+    assert earlier.remarks == ("by the fit of version 1, in force, which has stribeck",)
+    assert earlier.estimates is not None
+    assert earlier.estimates["F_cp"].value == pytest.approx(12.0, rel=0.01)
+    assert earlier.estimates["F_sn"].value == pytest.approx(23.0, rel=0.01)
