@@ -97,7 +97,7 @@ def test_a_model_with_further_effects_tells_this_log_by_its_fit(tmp_path: Path) 
     whole = written_effect("stribeck", values, built_in())
     units = {"F_s": "N", "v_s": "m/s"}
     known = {
-        name: Estimate(value, units.get(name, "1"), *([0.01 * value] if name in units else []))
+        name: Estimate(value, units.get(name, "1"), 0.01 * value if name in units else None)
         for name, value in whole.values.items()
     }
     document = strict(model_document(replace(model, effects={"stribeck": known})))
