@@ -1,5 +1,6 @@
 """The axis test on one page: a light, why, the numbers with their limits, and two pictures."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from workbench.steps.axis_test import AxisTest, Earlier, Quantity
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
 LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
 SOURCE_OF_LIMITS = {"card": "card", "registry": "logs", "usual": "usual"}
+MOST_REASONS = 4  # on the printed page
 AXIS_HEIGHT = 160
 EACH_DIRECTION = (("F_cp", "positive direction"), ("F_cn", "negative direction"))
 
@@ -81,7 +83,7 @@ def axis_report(test: AxisTest) -> str:
     ]
     body = render(
         "axis_test", light=test.light, sentence=axis_sentence(test).partition(": ")[2],
-        reasons=test.reasons if len(test.reasons) > 1 else (),
+        reasons=_few(test.reasons),
         head=AXIS_HEAD, rows=list(zip(axis_rows(test), test.quantities, strict=True)),
     )  # fmt: skip
     charts = [chart_html(one) for one in axis_charts(test)]
@@ -90,6 +92,16 @@ def axis_report(test: AxisTest) -> str:
     drawn = "".join(map(str, charts))
     parts = [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
     return page(f"Axis test of {test.machine}", lead, parts)
+
+
+def _few(reasons: Sequence[str]) -> list[str]:
+    """Reasons for a printed page: none where there is but one, which stands beside the lamp."""
+    if len(reasons) == 1:
+        return []
+    if len(reasons) <= MOST_REASONS:
+        return list(reasons)
+    left = len(reasons) - MOST_REASONS + 1
+    return [*reasons[: MOST_REASONS - 1], f"{left} more, which the table shows"]
 
 
 def axis_charts(test: AxisTest) -> list[Chart]:
