@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from identification.drift.drift_test import DriftSettings as DriftSettings
     from identification.errors import NotIdentifiable as NotIdentifiable
     from identification.errors import UserError as UserError
+    from workbench.interface.calls import axis_test as axis_test
     from workbench.interface.calls import design as design
     from workbench.interface.calls import drift as drift
     from workbench.interface.calls import experiment as experiment
@@ -37,6 +38,7 @@ _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
     **{name: _CALLS for name in ("simulate", "experiment", "load_model", "read_logs")},
     "robust_design": _CALLS,
+    "axis_test": _CALLS,
     **{name: "workbench.interface.effects" for name in ("effects", "check_effects")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",

@@ -34,11 +34,12 @@ COMMANDS = {
     "identify": "Find friction, plant and actuator of a machine from its logs.",
     "trace": "Find the physical effect that the model of a machine lacks.",
     "drift": "Test whether a machine has changed since its model.",
+    "axis-test": "Test an axis by one log: green, yellow or red, on one page.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "experiment": "Find the run to make next: the reference that tells most.",
     "validate": "Check a design on a plant in simulation.",
-    "export": "Write a design as code for its machine: C, PLC, FMU.",
+    "export": "Write a design as code, a model as tables for its control.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "effects": "List the effects that 'trace' knows; check your own.",
     "paper": "Run the paper in simulation, its figures beside ours.",
@@ -79,6 +80,11 @@ class Terminated(KeyboardInterrupt):
         self.number = number
 
 
+def module_of(name: str) -> str:
+    """The module that holds a command."""
+    return f"workbench.commands.{name.replace('-', '_')}"
+
+
 class LazyGroup(click.Group):
     """The commands of `COMMANDS`; each is imported from `workbench.commands` when it is called."""
 
@@ -88,7 +94,7 @@ class LazyGroup(click.Group):
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command:
         if cmd_name not in COMMANDS:
             raise click.NoSuchCommand(cmd_name, possibilities=COMMANDS, ctx=ctx)
-        command = importlib.import_module(f"workbench.commands.{cmd_name}").command
+        command = importlib.import_module(module_of(cmd_name)).command
         if not isinstance(command, click.Command):
             raise TypeError(f"workbench.commands.{cmd_name}.command is no click.Command")
         return command

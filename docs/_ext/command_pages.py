@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from workbench.cli import COMMANDS
+from workbench.cli import COMMANDS, module_of
 
 HEAD = """# Commands
 
@@ -22,7 +22,7 @@ What each of them writes, key by key, stands in [the contract](../../contract.md
 |---|---|
 """
 PAGE = """
-.. click:: workbench.commands.{name}:command
+.. click:: {module}:command
    :prog: workbench {name}
    :nested: full
 """
@@ -34,4 +34,4 @@ def pages() -> Iterator[tuple[str, str]]:
     below = "\n".join(["", "", "```{toctree}", ":hidden:", "", *COMMANDS, "```", ""])
     yield "commands/index.md", HEAD + "\n".join(rows) + below
     for name in COMMANDS:
-        yield f"commands/{name}.rst", PAGE.format(name=name)
+        yield f"commands/{name}.rst", PAGE.format(name=name, module=module_of(name))

@@ -426,13 +426,15 @@ def _using(name: str, path: str, shop: Shop, number: int) -> list[str]:
     if name == "design":
         targets = [["--to", one] for one in ("c", "st", "plcopen", "fmu", "json", "mat")]
         return [["validate", model, path], ["export", path, *chain(*targets)]][number // 4 % 2]
+    tables = [["--to", one] for one in ("friction-table", "csv", "c", "st")]
     return [
+        ["export", path, *chain(*tables), "--rated", "2"],
         ["design", path],
         ["predict", path, *log],
         ["validate", path, design],
         ["drift", path, *log],
         ["validate", model, design, "--plant", path],
-    ][number % 5]
+    ][number % 6]
 
 
 def result_values(rng: np.random.Generator) -> Family:
@@ -575,18 +577,20 @@ def _lines(shop: Shop, path: str, number: int) -> list[str]:
         ["trace", log, "--test", path, "--card", card],
         ["validate", model, design, "--plant", path],
         ["export", path, "--to", "c"],
-    ][number % 14]
+        ["axis-test", path, "--card", card],
+        ["axis-test", log, "--card", card, "--registry", path],
+    ][number % 16]
 
 
 def names(rng: np.random.Generator) -> Family:
     """Names that are no files, too long, or not to be printed."""
     _ = rng
-    for number, name in enumerate(name for name in NAMES for _place in range(13)):
+    for number, name in enumerate(name for name in NAMES for _place in range(15)):
 
         def make(shop: Shop, _folder: Path, name: str = name, number: int = number) -> list[str]:
             return _lines(shop, name, number)
 
-        yield Case(f"name {name[:20]!r} {number % 13}", make)
+        yield Case(f"name {name[:20]!r} {number % 15}", make)
 
 
 def files(rng: np.random.Generator) -> Family:
@@ -613,7 +617,7 @@ def files(rng: np.random.Generator) -> Family:
         "terminal": lambda path: path.symlink_to("/dev/tty"),
         "zeros": lambda path: path.write_bytes(bytes(10_000)),
     }
-    for how, place in ((how, place) for place in range(13) for how in makers):
+    for how, place in ((how, place) for place in range(15) for how in makers):
 
         def make(shop: Shop, folder: Path, how: str = how, place: int = place) -> list[str]:
             makers[how](folder / "thing")

@@ -259,6 +259,73 @@ def test_export_writes_code(shop: Path, tmp_path: Path, capsys: pytest.CaptureFi
         assert said in refusal(capsys, ["export", design, *arguments], 2)
 
 
+def test_export_writes_the_tables_of_a_model(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    model, design, out = str(shop / "id/model.json"), str(shop / "design/design.json"), tmp_path
+    command = ["export", model, "--name", "X", "--out", str(out / "e")]
+    asked = ["--rated", "2.4 N m", "--per-turn", "10 mm"]
+    found = as_json(capsys, [*command, "--to", "friction-table", "--to", "c", *asked])
+    assert files(out / "e") == {one["file"] for one in found["files"]}
+    assert {one["control"] for one in found["files"]} == {None, "twincat", "sinumerik", "linuxcnc"}
+    assert all(one["error"] < 0.01 for one in found["files"])
+    (cost, *_) = [
+        one
+        for each in found["files"]
+        for one in each["costs"]
+        if one["what"].startswith("asymmetry")
+    ]
+    assert cost["unit"] == "N" and cost["value"] > 1.0
+    assert found["left_out"] == []
+    assert main([*command, "--to", "csv"]) == 0
+    assert "X_friction.csv" in capsys.readouterr().out
+    for file, arguments, said in (
+        (model, ["--to", "backlash"], "the model has no backlash"),
+        (model, ["--to", "cogging-table"], "the model has no cogging"),
+        (model, ["--to", "friction-table", "--control", "codesys"], "no friction table"),
+        (model, ["--to", "friction-table", "--control", "fanuc"], "'fanuc' is not one of"),
+        (model, ["--to", "friction-table", "--rated", "2 kg"], "of another kind"),
+        (model, ["--to", "friction-table", "--precision", "single"], "--precision has no meaning"),
+        (model, ["--to", "friction-table", "--to", "fmu"], "--to fmu of a design"),
+        (model, ["--to", "fmu"], "'design/2' needed"),
+        (design, ["--to", "friction-table"], "'model/1' needed"),
+        (design, ["--to", "c", "--speed", "3"], "--speed has no meaning"),
+    ):
+        assert said in refusal(capsys, ["export", file, *arguments], 2), said
+
+
+def test_axis_test_has_the_status_of_its_light(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, out = str(shop / "log/short.csv"), str(tmp_path / "a")
+    card = tmp_path / "card.toml"
+    text = (shop / "card.toml").read_text(encoding="utf-8")
+    for limits, light, status in (
+        ("[11.0, 13.0]", "green", 0),
+        ('["5 N", "6 N"]', "red", 1),
+        (None, "yellow", 1),
+    ):
+        wanted = "" if limits is None else f"\n[limits]\nF_cp = {limits}\n"
+        card.write_text(text + wanted, encoding="utf-8")
+        found = as_json(capsys, ["axis-test", log, "--card", str(card), "--out", out], status)
+        assert found["light"] == light and files(tmp_path / "a") == {
+            "axis_test.json",
+            "report.html",
+        }
+        assert json.loads((tmp_path / "a/axis_test.json").read_text())["light"] == light
+        assert ("next" in found) is (status == 1)
+    assert main(["axis-test", log, "--card", str(card), "--out", out]) == 1
+    assert capsys.readouterr().out.startswith("YELLOW: no limits to judge by")
+    card.write_text(text + "\n[limits]\nF_cp = [6.0, 5.0]\n", encoding="utf-8")
+    for arguments, said in (
+        ([log, "--card", str(card)], "the lower limit first needed"),
+        (["none.csv", "--card", str(shop / "card.toml")], "none.csv"),
+        ([log, "--card", str(shop / "card.toml"), "--machine", "x"], "give --registry too"),
+        ([log, "--card", str(shop / "card.toml"), "--registry", out], "registry"),
+    ):
+        assert said in refusal(capsys, ["axis-test", *arguments], 2), said
+
+
 def test_validate_passes_and_fails_with_its_status(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

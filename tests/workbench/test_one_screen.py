@@ -224,8 +224,27 @@ def doctor() -> Iterator[Screen]:
     yield installation_view(look_over(), {"where": "x" * 150, "answers": False}, LOGS)
 
 
+def axis_test() -> Iterator[Screen]:
+    """Every number beyond its limits, of a log of many runs."""
+    from tests.chain import short_recipe
+    from workbench.logs.sources import Source, Sources
+    from workbench.report.axis_test import axis_view
+    from workbench.steps import axis_test as step
+    from workbench.steps.axis_limits import MEANING_OF
+    from workbench.steps.simulate import record
+
+    card, recipe = short_recipe()
+    log = record("short", recipe, 7)
+    runs = (Source(log, "a long name of a file " * 3, "0" * 64, len(log)),) * 3
+    limits = dict.fromkeys(MEANING_OF, (1e6, 2e6))
+    for given in ({}, limits):
+        found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
+        yield axis_view(step.axis_test(found), OUT)
+
+
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
     identify, trace, validate, design, demo, drift, experiment, predict, reidentify, fleet, doctor,
+    axis_test,
 )  # fmt: skip
 BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # run below
 ELSEWHERE = {"paper": "tests/workbench/paper/test_study.py"}  # as it takes long to make
@@ -233,7 +252,8 @@ NO_SCREEN = ("serve", "work", "watch")  # events as JSON lines, until they are s
 
 
 def test_every_command_is_held() -> None:
-    held = {view.__name__ for view in BY_VIEW} | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
+    views = {view.__name__.replace("_", "-") for view in BY_VIEW}
+    held = views | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
     assert held == set(cli.COMMANDS)
     for path in ELSEWHERE.values():
         assert "one_screen(" in (Path(__file__).parents[2] / path).read_text("utf-8")
@@ -354,3 +374,20 @@ def test_a_simulation_and_an_export(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     chosen = ["--controller", "rst", "--compensator"]
     chosen += [word for name in ("c", "st", "plcopen", "json") for word in ("--to", name)]
     assert "written: " in held_by_command("export", "design.json", *chosen, "--out", "code")
+
+
+def test_an_export_of_every_table(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from tests.workbench.export.models import COGGING, PLACE, PLAY, STRIBECK, linear
+    from workbench.documents.model_file import model_document
+    from workbench.output import dumps
+
+    monkeypatch.chdir(tmp_path)
+    slow = {"warmup": {"a": -0.2, "tau": 100.0}, "rising_stiction": {"F_r": 1.0, "tau": 1.0}}
+    full = linear({**STRIBECK, **COGGING, **PLACE, **PLAY, **slow})
+    full = replace(full, fit=replace(full.fit, adequate=False))
+    Path("model.json").write_text(dumps(model_document(full)), "utf-8")
+    every = ("friction-table", "cogging-table", "backlash", "csv", "c", "st")
+    asked = ["--rated", "2 N m", "--per-turn", "48 mm", "--encoder", "motor", "--speed", "0.5 m/s"]
+    asked += [word for one in every for word in ("--to", one)]
+    text = held_by_command("export", "model.json", *asked, "--out", "tables")
+    assert "asymmetry" in text and "written: tables" in text

@@ -7,7 +7,7 @@ workbench/cards/card_faults.py.
 import re
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -41,7 +41,7 @@ _OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
 class Card:
     """A card as read: `signals` by canonical name, `files` the set, `split` its named groups.
 
-    `controller`: the one that the machine has now.
+    `controller`: the one that the machine has now; `limits`: of `axis-test`, in SI, by name.
     """
 
     path: Path
@@ -53,6 +53,7 @@ class Card:
     recipe: Recipe | None
     rigs: Mapping[str, Rig]
     controller: CardController | None = None
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -124,12 +125,20 @@ def card_from(
         recipe=recipe,
         rigs=MappingProxyType(rigs),
         controller=_controller(path, parsed, rigs[""]),
+        limits=_limits(path, parsed, rigs[""]),
     )
 
 
 def _rig(path: Path, section: RigSection, signals: Mapping[str, SignalSpec]) -> Rig:
     try:
         return section.value(signals)
+    except BadCard as error:
+        raise BadCard(f"{path}: {error}") from None
+
+
+def _limits(path: Path, parsed: CardFile, rig: Rig) -> Mapping[str, tuple[float, float]]:
+    try:
+        return MappingProxyType({} if parsed.limits is None else parsed.limits.value(rig))
     except BadCard as error:
         raise BadCard(f"{path}: {error}") from None
 

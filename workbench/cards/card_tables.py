@@ -13,6 +13,7 @@ from identification.errors import BadCard
 from identification.log import Rig, RigKind
 from identification.model.plant import over
 from workbench.cards.controller import ControllerSection
+from workbench.cards.limits import LimitsSection
 from workbench.cards.quantities import in_unit_of
 from workbench.cards.recipe import RecipeSection
 from workbench.cards.sensors import column_scale, command_unit, parse_gain
@@ -214,6 +215,8 @@ class CardFile(CardTable):
     """in place of a log: what `simulate` makes one from"""
     controller: ControllerSection | None = None
     """the controller that the machine has now"""
+    limits: LimitsSection | None = None
+    """what `axis-test` holds the machine to"""
 
     @field_validator("signals", mode="before")
     @classmethod

@@ -44,11 +44,12 @@ from workbench.interface.inputs import (
     read_card,
     sources,
 )
-from workbench.interface.logs import DriftResult, PredictResult, SimulateResult
+from workbench.interface.logs import AxisTestResult, DriftResult, PredictResult, SimulateResult
 from workbench.interface.loops import DesignResult, ExperimentResult, RobustResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
 from workbench.output import Bar, progress
+from workbench.steps.axis_test import axis_test as test_of_axis
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
@@ -258,6 +259,28 @@ def drift(
         write_stream(Path(state), tested.stream)
     path = os.fspath(model) if isinstance(model, str | os.PathLike) else f"model of {known.card}"
     return DriftResult(tested, path)
+
+
+def axis_test(
+    logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, registry: str | None = None, machine: str | None = None,
+    seed: int = 0,
+) -> AxisTestResult:  # fmt: skip
+    """An axis by one log, green, yellow or red, as `workbench axis-test`.
+
+    registry: SQLite file or PostgreSQL URL whose last 30 logs of the machine, by default of the
+    card's name, give its limits where the card has none.
+    """
+    found = sources(logs, None if card is None else read_card(card), rig, signals)
+    name, earlier = machine or found.card.name, None
+    with _bar("testing"):
+        if registry is not None:
+            from workbench.jobs.axis_history import earlier_of
+            from workbench.registry.store import Registry
+
+            with Registry(registry, create=False) as where:
+                earlier = earlier_of(where, name, found, seed)
+        return AxisTestResult(test_of_axis(found, earlier, name))
 
 
 def simulate(

@@ -8,6 +8,7 @@ from identification.log import Log
 from workbench.cards.card import Card
 from workbench.interface.result import Part, Result
 from workbench.output import dumps
+from workbench.steps.axis_test import AxisTest
 from workbench.steps.drift import Drifted
 from workbench.steps.predict import Predicted
 
@@ -132,6 +133,59 @@ class DriftResult(Result):
     @property
     def _command(self) -> str:
         return "drift"
+
+
+@dataclass(frozen=True, repr=False)
+class AxisTestResult(Result):
+    """An axis by one log: its light, its numbers and their limits."""
+
+    found: AxisTest
+
+    @property
+    def light(self) -> str:
+        """ "green", "yellow" or "red"."""
+        return self.found.light
+
+    @property
+    def reasons(self) -> Sequence[str]:
+        """Why it is not green, the worst first."""
+        return self.found.reasons
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.axis_test import axis_document
+
+        return axis_document(self.found)
+
+    def report(self) -> str:
+        from workbench.report.axis_test import axis_report
+
+        return axis_report(self.found)
+
+    def plot(self) -> "Figure":
+        from workbench.report.axis_test import axis_charts
+        from workbench.report.chart_figure import chart_figure
+
+        return chart_figure(axis_charts(self.found)[0])
+
+    def _view(self) -> object:
+        from workbench.report.axis_test import axis_view
+
+        return axis_view(self.found, None)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.axis_test import AXIS_HEAD, axis_rows, axis_sentence
+
+        rows = axis_rows(self.found)
+        return axis_sentence(self.found), [Part(AXIS_HEAD, rows, self.found.reasons)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        yield "axis_test.json", self.to_json() + "\n"
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "axis-test"
 
 
 @dataclass(frozen=True, repr=False)

@@ -18,6 +18,7 @@ from workbench.page.pages import show
 from workbench.page.version_looks import EXPORTS
 from workbench.page.visitors import Visitor, reading
 from workbench.page.work import report_response
+from workbench.registry.axis_past import newest_lights
 from workbench.registry.difference import difference
 from workbench.registry.results import JudgedLog, condition, last_logs, log_count
 from workbench.registry.store import Registry
@@ -37,6 +38,7 @@ def machine(request: Request, visitor: Visitor) -> Response:
     last = MORE_LOGS if request.query_params.get("logs") == "all" else LAST_LOGS
     logs = last_logs(registry.database, name, last)
     current = state.in_force.number if state.in_force else None
+    tested, lights = newest_lights(logs[:LAST_LOGS])
     other = next((v.number for v in reversed(versions) if v.number != current), None)
     return show(
         request, visitor, "machine", title=name, state=state, versions=list(reversed(versions)),
@@ -44,6 +46,7 @@ def machine(request: Request, visitor: Visitor) -> Response:
         alarms=[one for one in logs if one.verdict in ALARMING], exports=EXPORTS,
         condition=condition(registry.database, name), total=log_count(registry.database, name),
         reports=[path.name for path in _reports(request)], charts=_charts(logs),
+        tested=tested, lights=lights,
     )  # fmt: skip
 
 

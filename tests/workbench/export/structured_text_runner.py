@@ -2,6 +2,7 @@
 into a Python function. No PLC's own compiler is to be had by a package manager; this is what the
 tests run."""
 
+import math
 import operator
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -29,6 +30,7 @@ FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "min": lambda a, b: b if b < a else a,
     "max": lambda a, b: b if b > a else a,
     "abs": abs,
+    "cos": math.cos,
 }
 ZERO = {"LREAL": 0.0, "REAL": np.float32(0.0), "DINT": 0, "BOOL": False}
 Values = dict[str, Any]

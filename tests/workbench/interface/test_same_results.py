@@ -199,6 +199,16 @@ def test_predict(bench: Bench, model: Any, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_axis_test(bench: Bench, tmp_path: Path) -> None:
+    log, card = bench.path("day2.csv"), bench.path("card.toml")
+    folder = bench.ran("axis", "axis-test", log, "--card", card)
+    found = wb.axis_test(log, card)
+    assert found.to_json() + "\n" == (folder / "axis_test.json").read_text("utf-8")
+    assert found.report() == (folder / "report.html").read_text("utf-8")
+    assert found.light == "yellow" and "no limits to judge by" in found.reasons[0]
+    shown_well(found, "YELLOW")
+
+
 def test_drift(bench: Bench, model: Any, tmp_path: Path) -> None:
     path = bench.path("model/model.json")
     arguments = ("drift", path, bench.path("day2.csv"), "--card", bench.path("card.toml"))

@@ -146,6 +146,23 @@ def test_the_table_and_the_machine_show_it(page: Page) -> None:
     assert page.client.get("/machine/x%26y/version/1/model.json").json() == {"m": 1.0}
 
 
+def test_a_machine_shows_the_lights_of_its_newest_log(page: Page) -> None:
+    registry = page.registry
+    for name in ("fresh", "same", "worn"):  # a page is kept for a moment, so one for each state
+        registry.add(name, Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
+        for k in range(1, 8) if name != "fresh" else ():
+            found = evidence(told("F_cp", 0.01 * (k % 3)), told("m", 0.001))
+            judge(registry, name, k, "none", found)
+    judge(registry, "worn", 8, "none", evidence(told("F_cp", 0.4), told("m", 0.001)))
+    fresh, same, worn = (
+        page.client.get(f"/machine/{name}").text for name in ("fresh", "same", "worn")
+    )
+    assert "No log has told its parameters yet" in fresh
+    assert "run7.csv, within the mean" in same and 'class="state done">green' in same
+    assert 'class="state failed">red' not in same
+    assert "run8.csv, within the mean" in worn and 'class="state failed">red' in worn
+
+
 @pytest.mark.parametrize(
     "query",
     [

@@ -1,0 +1,140 @@
+"""An axis by its equation of motion alone, in a second: what a maintenance engineer asks of a log.
+
+Mass, friction and breakaway of each direction, and friction along the travel, by least squares of
+the equation in weak form; no free run, no search. Deviations are the jackknife's over stretches of
+the log, so they hold what varies in it, and 0.4 % of a value by which the equation errs itself.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.errors import NotIdentifiable
+from identification.estimation.regression.equation_rows import MotionLog, mechanical, motion_log
+from identification.estimation.regression.standstill import breakaways
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    solve_rows,
+    spread_of_left_out,
+)
+from identification.log import Log
+
+OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
+COULOMB_LEVELS = ("F_cp", "F_cn")
+COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
+MOST_SPREAD = 0.25  # deviation of mass and viscous friction, of their values, that is told
+SETTLING_ROUNDS = 3  # in which the rows' noise, which depends on mass and damping, settles
+FEWEST_SLIDING = 8  # windows of sliding in each direction
+FEWEST_BREAKAWAYS = 3  # of a direction, from which they tell its limit
+SLOW_QUARTER = 4  # a quarter of the breakaways
+OF_OFF = 1.4826  # deviation of normal values, of the median of their distance from theirs
+OF_MEDIAN = (np.pi / 2.0) ** 0.5  # its deviation, of the mean's
+
+
+@dataclass(frozen=True, eq=False)
+class AxisEquation:
+    """What the equation of motion tells of one log.
+
+    values, sd: by name, F_cp, F_cn [N], and where they are told m [kg], F_vp, F_vn [N s/m], and the
+    breakaway forces F_sp, F_sn [N], sizes. offset: (F_cn - F_cp)/2 [N], a constant force towards +y
+    if friction is alike both ways, with its sd. breakaways: how many, up and down. relative: share
+    of the force that is left while sliding. position [m], level [N] (size) and up, (r,): Coulomb
+    friction of each window of sliding.
+    """
+
+    values: dict[str, float]
+    sd: dict[str, float]
+    offset: tuple[float, float]
+    breakaways: tuple[int, int]
+    relative: float
+    position: Array
+    level: Array
+    up: BoolArray
+
+
+def axis_equation(log: Log, *, held: bool) -> AxisEquation:
+    """The log's equation of motion; y [m] and F [N] are needed.
+
+    held: the force is a command held over each period. Raises NotIdentifiable where too little
+    slides in a direction, BadLog where the log is too short for one window.
+    """
+    one = motion_log(log, held=held, by_command=False)
+    up, down = int(np.count_nonzero(one.up)), int(np.count_nonzero(~one.up))
+    if min(up, down) < FEWEST_SLIDING:
+        raise NotIdentifiable(
+            f"{log.name}: {up} windows of sliding in positive and {down} in negative direction, at"
+            f" least {FEWEST_SLIDING} of each needed; log strokes in both directions"
+        )
+    rows, theta = _settled(one)
+    used, theta, each = _told_apart(rows)
+    spread = np.hypot(spread_of_left_out(each), OF_EQUATION * np.abs(theta))
+    names = [rows.names[k] for k in used]
+    values = dict(zip(names, theta.tolist(), strict=True))
+    sd = dict(zip(names, spread.tolist(), strict=True))
+    up_at, down_at = names.index("F_cp"), names.index("F_cn")
+    offset = spread_of_left_out(0.5 * (each[:, [down_at]] - each[:, [up_at]]))
+    bias = 0.5 * OF_EQUATION * float(np.hypot(values["F_cp"], values["F_cn"]))
+    limits, limit_sd, count = _breakaway(one, values.get("m", 0.0))
+    left = rows.b - rows.X[:, used] @ theta
+    beside = [k for k in range(len(used)) if k not in (up_at, down_at)]
+    level = rows.b - rows.X[:, [used[k] for k in beside]] @ theta[beside]
+    return AxisEquation(
+        {**values, **limits}, {**sd, **limit_sd},
+        (0.5 * (values["F_cn"] - values["F_cp"]), float(np.hypot(offset[0], bias))), count,
+        float(np.linalg.norm(left) / max(float(np.linalg.norm(rows.b)), 1e-300)),
+        np.asarray(log["y"])[one.sliding.middle], level * np.where(one.up, 1.0, -1.0), one.up,
+    )  # fmt: skip
+
+
+def _settled(one: MotionLog) -> tuple[Rows, Array]:
+    """The rows, and the parameters of their least squares."""
+    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    for _ in range(SETTLING_ROUNDS):
+        theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
+    return mechanical(one, np.maximum(theta, 0.0)), theta
+
+
+def _told_apart(rows: Rows) -> tuple[list[int], Array, Array]:
+    """The columns that the log tells apart, their parameters (k,), and these without each stretch
+    of the log in turn (b, k): all, else without mass, else without viscous friction too.
+
+    A column that is not told would take its neighbours' parameters with it.
+    """
+    for used in COLUMNS_TRIED:
+        some = replace(rows, X=rows.X[:, used])
+        theta = solve_rows(some).theta
+        blocks = np.unique(rows.block)
+        each = np.array([solve_rows(some, rows.block != block).theta for block in blocks])
+        further = [k for k, column in enumerate(used) if rows.names[column] not in COULOMB_LEVELS]
+        wide = spread_of_left_out(each)[further] > MOST_SPREAD * theta[further]
+        if not np.any(wide):  # nor below 0
+            break
+    return used, theta, each
+
+
+def _breakaway(
+    one: MotionLog, m: float
+) -> tuple[dict[str, float], dict[str, float], tuple[int, int]]:
+    """Breakaway forces as sizes [N], their deviations, and how many there were up and down.
+
+    Of each direction the median of the quarter in which the force rose most slowly: the motion is
+    seen late, and by then a fast force has gone further. The deviation holds half of what the force
+    rises in a sample.
+    """
+    if not m > 0:
+        return {}, {}, (0, 0)
+    events = breakaways(one, m)
+    values, sd, count = dict[str, float](), dict[str, float](), list[int]()
+    for name, way in (("F_sp", 1.0), ("F_sn", -1.0)):
+        own = events.direction == way
+        count.append(int(np.count_nonzero(own)))
+        if count[-1] >= FEWEST_BREAKAWAYS:
+            order = np.argsort(np.abs(events.rate[own]), kind="stable")
+            slow = order[: max(FEWEST_BREAKAWAYS, count[-1] // SLOW_QUARTER)]
+            force, rate = np.abs(events.force[own])[slow], np.abs(events.rate[own])[slow]
+            values[name] = float(np.median(force))
+            off = float(np.median(np.abs(force - values[name])))
+            late = 0.5 * one.log.h * float(np.median(rate))
+            sd[name] = float(np.hypot(OF_MEDIAN * OF_OFF * off / len(force) ** 0.5, late))
+    return values, sd, (count[0], count[1])

@@ -1,0 +1,95 @@
+"""`workbench axis-test`: one log of an axis -> a light, its numbers with limits, one page."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from workbench.ending import StatusCommand, Step, refused_with, step
+from workbench.options import card_option, complete_file
+from workbench.output import OutputFolder, emit, output_options
+
+if TYPE_CHECKING:
+    from workbench.steps.axis_test import AxisTest
+
+
+@click.command(
+    cls=StatusCommand,
+    done="green",
+    refusal="yellow or red, or the log tells nothing; the first line says why",
+    epilog="Example: workbench axis-test run1.csv --card bench-a/card.toml --registry registry.db",
+)
+@click.argument("log", metavar="LOG", shell_complete=complete_file)
+@card_option
+@click.option(
+    "--registry",
+    "where",
+    metavar="FILE|URL",
+    help="SQLite file or postgresql://... whose last 30 logs of the machine give its limits.",
+)
+@click.option(
+    "--machine", metavar="NAME", help="The machine's name in the registry.  [default: the card's]"
+)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@output_options
+def command(
+    log: str,
+    card: str,
+    where: str | None,
+    machine: str | None,
+    seed: int,
+    as_json: bool,
+    out: Path | None,
+) -> int:
+    """Test an axis by one log: friction and breakaway each way, mass, constant force, backlash.
+
+    Each number has its limits, of the card's [limits], else the mean +- 3 sd of the machine's last
+    logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side, or
+    nothing to judge by. Writes axis_test.json, and report.html to be printed on one page.
+    """
+    from workbench.logs.sources import read_sources
+    from workbench.report.axis_test import axis_report, axis_view
+    from workbench.report.next_steps import looked_over
+    from workbench.steps.axis_test import axis_document, axis_test
+
+    sources = read_sources([log], card)
+    name = machine or sources.card.name
+    earlier = None
+    if where is not None:
+        from workbench.jobs.axis_history import earlier_of
+        from workbench.registry.store import Registry
+
+        with Registry(where, create=False) as registry:
+            earlier = earlier_of(registry, name, sources, seed)
+    elif machine is not None:
+        raise click.UsageError("--machine is a name in a registry; give --registry too.")
+    with (
+        refused_with(looked_over([log], card)),
+        OutputFolder("axis-test", out, now=datetime.now()) as folder,
+    ):
+        test = axis_test(sources, earlier, name)
+        document = axis_document(test)
+        folder.write_json("axis_test.json", document)
+        folder.write_text("report.html", axis_report(test))
+    emit(
+        {**document, "out": folder.final},
+        as_json,
+        lambda: axis_view(test, folder.final),
+        after_axis_test(test, log, card, where),
+    )
+    return 0 if test.light == "green" else 1
+
+
+def after_axis_test(test: "AxisTest", log: str, card: str, where: str | None) -> Step | None:
+    """What to type where the light is not green."""
+    if test.light == "green":
+        return None
+    if test.of("explained").light in ("yellow", "red") or test.of("explained").light == "":
+        return step("what else acts", "trace", log, "--card", card)
+    if test.unjudged and where is None:
+        return step("limits of its own logs", "axis-test", log, "--card", card,
+                    "--registry", "registry.db")  # fmt: skip
+    if where is None:
+        return step("what has changed", "identify", log, "--card", card)
+    return step("what its logs have shown", "registry", "show", test.machine, "--registry", where)

@@ -1,0 +1,351 @@
+"""What a control compensates by: a model's numbers for its tables, and what a table cannot hold."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from design.compensation_tables import (
+    LOWEST_SHARE,
+    Harmonic,
+    SlidingFriction,
+    along,
+    cogging_harmonics,
+    is_of_place,
+    is_of_speed,
+)
+from identification.effects._base import Acting
+from identification.errors import BadModel
+from identification.model.estimates import Estimate
+from workbench.cards.readable import Unit, number, shown_unit, units_of
+from workbench.documents.model import Model
+from workbench.export.exported import identifier
+
+Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
+Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
+Encoder = Literal["motor", "load"]
+TOLD_BY_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
+MOST_OF_IT = 0.5  # of the asymmetry, from which a constant force is worth saying
+PLACES_ALONG = 400  # of the travel, at which a force of place is looked at
+NO_TABLE_HOLDS = "what it adds depends on what was before, so no table holds it"
+
+
+@dataclass(frozen=True)
+class TablesAsked:
+    """What a user says that no model can: speeds, gearing, motor, encoder; SI, None for not said.
+
+    high: highest speed of the tables; per_turn: travel of the axis in one turn of its motor [m or
+    rad]; rated: rated torque [N m], or force [N] of a linear motor, of which drives count their
+    torque in shares; encoder: by which the control positions, before the play or behind it.
+    """
+
+    name: str | None = None
+    high: float | None = None
+    per_turn: float | None = None
+    rated: float | None = None
+    encoder: Encoder | None = None
+
+
+@dataclass(frozen=True)
+class Cost:
+    """What a table leaves uncompensated, in words; force [N or N m], None where no log tells it."""
+
+    what: str
+    force: float | None
+
+
+@dataclass(frozen=True)
+class TableFile:
+    """A file for a control ("" for any), as text; units: in words; where: it is to go.
+
+    error: largest deviation from the model over the table's range, relative; None where it has no
+    range. costs: what it leaves uncompensated. remarks: what to know, a line each.
+    """
+
+    name: str
+    text: str
+    table: Table
+    control: Control | Literal[""]
+    units: str
+    where: str
+    points: int
+    error: float | None = None
+    costs: tuple[Cost, ...] = ()
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Compensation:
+    """A model, and what was asked of its tables."""
+
+    model: Model
+    asked: TablesAsked
+
+    @cached_property
+    def name(self) -> str:
+        """Prefix of files and blocks."""
+        return identifier(self.asked.name or self.model.card)
+
+    @property
+    def rotary(self) -> bool:
+        """Whether the axis turns."""
+        return self.model.rotary
+
+    @property
+    def force_unit(self) -> str:
+        """N or N m."""
+        return units_of(self.rotary).force.name
+
+    @property
+    def speed_unit(self) -> Unit:
+        """In which speeds of the axis are shown."""
+        return units_of(self.rotary).velocity
+
+    @cached_property
+    def friction(self) -> SlidingFriction:
+        """Friction while sliding; raises BadModel where a number of it is not identified."""
+        self.need("a friction table", TOLD_BY_SLIDING)
+        for one in filter(is_of_speed, self.model.acting):
+            for name, found in self.model.effects[one.key].items():
+                if not found.known:
+                    raise BadModel(self.untold("a friction table", f"{one.key}.{name}", found))
+        return SlidingFriction(self.model.simulated, LOWEST_SHARE * self.high, self.high)
+
+    @property
+    def high(self) -> float:
+        """Highest speed of the tables [m/s]: as asked, else what the logs show."""
+        found = self.asked.high or self.model.speed
+        if found is None:
+            raise BadModel(
+                f"{self.model.card}: the model does not say how fast its logs are; give the highest"
+                " speed of the table by --speed, or run 'workbench identify' again"
+            )
+        return found
+
+    def need(self, what: str, names: Iterable[str]) -> None:
+        """Raises BadModel where one of the nine is not identified."""
+        for name in names:
+            found = self.model.friction[name]
+            if not found.known:
+                raise BadModel(self.untold(what, name, found))
+
+    def untold(self, what: str, name: str, found: Estimate) -> str:
+        """The refusal of what needs a number that no log tells."""
+        return (
+            f"{self.model.card}: {what} needs {name}, which is not identified"
+            f" ({first_of(found.reason)}); no number is assumed for it"
+        )
+
+    def small(self, names: Iterable[str]) -> Iterator[str]:
+        """A line for each parameter of which the logs tell no more than that it is small."""
+        for name in names:
+            found = self.model.friction[name]
+            if found.value is None and found.at_most is not None:
+                yield (
+                    f"{name}: too small for the logs to tell, at most"
+                    f" {number(found.at_most)} {found.unit}; the table has"
+                    f" {number(found.assumed or 0.0)}"
+                )
+
+    @property
+    def missing(self) -> tuple[str, ...]:
+        """A remark where the model leaves much of the force."""
+        left = self.model.fit.force_relative
+        if self.model.fit.adequate or left is None:
+            return ()
+        return (
+            f"the model leaves {100 * left:.2g} % of the force while sliding, which is more than"
+            " noise: 'workbench trace' finds what it lacks",
+        )
+
+    @property
+    def beyond(self) -> tuple[str, ...]:
+        """A remark where the tables go further than the logs."""
+        seen, unit = self.model.speed, self.speed_unit
+        if seen is None or self.high <= 1.001 * seen:
+            return ()
+        return (
+            f"the logs reach {number(unit.factor * seen)} {unit.name}: above it the table is the"
+            " model's law, not a measurement",
+        )
+
+    @cached_property
+    def places(self) -> tuple[Acting, ...]:
+        """Effects that are forces of place, with the sizes that the logs tell; `untold_places` has
+        the others, which are 0 here."""
+        return tuple(one for one, _ in self._places if one is not None)
+
+    @property
+    def untold_places(self) -> tuple[str, ...]:
+        """A line for each number of a force of place that no log tells."""
+        return tuple(line for _, lines in self._places for line in lines)
+
+    @cached_property
+    def _places(self) -> list[tuple[Acting | None, list[str]]]:
+        return [self._told(one) for one in self.model.acting if is_of_place(one)]
+
+    def _told(self, one: Acting) -> tuple[Acting | None, list[str]]:
+        """The effect without the sizes that no log tells; None where its shape is not told."""
+        found, lines, values = self.model.effects[one.key], list[str](), dict(one.values)
+        for p in one.effect.params:
+            if found[p.name].known:
+                continue
+            why = f"{one.key}.{p.name} is not identified ({first_of(found[p.name].reason)})"
+            if not p.linear:
+                return None, [f"{why}, so {one.key} is left out"]
+            values[p.name] = 0.0
+            lines.append(f"{why}, so it is 0 in the table")
+        return one.effect.acting(values), lines
+
+    @cached_property
+    def harmonics(self) -> tuple[Harmonic, ...]:
+        """Cogging of the axis by its waves, the largest first; empty where none is told."""
+        return cogging_harmonics(self.places)
+
+    @cached_property
+    def play(self) -> Estimate | None:
+        """Width of the play [m]; None where the model has none.
+
+        Raises BadModel where it has one of unknown width.
+        """
+        found = self.model.effects.get("backlash", {}).get("width")
+        if found is not None and found.value is None:
+            raise BadModel(self.untold("backlash", "its width", found))
+        return found
+
+    @property
+    def turn(self) -> float:
+        """Travel of the axis [m or rad] over which orders are counted: a turn of its motor; of a
+        rotary axis whose gearing is not said its own; else the longest period of its cogging."""
+        if self.asked.per_turn is not None:
+            return self.asked.per_turn
+        return 2.0 * np.pi if self.rotary else max(one.period for one in self.harmonics)
+
+    @property
+    def turn_words(self) -> str:
+        """What `turn` is."""
+        if self.asked.per_turn is not None:
+            return "a turn of the motor"
+        return "a turn of the axis" if self.rotary else "the longest period of the cogging"
+
+    @property
+    def at(self) -> str:
+        """What the speeds and torques of a drive's files are of, in words."""
+        return f"speeds and torques of a drive are {self.at_motor.words}"
+
+    @property
+    def at_motor(self) -> "AtMotor":
+        """How forces and speeds of the axis are at its motor."""
+        return AtMotor(self.rotary, self.asked.per_turn)
+
+
+@dataclass(frozen=True)
+class AtMotor:
+    """Forces and speeds of an axis at its motor, which turns, or is linear.
+
+    A linear axis of which no `per_turn` is said has a linear motor, a rotary one its motor on it.
+    """
+
+    rotary: bool
+    per_turn: float | None
+
+    @property
+    def turns(self) -> bool:
+        """Whether the motor turns."""
+        return self.rotary or self.per_turn is not None
+
+    @property
+    def travel(self) -> float:
+        """Travel of the axis [m or rad] for each radian of the motor; 1 where they are one."""
+        return 1.0 if self.per_turn is None else self.per_turn / (2.0 * np.pi)
+
+    @property
+    def torque_unit(self) -> str:
+        """N m, or N of a linear motor."""
+        return "N m" if self.turns else "N"
+
+    @property
+    def speed(self) -> Unit:
+        """rpm, or m/min of a linear motor, for each m/s or rad/s of the axis."""
+        if not self.turns:
+            return Unit("m/min", 60.0)
+        return Unit("rpm", 60.0 / (2.0 * np.pi * self.travel))
+
+    @property
+    def words(self) -> str:
+        """What was taken for it."""
+        if self.per_turn is not None:
+            unit, factor = shown_unit("rad" if self.rotary else "m")
+            return f"of the motor, {number(factor * self.per_turn, 6)} {unit} of the axis a turn"
+        return "of a motor on the axis itself" if self.rotary else "of a linear motor"
+
+
+def first_of(reason: str | None) -> str:
+    """What a reason says, without its advice."""
+    return (reason or "no log tells it").partition(";")[0]
+
+
+def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
+    """What a table of friction against speed leaves, the common part; signed: it has both ways."""
+    curve, out = what.friction, list[Cost]()
+    if not signed:
+        off, constant = curve.asymmetry, curve.constant_share
+        said = "asymmetry: the table is the mean of both directions, off either way by up to"
+        if abs(constant) > MOST_OF_IT * off > 0:
+            said = (
+                f"asymmetry: the table is the mean of both directions (a constant"
+                f" {number(constant)} {what.force_unit} beside it would take most of it), off"
+                " either way by up to"
+            )
+        out.append(Cost(said, off))
+    lowest = np.array([curve.low])
+    for name, way, level in (
+        ("F_sp", "positive", curve.positive(lowest)),
+        ("F_sn", "negative", curve.negative(lowest)),
+    ):
+        found = what.model.friction[name]
+        if not found.known:
+            out.append(Cost(f"breakaway in {way} direction, not identified, so not told", None))
+            continue
+        limit = abs(found.value if found.value is not None else found.assumed or 0.0)
+        more = limit - float(level[0])
+        if more > 0:
+            said = f"stiction: breakaway in {way} direction needs more than the table, by"
+            out.append(Cost(said, more))
+    return (*out, *other_costs(what))
+
+
+def other_costs(what: Compensation) -> Iterator[Cost]:
+    """Effects of the model that a friction table does not hold, with their sizes where known."""
+    for one in what.model.acting:
+        effect = one.effect
+        if is_of_speed(one) or effect.place.shows or effect.place.in_actuator:
+            continue
+        said = one.key.replace("_", " ")
+        if effect.place.unit != "N" or effect.evolve is not None or effect.signals:
+            yield Cost(f"{said}: {NO_TABLE_HOLDS}", None)
+        elif set(effect.depends_on) <= {"y", "v"}:
+            kind = "a force of place, not friction" if is_of_place(one) else "varies with place"
+            yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))
+        else:
+            yield Cost(f"{said}: depends on {', '.join(effect.depends_on)}, so not held", None)
+
+
+def largest_along(model: Model, one: Acting) -> float:
+    """Largest size of an effect along the travel of the logs [N], either way."""
+    y = np.linspace(*model.travel, PLACES_ALONG)
+    speed = np.full(PLACES_ALONG, model.speed or 0.0)
+    found = (along(one, plant=model.simulated, way=d, y=y, v=d * speed) for d in (1, -1))
+    return max(float(np.max(np.abs(each))) for each in found)
+
+
+def in_file(costs: Iterable[Cost], unit: str) -> list[str]:
+    """Costs as lines of a file."""
+    return [cost_line(one, unit) for one in costs]
+
+
+def cost_line(one: Cost, unit: str) -> str:
+    """A cost in words."""
+    return one.what if one.force is None else f"{one.what} {number(one.force)} {unit}"

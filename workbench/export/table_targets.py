@@ -1,0 +1,93 @@
+"""The tables of a model and the controls that take them: which files are written, and which not."""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from identification.errors import BadModel
+from workbench.export.backlash_formats import BACKLASH, backlash_csv
+from workbench.export.cogging_formats import COGGING, NO_COGGING_TABLE, cogging_csv, turn_csv
+from workbench.export.compensation import Compensation, TableFile
+from workbench.export.feed_forward import feed_forward_c, feed_forward_st
+from workbench.export.friction_formats import FRICTION, NO_FRICTION_TABLE, friction_csv
+
+Writer = Callable[[Compensation], TableFile]
+NEUTRAL: Mapping[str, tuple[Writer, ...]] = {
+    "friction-table": (friction_csv,),
+    "cogging-table": (cogging_csv, turn_csv),
+    "backlash": (backlash_csv,),
+}
+OF_CONTROLS: Mapping[str, Mapping[str, tuple[Writer, ...]]] = {
+    "friction-table": FRICTION,
+    "cogging-table": COGGING,
+    "backlash": BACKLASH,
+}
+NOT_THERE: Mapping[str, Mapping[str, str]] = {
+    "friction-table": {"codesys": NO_FRICTION_TABLE},
+    "cogging-table": NO_COGGING_TABLE,
+    "backlash": {},
+}
+CODE: Mapping[str, Callable[[Compensation], tuple[TableFile, ...]]] = {
+    "c": feed_forward_c,
+    "st": feed_forward_st,
+}
+
+
+@dataclass(frozen=True)
+class Tables:
+    """The files of what was asked for, and what is not written, a line each with its reason."""
+
+    files: tuple[TableFile, ...]
+    left_out: tuple[str, ...]
+
+
+def tables(what: Compensation, targets: Sequence[str], controls: Sequence[str]) -> Tables:
+    """The files of these targets, for these controls; for every control where none is named.
+
+    Raises BadModel, in one line, where a target or a control that was named cannot be written:
+    what the model lacks, or what only the user can say.
+    """
+    files, left = list[TableFile](), list[str]()
+    for target in dict.fromkeys(targets):
+        if target == "csv":
+            _tried(NEUTRAL, what, files, left)
+            if not files:
+                raise BadModel("; ".join(left))
+        elif target in CODE:
+            files += CODE[target](what)
+        else:
+            files += [one(what) for one in NEUTRAL[target]]
+            _for_controls(target, what, controls, files, left)
+    for control in controls:
+        if left and not any(one.control == control for one in files):
+            raise BadModel("; ".join(left))
+    kept = {one.name: one for one in files}
+    return Tables(tuple(kept.values()), tuple(dict.fromkeys(left)))
+
+
+def _tried(
+    writers: Mapping[str, Iterable[Writer]], what: Compensation, files: list[TableFile],
+    left: list[str],
+) -> None:  # fmt: skip
+    """What can be written of each, and why the rest cannot."""
+    for each in writers.values():
+        try:
+            files += [one(what) for one in each]
+        except BadModel as error:
+            left.append(str(error))
+
+
+def _for_controls(
+    target: str, what: Compensation, controls: Sequence[str], files: list[TableFile],
+    left: list[str],
+) -> None:  # fmt: skip
+    """The files of each control; one that is not named is left out where a number is wanting."""
+    for control in controls or OF_CONTROLS[target]:
+        writers = OF_CONTROLS[target].get(control, ())
+        if not writers:
+            left.append(NOT_THERE[target][control])
+        refused, before = list[str](), len(files)
+        for one in writers:
+            _tried({control: (one,)}, what, files, refused)
+        if controls and refused and len(files) == before:
+            raise BadModel(refused[0])
+        left += refused

@@ -1,0 +1,97 @@
+"""What the registry has of a machine for its axis test: its last logs, and its model in force."""
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from identification.model.estimates import Estimate
+from workbench.documents.model import Model
+from workbench.documents.model_file import read_model
+from workbench.jobs.drift_by_chart import drift_by_chart
+from workbench.jobs.drift_verdict import Reading
+from workbench.logs.sources import Sources
+from workbench.registry.axis_past import LAST_ON_PAGE, NAMED, history
+from workbench.registry.results import last_logs
+from workbench.registry.store import Registry
+from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
+from workbench.steps.axis_test import Earlier
+
+LOOKED_AT = 120  # of a machine's last logs, among which those are that tell its parameters
+# Effects that the equation of motion takes out, and those that it does not see
+HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
+
+
+def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
+    """The machine's last logs, and this log by the model in force where that has further effects.
+
+    Raises BadRegistry where there is no such machine.
+    """
+    state = registry.machine(machine)
+    own = {source.sha256 for source in sources.runs}
+    logs = [one for one in last_logs(registry.database, machine, LOOKED_AT)
+            if one.sha256 not in own and one.parameters]  # fmt: skip
+    values = history(list(reversed(logs[:LAST_ON_PAGE])))
+    said = ""
+    if len(logs) < FEWEST_EARLIER:
+        said = (
+            f"{machine} has {len(logs)} judged logs that tell its parameters, at least"
+            f" {FEWEST_EARLIER} needed"
+        )
+    if state.in_force is None:
+        return Earlier(machine, values, None, None, said)
+    model = _read(registry.document(state.in_force, "model"))
+    estimates, remarks = None, list[str]()
+    further = [key.replace("_", " ") for key in model.effects if not _held(key)]
+    if further:
+        remarks.append(
+            f"by the fit of version {state.in_force.number}, in force, which has"
+            f" {', '.join(further)}"
+        )
+        found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
+        estimates = untold(model, found.reason) | by_quantity(found.parameters)
+    width = model.effects.get("backlash", {}).get("width")
+    if width is not None and width.value is not None and "backlash" not in (estimates or {}):
+        in_force = Estimate(width.value, width.unit, width.sd, width.low, width.high)
+        estimates = {**(estimates or {}), "backlash": in_force}
+        remarks.append(f"backlash is that of version {state.in_force.number}, in force")
+    return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
+
+
+def untold(model: Model, why: str) -> dict[str, Estimate]:
+    """The nine as a log has them that the fit of the model in force does not tell."""
+    return {
+        name: Estimate(None, one.unit, reason=why)
+        for name, one in model.friction.items()
+        if name in MEANING_OF
+    }
+
+
+def by_quantity(readings: Sequence[Reading]) -> dict[str, Estimate]:
+    """This log's parameters as the drift test has them, by quantity."""
+    out = {}
+    for one in readings:
+        name = NAMED.get(one.name, one.name)
+        if name not in MEANING_OF:
+            continue
+        sign = -1.0 if name == "F_sn" else 1.0
+        low, high = sorted((sign * one.low, sign * one.high))
+        out[name] = Estimate(sign * one.after, one.unit, None, low, high)
+    return out
+
+
+def _held(key: str) -> bool:
+    """Whether the equation of motion holds an effect, the first or a further one of its kind."""
+    name, _, number = key.rpartition("_")
+    return key in HELD_BY_EQUATION or (name in HELD_BY_EQUATION and number.isdigit())
+
+
+def _read(document: Mapping[str, Any]) -> Model:
+    """The model of a document, read as from its file."""
+    with TemporaryDirectory(prefix="workbench-") as name:
+        path = Path(name) / "model.json"
+        path.write_text(json.dumps(document), encoding="utf-8")
+        return read_model(path)

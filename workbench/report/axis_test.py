@@ -1,0 +1,177 @@
+"""The axis test on one page: a light, why, the numbers with their limits, and two pictures."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from identification.arrays import Array
+from workbench.cards.readable import in_digits, number, shown_unit, units_of
+from workbench.output import Row, written
+from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
+from workbench.report.page import Section, page
+from workbench.report.templating import render
+from workbench.screen import Screen, listed, screen, tabled
+from workbench.steps.axis_test import AxisTest, Earlier, Quantity
+
+AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
+LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
+SOURCE_OF_LIMITS = {"card": "card", "registry": "logs", "usual": "usual"}
+MOST_REASONS = 4  # on the printed page
+AXIS_HEIGHT = 160
+EACH_DIRECTION = (("F_cp", "positive direction"), ("F_cn", "negative direction"))
+
+
+def axis_sentence(test: AxisTest) -> str:
+    """The answer: the light and, where it is not green, the first reason."""
+    light = test.light.upper()
+    judged = sum(1 for one in test.quantities if one.light)
+    if test.light == "green":
+        return f"{light}: {test.machine} is within its limits in {judged} of {judged} numbers."
+    return f"{light}: {_first(test)}."
+
+
+def _first(test: AxisTest) -> str:
+    """The first reason, and how many more there are."""
+    first, *rest = test.reasons
+    return f"{first} (and {len(rest)} more)" if rest else first
+
+
+def axis_rows(test: AxisTest) -> list[Row]:
+    """A row a quantity."""
+    return [_row(one) for one in test.quantities]
+
+
+def _row(one: Quantity) -> Row:
+    told = one.estimate
+    (unit, factor) = ("%", 100.0) if told.unit == "1" else shown_unit(told.unit)
+    limits = "-"
+    if one.allowed is not None:
+        low, high = (number(factor * x, 4) for x in (one.allowed.low, one.allowed.high))
+        limits = f"{low} to {high} ({SOURCE_OF_LIMITS[one.allowed.source]})"
+    if told.value is None:
+        why = (told.reason or "not told").partition(";")[0]
+        return one.meaning, "-", unit, why, limits, LAMPS[one.light]
+    if told.low is None or told.high is None:
+        return one.meaning, number(factor * told.value, 4), unit, "", limits, LAMPS[one.light]
+    spread = 0.25 * (told.high - told.low)
+    value, low, high = in_digits(
+        [factor * x for x in (told.value, told.low, told.high)], factor * told.value,
+        factor * spread,
+    )  # fmt: skip
+    return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]
+
+
+def axis_view(test: AxisTest, folder: Path | None) -> Screen:
+    """The light, the numbers and the reasons, for a terminal."""
+    return screen(
+        axis_sentence(test),
+        tabled(AXIS_HEAD, axis_rows(test)),
+        listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
+        listed((f"note: {line}" for line in test.remarks), most=4),
+        *([] if folder is None else [written(folder, "axis_test.json", "report.html")]),
+    )
+
+
+def axis_report(test: AxisTest) -> str:
+    """HTML of one printed page."""
+    log = test.source.log
+    facts = [
+        f"log {test.source.file}, {number(log.duration, 4)} s at {number(1.0 / log.h, 4)} Hz",
+        f"{test.breakaways[0]} breakaways in positive, {test.breakaways[1]} in negative direction",
+        _limits_said(test.earlier),
+    ]
+    body = render(
+        "axis_test", light=test.light, sentence=axis_sentence(test).partition(": ")[2],
+        reasons=_few(test.reasons),
+        head=AXIS_HEAD, rows=list(zip(axis_rows(test), test.quantities, strict=True)),
+    )  # fmt: skip
+    charts = [chart_html(one) for one in axis_charts(test)]
+    end = render("axis_test_end", facts=[one for one in facts if one], remarks=test.remarks)
+    lead = f"{test.machine}: friction, breakaway, mass and play of one log, each with its limits."
+    drawn = "".join(map(str, charts))
+    parts = [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
+    return page(f"Axis test of {test.machine}", lead, parts)
+
+
+def _few(reasons: Sequence[str]) -> list[str]:
+    """Reasons for a printed page: none where there is but one, which stands beside the lamp."""
+    if len(reasons) == 1:
+        return []
+    if len(reasons) <= MOST_REASONS:
+        return list(reasons)
+    left = len(reasons) - MOST_REASONS + 1
+    return [*reasons[: MOST_REASONS - 1], f"{left} more, which the table shows"]
+
+
+def axis_charts(test: AxisTest) -> list[Chart]:
+    """Friction along the travel and, where there is a past, over the last logs."""
+    along = Chart("travel", "Coulomb friction of each direction along the travel",
+                  [along_panel(test)], shared_x=False)  # fmt: skip
+    past = [panel for name, said in EACH_DIRECTION if (panel := history_panel(test, name, said))]
+    if not past:
+        return [along]
+    return [along, Chart("logs", "Coulomb friction over the last logs, with its limits", past,
+                         columns=2)]  # fmt: skip
+
+
+def along_panel(test: AxisTest) -> Panel:
+    """Coulomb friction of both directions along the travel, as sizes."""
+    units, travel = units_of(test.rotary), test.travel
+    x = units.position.factor * travel.place
+    up, down = travel.positive, travel.negative
+    return Panel(
+        f"position [{units.position.name}]", f"friction [{units.force.name}]",
+        [Line("positive direction", x, up, "measured"),
+         Line("negative direction", x, down, "other")],
+        "along the travel",
+        areas=[Area("", x, up - 2 * travel.positive_sd, up + 2 * travel.positive_sd),
+               Area("", x, down - 2 * travel.negative_sd, down + 2 * travel.negative_sd)],
+        y_range=_from_zero(up, down), height=AXIS_HEIGHT,
+    )  # fmt: skip
+
+
+def history_panel(test: AxisTest, name: str, said: str) -> Panel | None:
+    """A Coulomb level over the last logs and this one, with its limits; None without a past."""
+    one = test.of(name)
+    past = [value for _, value in test.earlier.values.get(name, ())] if test.earlier else []
+    if not past:
+        return None
+    own = [] if one.estimate.value is None else [one.estimate.value]
+    values = np.array([*past, *own])
+    lines = [Line("earlier logs", np.arange(-len(past), len(own), 1.0), values, "measured")]
+    if own:
+        lines.append(Line("this log", np.array([-0.4, 0.4]), np.repeat(own, 2), "model", "bold"))
+    limits = one.allowed
+    bands = [] if limits is None else [Band("limits", limits.low, limits.high)]
+    edges = [] if limits is None else [limits.low, limits.high]
+    return Panel(
+        "logs before this one", f"friction [{units_of(test.rotary).force.name}]", lines,
+        f"{said}, over the last logs", bands=bands, x_range=(-len(past) - 0.5, 0.6),
+        y_range=_close(values, np.array(edges)), height=AXIS_HEIGHT,
+    )  # fmt: skip
+
+
+def _from_zero(*values: Array) -> tuple[float, float]:
+    """From 0 to a little above the largest."""
+    most = max((float(np.nanmax(one)) for one in values if np.any(np.isfinite(one))), default=1.0)
+    return 0.0, 1.2 * most
+
+
+def _close(*values: Array) -> tuple[float, float]:
+    """From a little below the lowest to a little above the highest."""
+    every = np.concatenate(values)
+    low, high = float(np.nanmin(every)), float(np.nanmax(every))
+    room = 0.1 * (high - low) or 0.1 * abs(high)
+    return low - room, high + room
+
+
+def _limits_said(earlier: Earlier | None) -> str:
+    if earlier is None:
+        return "limits of the card alone; no registry was given"
+    many = max((len(values) for values in earlier.values.values()), default=0)
+    return (
+        f"limits of the card; else the mean of the machine's last {many} logs +- 3 sd (wider of few"
+        " logs; never nearer than 2 %, of"
+        " breakaway 5 %)"
+    )

@@ -1,0 +1,324 @@
+"""One log of an axis as a maintenance engineer reads it: its numbers, their limits, and a light.
+
+A number is green within its limits, red where its whole 95 % interval lies beyond one, yellow
+where the log cannot tell on which side it is. Limits are the card's, else what the machine's own
+logs have shown.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from identification.arrays import Array
+from identification.estimation.axis_equation import AxisEquation, axis_equation
+from identification.estimation.estimates import told_estimate
+from identification.estimation.surroundings import surroundings
+from identification.model.estimates import Estimate
+from identification.model.surroundings import Surroundings
+from identification.signals.check import check_driven
+from identification.thresholds import MOST_UNEXPLAINED
+from workbench.cards.limits import limit_units
+from workbench.cards.readable import number, shown_unit
+from workbench.logs.sources import Source, Sources
+from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
+
+AXIS_SCHEMA = "axis_test/1"
+LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
+ALONG_PLACES = 24  # along the travel
+FEWEST_THERE = 3  # windows of sliding at a place
+NO_BACKLASH = "no model with a play is in force; `workbench trace` finds one in this log"
+
+WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One line of the test: its estimate, its limits, its light ("": no limits, or not told)."""
+
+    name: str
+    meaning: str
+    estimate: Estimate
+    allowed: Allowed | None
+    light: Light
+    why: str
+
+
+@dataclass(frozen=True)
+class Earlier:
+    """What the registry has of a machine: values of its last logs by quantity, oldest first, with
+    the seconds since 1970 at which they were recorded; version: of the model in force.
+
+    estimates: of this log, by the fit of the model in force, where that has effects which the
+    equation of motion alone does not hold. said: why there are no limits, where there are none;
+    remarks: on these, a line each.
+    """
+
+    machine: str
+    values: Mapping[str, Sequence[tuple[float, float]]]
+    version: int | None = None
+    estimates: Mapping[str, Estimate] | None = None
+    said: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Travel:
+    """Coulomb friction along the travel, both directions as sizes: place [m], mean [N] and sd of
+    it at each, (p,); NaN where a direction hardly passes."""
+
+    place: Array
+    positive: Array
+    negative: Array
+    positive_sd: Array
+    negative_sd: Array
+
+
+@dataclass(frozen=True, eq=False)
+class AxisTest:
+    """The test of one log."""
+
+    machine: str
+    source: Source
+    rotary: bool
+    quantities: tuple[Quantity, ...]
+    travel: Travel
+    breakaways: tuple[int, int]
+    earlier: Earlier | None
+    remarks: tuple[str, ...]
+
+    @property
+    def light(self) -> Light:
+        """The worst light; yellow where nothing has limits, or a Coulomb friction is not told."""
+        found = {one.light for one in self.quantities}
+        worst = next(light for light in WORST if light in found)
+        if worst == "red" or not (self.unjudged or self.blind):
+            return worst
+        return "yellow"
+
+    @property
+    def blind(self) -> bool:
+        """Whether the log does not tell Coulomb friction of both directions."""
+        return any(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
+
+    @property
+    def unjudged(self) -> bool:
+        """Whether no number of the machine has limits."""
+        return all(one.allowed is None or one.allowed.source == "usual" for one in self.quantities)
+
+    def of(self, name: str) -> Quantity:
+        """The quantity of that name."""
+        return next(one for one in self.quantities if one.name == name)
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why it is not green, the worst first."""
+        order = sorted(self.quantities, key=lambda one: WORST.index(one.light))
+        out = [one.why for one in order if one.light in ("red", "yellow")]
+        if self.blind:
+            found = (self.of(name).estimate for name in ("F_cp", "F_cn"))
+            why = next(one.reason or "" for one in found if one.value is None)
+            out.append(f"Coulomb friction is not told: {why.partition(';')[0]}")
+        if self.unjudged:
+            why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"
+            out.append(f"no limits to judge by: {why}")
+        return tuple(out)
+
+
+def axis_test(
+    sources: Sources, earlier: Earlier | None = None, machine: str | None = None
+) -> AxisTest:
+    """The test of the longest run of the log.
+
+    earlier: what the registry has of the machine. Raises NotIdentifiable where too little slides.
+    """
+    source = max(sources.runs, key=lambda one: one.log.duration)
+    check_driven(source.log)
+    around = surroundings([source.log], sources.rig)
+    found = axis_equation(around.taken_out(source.log), held=sources.rig.kind == "motor")
+    units = limit_units(sources.rig)
+    told = told_of(found, around, units)
+    if earlier is not None and earlier.estimates is not None:
+        told |= earlier.estimates
+    travel = friction_along(found)
+    told["along_travel"] = Estimate(_deviation(travel), units["along_travel"])
+    allowed = {**_of_past(earlier), **_of_card(sources.card.limits)}
+    allowed.setdefault("explained", Allowed(LEAST_EXPLAINED, 1.0, "usual"))
+    runs = len(sources.runs)
+    longest = (f"the log has {runs} runs; this is the longest",) if runs > 1 else ()
+    return AxisTest(
+        machine or sources.card.name, source, sources.rig.motion == "rotary",
+        tuple(judged(name, told[name], allowed.get(name)) for name in MEANING_OF),
+        travel, found.breakaways, earlier,
+        (*(earlier.remarks if earlier else ()), *longest, *sources.remarks),
+    )  # fmt: skip
+
+
+def told_of(
+    found: AxisEquation, around: Surroundings, units: Mapping[str, str]
+) -> dict[str, Estimate]:
+    """Every quantity of the test, by name, as far as the equation of motion tells it."""
+    out = {}
+    scale = max(abs(found.values["F_cp"]), abs(found.values["F_cn"]))
+    unheld = (
+        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no number holds;"
+        " `workbench trace` looks for what acts"
+    )
+    for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
+        if name not in found.values:
+            out[name] = Estimate(None, units[name], reason=_why_not(name, found))
+        elif found.relative > MOST_UNEXPLAINED:
+            out[name] = Estimate(None, units[name], reason=unheld)
+        else:
+            out[name] = told_estimate(
+                found.values[name], units[name], found.sd[name], bounds=(0.0, np.inf)
+            )
+    value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
+    half = float(norm.ppf(0.975)) * sd
+    constant = Estimate(value, units["constant_force"], sd, value - half, value + half)
+    if found.relative > MOST_UNEXPLAINED or not half < scale:
+        constant = Estimate(None, units["constant_force"], reason=unheld)
+    out["constant_force"] = constant
+    out["backlash"] = Estimate(None, units["backlash"], reason=NO_BACKLASH)
+    out["explained"] = Estimate(1.0 - found.relative, "1")
+    return out
+
+
+def _why_not(name: str, found: AxisEquation) -> str:
+    """Why a number is not told."""
+    if name == "m":
+        return "inertia is too small a part of the force; add faster reversals"
+    if name.startswith("F_v"):
+        return "speeds too alike to tell it from Coulomb friction; add strokes at others"
+    if "m" not in found.values:
+        return "without mass a start from rest is not placed; add faster reversals"
+    many = found.breakaways[0 if name == "F_sp" else 1]
+    return f"{many} breakaways seen, too few; add starts from rest"
+
+
+def friction_along(found: AxisEquation) -> Travel:
+    """Coulomb friction of each direction at places along the travel."""
+    edges = np.linspace(
+        float(np.min(found.position)), float(np.max(found.position)), ALONG_PLACES + 1
+    )
+    at = np.clip(np.searchsorted(edges, found.position, side="right") - 1, 0, ALONG_PLACES - 1)
+    columns = []
+    for own in (found.up, ~found.up):
+        count = np.bincount(at[own], minlength=ALONG_PLACES)
+        enough = np.where(count >= FEWEST_THERE, count, np.nan)
+        mean = np.bincount(at[own], found.level[own], ALONG_PLACES) / enough
+        square = np.bincount(at[own], found.level[own] ** 2, ALONG_PLACES) / enough
+        columns += [mean, np.sqrt(np.maximum(square - mean**2, 0.0) / enough)]
+    up, up_sd, down, down_sd = columns
+    return Travel(0.5 * (edges[1:] + edges[:-1]), up, down, up_sd, down_sd)
+
+
+def _deviation(travel: Travel) -> float | None:
+    """Largest deviation of either direction from its own mean along the travel [N]."""
+    sizes = [
+        float(np.nanmax(np.abs(one - np.nanmean(one))))
+        for one in (travel.positive, travel.negative)
+        if np.count_nonzero(np.isfinite(one)) > 1
+    ]
+    return max(sizes, default=None)
+
+
+def _of_card(limits: Mapping[str, tuple[float, float]]) -> dict[str, Allowed]:
+    return {name: Allowed(low, high, "card") for name, (low, high) in limits.items()}
+
+
+def _of_past(earlier: Earlier | None) -> dict[str, Allowed]:
+    past = earlier.values if earlier else {}
+    return limits_of({name: [value for _, value in every] for name, every in past.items()})
+
+
+def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
+    """A quantity with its light and, where it is not green, the reason in a sentence."""
+    meaning = MEANING_OF[name]
+    if told.value is None and allowed is not None and allowed.source == "card":
+        why = (told.reason or "the log does not tell it").partition(";")[0]
+        said = f"{_whole(meaning)} is not told, and the card has limits for it: {why}"
+        return Quantity(name, meaning, told, allowed, "yellow", said)
+    if told.value is None or allowed is None:
+        return Quantity(name, meaning, told, allowed, "", "")
+    low = told.value if told.low is None else told.low
+    high = told.value if told.high is None else told.high
+    light = light_of(told.value, low, high, allowed)
+    if light in ("green", "red"):
+        said = _said(meaning, told, allowed, "") if light == "red" else ""
+        return Quantity(name, meaning, told, allowed, light, said)
+    outside = not allowed.low <= told.value <= allowed.high
+    unsure = ", though this log is not sure of it" if outside else " within its interval"
+    if allowed.source == "usual":
+        unsure = ": something else acts"
+    return Quantity(name, meaning, told, allowed, light, _said(meaning, told, allowed, unsure))
+
+
+def _said(meaning: str, told: Estimate, allowed: Allowed, unsure: str) -> str:
+    """Why a light is not green."""
+    (unit, factor), value = shown_unit(told.unit), told.value or 0.0
+    above = value > 0.5 * (allowed.low + allowed.high)
+    limit = allowed.high if above else allowed.low
+    if told.unit == "1":
+        unit, factor = "%", 100.0
+    side = "above" if above else "below"
+    whose = {
+        "card": "the card's",
+        "registry": f"its last {allowed.logs} logs'",
+        "usual": "the usual",
+    }
+    moved = ""
+    if allowed.mean and told.unit not in ("1", "") and "constant" not in meaning:
+        moved = f" ({100 * (value / allowed.mean - 1):+.0f} % of their mean)"
+    may = "perhaps " if unsure == " within its interval" else ""
+    found, bound = (f"{number(factor * x, 4)} {unit}" for x in (value, limit))
+    return (
+        f"{_whole(meaning)} is {found}, {may}{side} {whose[allowed.source]} limit"
+        f" {bound}{moved}{unsure}"
+    )
+
+
+def _whole(meaning: str) -> str:
+    """A meaning as it stands in a sentence."""
+    name, _, way = meaning.partition(", ")
+    return f"{name} in {way} direction" if way else name
+
+
+def axis_document(test: AxisTest) -> dict[str, Any]:
+    """The test for a PLC or SCADA: the light first, then every number with its limits."""
+    return {
+        "schema": AXIS_SCHEMA,
+        "light": test.light,
+        "machine": test.machine,
+        "log": {"file": test.source.file, "sha256": test.source.sha256, "rows": test.source.rows,
+                "duration": test.source.log.duration, "h": test.source.log.h},
+        "reasons": test.reasons,
+        "quantities": {one.name: _number(one) for one in test.quantities},
+        "breakaways": test.breakaways,
+        "travel": {
+            "place": test.travel.place,
+            "positive": test.travel.positive,
+            "negative": test.travel.negative,
+        },
+        "version": test.earlier.version if test.earlier else None,
+        "remarks": test.remarks,
+    }  # fmt: skip
+
+
+def _number(one: Quantity) -> dict[str, Any]:
+    told, allowed = one.estimate, one.allowed
+    return {
+        "value": told.value,
+        "unit": told.unit,
+        "sd": told.sd,
+        "low": told.low,
+        "high": told.high,
+        **({"reason": told.reason} if told.value is None else {}),
+        "light": one.light or None,
+        "limits": None if allowed is None else {
+            "low": allowed.low, "high": allowed.high, "source": allowed.source,
+            "logs": allowed.logs, "mean": allowed.mean, "sd": allowed.sd,
+        },
+    }  # fmt: skip
