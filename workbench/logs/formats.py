@@ -29,6 +29,7 @@ _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
     "mcap": (b"\x89MCAP0\r\n",),
     "ulog": (b"ULog\x01\x12\x35",),
     "npy": (b"\x93NUMPY",),
+    "rosbag": (b"#ROSBAG V2.0",),
 }
 _SUFFIXES: Mapping[str, Format] = {
     ".parquet": "parquet",
@@ -48,6 +49,7 @@ _SUFFIXES: Mapping[str, Format] = {
     ".ods": "excel",
     ".npy": "npy",
     ".npz": "npy",
+    ".bag": "rosbag",
 }
 
 

@@ -1,7 +1,7 @@
 """A file as named columns, which its reader hands out one by one."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ class Table:
 
     `headed` is false where the file gives no names: then columns go by number alone. `groups`
     names the group of each column where a file holds several, each with a clock of its own; a
-    column then also goes by "group/name".
+    column then also goes by "group/name". `clocks`: the column of a group's clock, where it has a
+    name of its own.
     """
 
     names: tuple[str, ...]
@@ -35,6 +36,7 @@ class Table:
     first_row: int = 1
     headed: bool = True
     groups: tuple[str, ...] = ()
+    clocks: Mapping[str, int] = field(default_factory=dict)
 
     def column(self, key: str | int, where: str) -> RawColumn:
         """The column named or numbered `key`; raises BadLog with the nearest name."""

@@ -109,7 +109,8 @@ class Column:
 class Columns:
     """The clock, the columns that may be signals, and why each of the others is not.
 
-    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`.
+    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`;
+    notes: what else the file holds.
     """
 
     path: Path
@@ -121,6 +122,7 @@ class Columns:
     left_out: Mapping[int, str]
     read: tuple[Column, ...]
     scalars: tuple[Column, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -144,7 +146,7 @@ def columns_of(log: UnknownLog) -> Columns:
     kept = _with_axes(kept)
     return Columns(
         log.path, log.spec, clock, step, grid, tuple(kept), left_out | twice,
-        tuple(read), tuple(_column(one) for one in log.scalars),
+        tuple(read), tuple(_column(one) for one in log.scalars), log.notes,
     )  # fmt: skip
 
 

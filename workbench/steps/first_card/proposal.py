@@ -26,6 +26,11 @@ CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
 )
+KIND_WORDS = {
+    "electro-pneumatic": "F_e from two pressures",
+    "force": "F_e is logged",
+    "motor": "F_e = force_per_command * u",
+}
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
@@ -73,8 +78,11 @@ class FileColumn:
 @dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
-    every column of the file, what else was noticed, the axes that the file holds, and what else
-    was measured (name: column)."""
+    every column of the file, what else was noticed, the axes that the file holds, what else was
+    measured (name: column), and what it should say of a rig of the next likely kind.
+
+    hardly: what the log will hardly tell; refused: why it cannot be read by the card; both empty
+    until it was tried (`looked_over`)."""
 
     path: Path
     name: str
@@ -88,6 +96,9 @@ class Proposal:
     remarks: tuple[str, ...] = ()
     axes: tuple[str, ...] = ()
     extra: Mapping[str, str | int] = field(default_factory=dict)
+    other: "Proposal | None" = None
+    hardly: tuple[str, ...] = ()
+    refused: str = ""
 
     def signal(self, name: str) -> SignalGuess | None:
         """The signal of that name; None where the card has none."""
@@ -100,6 +111,8 @@ class Proposal:
             "log": str(self.path),
             "rig": {"kind": self.kind, "motion": self.motion,
                     **{one.key: one.value for one in self.rig}},
+            "sure": {one.key: one.sure for one in self.rig},
+            "else": {one.key: one.rival for one in self.rig if one.rival},
             "signals": {
                 one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
                            "bits": one.bits, "sure": one.sure, "why": one.why, "else": one.rival}
@@ -107,7 +120,9 @@ class Proposal:
             },
             "file": self.spec.model_dump(exclude_defaults=True),
             "unused": dict(self.unused),
+            "hardly_told": self.hardly,
             "remarks": self.remarks,
+            "refused": self.refused or None,
             "axes": self.axes,
         }  # fmt: skip
 
@@ -130,15 +145,23 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         )
     _refuse_resting(columns, roles)
     _refuse_sign_bits(columns, roles)
+    named = _card_name(name or path.stem)
+    other = None if roles.other is None else _of_roles(columns, roles.other, named)
+    return replace(_of_roles(columns, roles, named), other=other)
+
+
+def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
+    """The card by these roles."""
+    other = roles.other
     roles, area = _pressure_beside_force(columns, roles)
     motion = told_motion(roles)
     units = guessed_units(columns, roles, motion)
-    rig = [_motion_guess(motion), *_rig(columns, roles, motion.motion)]
+    rig = [_kind_guess(roles, other), _motion_guess(motion), *_rig(columns, roles, motion.motion)]
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
-        path=path,
-        name=_card_name(name or path.stem),
+        path=columns.path,
+        name=name,
         kind=roles.kind,
         motion=motion.motion,
         spec=columns.spec,
@@ -149,7 +172,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
             FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
             for one in columns.read
         ),
-        remarks=tuple(remarks_on(columns, roles, units)),
+        remarks=(*columns.notes, *remarks_on(columns, roles, units)),
         axes=columns.axes,
         extra=_extra(columns, roles),
     )
@@ -239,6 +262,26 @@ def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGues
     key = "area_p_m2" if name == "p_p" else "area_n_m2"
     why = "with it friction is alike in both directions; the bore tells it better"
     return RigGuess(key, float(f"{area:.3g}"), "m^2", False, why)
+
+
+def _kind_guess(roles: Roles, other: Roles | None) -> RigGuess:
+    """The kind of rig, by what drives the body; the next one with the column that would."""
+    drive = next(iter(_drives(roles)))
+    sure = bool(roles.ahead >= SURE and roles.odds[drive] >= SURE)
+    why = KIND_WORDS[roles.kind]
+    if not sure and other is not None:
+        why += f", by {drive_columns(roles)}; a {other.kind} rig would be driven by"
+        why += f" {drive_columns(other)}"
+    return RigGuess("kind", roles.kind, "", sure, why, "" if sure or other is None else other.kind)
+
+
+def _drives(roles: Roles) -> tuple[str, ...]:
+    return {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",)}.get(roles.kind, ("u",))
+
+
+def drive_columns(roles: Roles) -> str:
+    """The columns that drive the body, in words."""
+    return " and ".join(roles.columns[name].shown for name in _drives(roles))
 
 
 def _motion_guess(found: MotionGuess) -> RigGuess:

@@ -1,5 +1,5 @@
-"""What a first card cannot hold: gaps, delays, axes, doubled names, a clock that a velocity denies,
-and what kind of rig it would be otherwise."""
+"""What a first card cannot hold: gaps, delays, axes, doubled names, a clock that a velocity
+denies."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -35,9 +35,6 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
         found = lead(roles.columns["r"].x, roles.columns["y"].x)
         late = found.samples * h * columns.grid
         yield f"the position follows the reference by {1e3 * late:.3g} ms"
-    if roles.rival_kind is not None:
-        kind, column = roles.rival_kind
-        yield f'else a rig of kind "{kind}", driven by column {column.shown}'
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:

@@ -6,7 +6,7 @@ that are left; the largest sum of log-odds (`weights`) decides.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -53,8 +53,8 @@ class Roles:
     """Signals by canonical name, their signs, and how sure each is (log-odds over the next).
 
     law: what of the driving signal is inertia and friction along y; area_ratio: of the chambers;
-    why: reasons by signal; rivals: the next best column of each, where there is one; rival_kind:
-    the next best kind of rig, with the column that would drive it.
+    why: reasons by signal; rivals: the next best column of each, where there is one; ahead: of the
+    kind of rig over the next best one [log-odds], whose roles are `other`.
     """
 
     kind: RigKind
@@ -65,7 +65,8 @@ class Roles:
     law: ForceLaw
     area_ratio: float = 1.0
     rivals: Mapping[str, Column] = field(default_factory=dict)
-    rival_kind: tuple[RigKind, Column] | None = None
+    ahead: float = np.inf
+    other: "Roles | None" = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +120,14 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
     best = choices[0]
+    other = _of_another_kind(best, choices)
+    rest = None if other is None else _roles_of(other, [one for one in choices if one is not best])
+    ahead = np.inf if other is None else best.score - other.score
+    return replace(_roles_of(best, choices), other=rest, ahead=ahead)
+
+
+def _roles_of(best: _Choice, choices: Sequence[_Choice]) -> Roles:
+    """The roles by one choice beside the others."""
     return Roles(
         kind=best.way.kind,
         columns=best.columns,
@@ -128,7 +137,6 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
         law=best.way.law,
         area_ratio=best.way.area_ratio,
         rivals=_rivals(best, choices),
-        rival_kind=_rival_kind(best, choices),
     )
 
 
@@ -328,12 +336,10 @@ def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
     return out
 
 
-def _rival_kind(best: _Choice, choices: Sequence[_Choice]) -> tuple[RigKind, Column] | None:
+def _of_another_kind(best: _Choice, choices: Sequence[_Choice]) -> _Choice | None:
     """The likeliest choice of another kind of rig with the same position."""
-    for one in choices[1:]:
-        if one.way.kind != best.way.kind and one.way.y is best.way.y:
-            return one.way.kind, next(iter(one.way.columns.values()))
-    return None
+    others = (one for one in choices if one.way.y is best.way.y)
+    return next((one for one in others if one.way.kind != best.way.kind), None)
 
 
 def _reasons(best: _Choice) -> dict[str, str]:

@@ -25,7 +25,6 @@ SAME_RATE = 0.03  # the same, within which it makes sure of a unit
 SHORTEST_PERIOD = 1e-12  # s; what a clock ticks faster is none
 TELLS_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
 MOST_LOST = 8.0  # log-probability that one disagreement costs
-SURE_OF_CLOCK = 6.0  # log-probability by which a clock's unit is ahead, where others cannot be
 OFF_RATE = 0.05  # relative error from which clock and velocity contradict each other
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
@@ -81,17 +80,19 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         likely = usual + _plausible(columns, roles, motion.machine, names, given)
         scored.append((likely - _disagreement(names, given, slope), names))
     scored.sort(key=lambda one: -one[0])
-    best, names = scored[0]
+    _, names = scored[0]
     out = {}
     for name, unit in names.items():
         if name in given or unit == "":
             continue
         others = [(score, other[name]) for score, other in scored if other[name] != unit]
-        clear = name == "t" and best - max([-np.inf, *(one for one, _ in others)]) > SURE_OF_CLOCK
+        counted = name == "t" and not others  # from 1970 on
         related = _by_relation(name, names, given, slope)
-        why = "by the velocity and the position" if related else "by its size, the header says none"
+        why = "by its size, the header says none"
+        if counted or related:
+            why = "it counts from 1970" if counted else "by the velocity and the position"
         rival = others[0][1] if others else ""
-        out[name] = UnitGuess(unit, None, clear or related, why, rival)
+        out[name] = UnitGuess(unit, None, counted or related, why, rival)
     return out
 
 
