@@ -187,10 +187,10 @@ def bag(path: Path, columns: Columns, rng: np.random.Generator, part: str) -> Pa
     state, header = store.types[BAG_TYPE], store.types["std_msgs/msg/Header"]
     stamp, number = store.types["builtin_interfaces/msg/Time"], store.types["std_msgs/msg/Float64"]
     (_, t), y, drive, *rest = columns
-    with Writer(path) as writer:
-        kind = writer.CompressionFormat.BZ2 if part == "judge" else None
-        if kind is not None:
-            writer.set_compression(kind)
+    writer = Writer(path)
+    if part == "judge":
+        writer.set_compression(writer.CompressionFormat.BZ2)
+    with writer:
         joint = writer.add_connection("/joint_states", BAG_TYPE, typestore=store)
         others = [
             writer.add_connection(f"/extra_{k}", "std_msgs/msg/Float64", typestore=store)

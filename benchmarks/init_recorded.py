@@ -20,6 +20,7 @@ from pathlib import Path
 from identification.errors import UserError
 from workbench.logs.fetch import DATA_VARIABLE
 from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
+from workbench.steps.first_card.looked_over import looked_over
 from workbench.steps.first_card.proposal import Proposal, proposed
 
 Signal = tuple[str | int, str]  # column, and unit ("": in no log)
@@ -180,12 +181,13 @@ def _judged(path: Path, wanted: Right) -> tuple[str, bool, bool, int, int]:
     import re
 
     try:
-        found = proposed(path)
+        found = looked_over(proposed(path))
     except UserError as error:
         fits = bool(wanted.refused and re.search(wanted.refused, str(error)))
         return f"refused: {error}", fits, fits, 0, 0
     wrong = wrong_lines(found, wanted)
-    unsaid = [one for one in wanted.said if not any(one in line for line in found.remarks)]
+    lines = (*found.hardly, *found.remarks)
+    unsaid = [one for one in wanted.said if not any(one in line for line in lines)]
     sure = [one.name for one in found.signals if one.sure] + [
         one.key for one in found.rig if one.sure
     ]

@@ -7,6 +7,7 @@ line by itself. What differs from block to block is the name.
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,11 @@ from workbench.logs.table import RawColumn, Table
 
 FEWEST_BLOCKS = 2
 PAIR = 2  # columns of a block of one variable: its clock, and its values
+MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
+_WORDS = re.compile(r"^[^\S\n]*[\[\"]?[^\W\d_]", re.M)
+_NO_WORDS = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
 _MARKS = (";", "\t", ",", " ", "|")
 _KEY = re.compile(r"^\s*([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
 _COUNTED = re.compile(r"\d+([.,]\d+)?")  # values that differ by chance: numbers of samples
@@ -113,10 +117,8 @@ def _may_have_blocks(text: str) -> bool:
     begin = re.search(r"^\s*[+-]?[\d.]+[^\n]*\n\s*[+-]?[\d.]+[^\n]*\n", text, re.M)
     if begin is None:
         return False
-    below = re.search(r"^[^\S\n]*[^\W\d_\n]{2}|^\s*\[", text[begin.end() :], re.M)
-    return below is not None and not re.match(
-        r"\s*(nan|inf|eof|end)\b", text[begin.end() + below.start() :], re.I
-    )
+    lines = islice(_WORDS.finditer(text, begin.end()), MOST_WORDS)
+    return any(not _NO_WORDS.match(text, one.end() - 1) for one in lines)
 
 
 def _mark(lines: Sequence[str]) -> str:
@@ -155,7 +157,7 @@ def _own_names(blocks: Sequence[Block], k: int) -> str:
     plain = [line.strip().strip("[]#; ") for line in blocks[k].above]
     elsewhere = {line.strip().strip("[]#; ") for j, one in enumerate(blocks) if j != k
                  for line in one.above}  # fmt: skip
-    return next((line for line in plain if line and line not in elsewhere), "")
+    return next((line for line in plain[::-1] if line and line not in elsewhere), "")
 
 
 def _keyed(block: Block) -> dict[str, str]:

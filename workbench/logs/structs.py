@@ -52,8 +52,15 @@ def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]
     if depth > DEEPEST:
         return
     if isinstance(value, Mapping):
-        for key, inner in value.items():
-            yield from _leaves(f"{path}.{key}" if path else str(key), inner, depth + 1)
+        own = [
+            leaf
+            for key, inner in value.items()
+            for leaf in _leaves(f"{path}.{key}" if path else str(key), inner, depth + 1)
+        ]
+        long = [x for _, x in own if x.size > 1]
+        if path and (name := _label(value)) and len(long) == 1:
+            own = [(name, long[0])]
+        yield from own
     elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
         yield from _entries(path, value, depth)
     elif isinstance(value, PLAIN):

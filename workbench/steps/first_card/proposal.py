@@ -78,8 +78,9 @@ class FileColumn:
 @dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
-    every column of the file, what else was noticed, the axes that the file holds, what else was
-    measured (name: column), and what it should say of a rig of the next likely kind.
+    every column of the file, what else was noticed, the axes that the file holds and the one of the
+    card, what else was measured (name: column), and what it should say of a rig of the next likely
+    kind.
 
     hardly: what the log will hardly tell; refused: why it cannot be read by the card; both empty
     until it was tried (`looked_over`)."""
@@ -95,6 +96,7 @@ class Proposal:
     columns: tuple[FileColumn, ...]
     remarks: tuple[str, ...] = ()
     axes: tuple[str, ...] = ()
+    axis: str = ""
     extra: Mapping[str, str | int] = field(default_factory=dict)
     other: "Proposal | None" = None
     hardly: tuple[str, ...] = ()
@@ -124,6 +126,7 @@ class Proposal:
             "remarks": self.remarks,
             "refused": self.refused or None,
             "axes": self.axes,
+            "axis": self.axis,
         }  # fmt: skip
 
 
@@ -174,6 +177,7 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
         ),
         remarks=(*columns.notes, *remarks_on(columns, roles, units)),
         axes=columns.axes,
+        axis=roles.columns["y"].axis,
         extra=_extra(columns, roles),
     )
 
