@@ -103,7 +103,8 @@ def make_file(seed: int, part: str, folder: Path) -> Table:
     pick = int(rng.integers(2))
     table = []
     for name, unit, x in columns:
-        word = words[name][pick % len(words[name])]
+        at = pick if name not in ("F", "v") else 0 if rotary else 1  # no torque slides
+        word = words[name][at % len(words[name])]
         table.append((f"{word} [{unit}]" if shown and unit else word, x))
     path = kind.write(folder / f"people_{seed}", table, rng, part)
     said = f"{kind.said}, {language}, {'units' if shown else 'no units'}, " + (

@@ -64,7 +64,7 @@ _CHANNELS: Words = {
     "p_p": ("K20",), "p_n": ("K21",),
 }  # fmt: skip
 _ENGLISH: Words = {
-    "t": ("time", "t"), "y": ("actual_position", "q"), "v": ("actual_velocity", "dq"),
+    "t": ("time", "t"), "y": ("actual_position", "q"), "v": ("actual_velocity", "actual_speed"),
     "a": ("actual_acceleration",), "r": ("commanded_position",), "target": ("target_position",),
     "u": ("motor_voltage",), "u0": ("controller_out",), "ff": ("feedforward",),
     "F": ("torque_estimate", "force"), "current": ("motor_current", "iq_measured"),

@@ -216,7 +216,7 @@ def read_header(text: str, unit_below: str = "") -> Header:
     whole = " ".join(words)
     purpose = _purpose(words, whole, means)
     lengths = unit is not None and unit.quantity == "position"
-    if lengths and "command" in words and not purpose:
+    if lengths and any(one.startswith("command") for one in words) and not purpose:
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
         purpose = "demand"  # a voltage or current that is asked for is the command
@@ -320,7 +320,7 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
         return "model"
     if any(one in whole for one in _REFERENCE) or any(one in _REFERENCE_SHORT for one in words):
         return "reference"
-    if "command" in words and "position" in means:
+    if any(one.startswith("command") for one in words) and "position" in means:
         return "reference"
     if any(one in whole for one in _MEASURED) or any(one in _MEASURED_SHORT for one in words):
         return "measured"

@@ -26,6 +26,8 @@ from workbench.logs.times import seconds
 _BELOW = 5  # rows of numbers by which the first of them is known
 _MOSTLY = 0.5  # share of a row's fields, that are numbers where it is data, or units
 ONE_ROW = 1  # by which vectors of one log may differ in length
+_OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
+_ONLY_NUMBER = ("data", "value")  # of a message that holds one number
 _DEEPEST = 5  # tables in each other, in which the rows are looked for
 _ENCODINGS = ("utf-8", "cp932", "cp1252", "latin-1")
 
@@ -56,7 +58,7 @@ def read_unknown(path: Path) -> UnknownLog:
         spec, notes = _other_layout(path, form)
     table = read_table(path, spec)
     headed = table.headed and not names
-    texts, full = names or table.names, table.full_names()
+    texts, full = names or _plain_names(table, form), table.full_names()
     if form == "csv" and (rows := len(table.fetch(0))) < SHORTEST_LOG:
         raise BadLog(_too_short(path, f"{rows} row" + ("s" if rows != 1 else "")))
     found, scalars = list[RawColumn](), list[RawColumn]()
@@ -80,6 +82,20 @@ def read_unknown(path: Path) -> UnknownLog:
     rows = min((len(one.values) for one in same), default=0)
     same = [replace(one, values=one.values[:rows]) for one in same]
     return UnknownLog(path, spec, tuple(same), tuple(scalars), notes)
+
+
+def _plain_names(table: Table, form: Format) -> tuple[str, ...]:
+    """What to read of the columns' names: of a path within tables its last part, where no other
+    column has that, and of a message's only number its topic."""
+    if form not in _OF_PATHS:
+        return table.names
+    topics = table.groups or ("",) * len(table.names)
+    last = [
+        topic.strip("/") if name in _ONLY_NUMBER and topic else name.rpartition(".")[2] or name
+        for name, topic in zip(table.names, topics, strict=True)
+    ]
+    return tuple(one if last.count(one) == 1 else name
+                 for one, name in zip(last, table.names, strict=True))  # fmt: skip
 
 
 def _too_short(path: Path, found: str) -> str:

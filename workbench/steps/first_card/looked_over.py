@@ -11,7 +11,6 @@ from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal
 from workbench.steps.first_card.written import written
 from workbench.steps.hardly_tells import hardly_tells
-from workbench.steps.other_kind import looks_like_velocity
 
 CARD_NAME = Path("the card")
 
@@ -22,7 +21,7 @@ def looked_over(of: Proposal) -> Proposal:
         card = card_from(tomllib.loads(written(of)), CARD_NAME)
         found = read_runs(of.path, card)
         rig = card.rig(of.path.name)
-        lines = [*hardly_tells(found.runs, rig), *looks_like_velocity(found.runs, rig)]
+        lines = hardly_tells(found.runs, rig)
     except UserError as error:
         return replace(of, refused=str(error))
     before = f"{of.path.name}: "

@@ -14,6 +14,8 @@ WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a wh
 TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
+COUNT_PARTS, MANY_COUNTS = 256.0, 1000.0  # of a count that is halved, and counts of a position then
+OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 CURRENTS = ("current", "strom", "電流", "courant", "corrente", " iq ", " i q ", " isq ", " ia ",
             " i a ", " amp")  # fmt: skip
@@ -57,6 +59,9 @@ def told_motion(roles: Roles) -> MotionGuess:
     if _counted_shaft(roles):
         why = "counts of an encoder beside a motor's current are mostly those of a shaft"
         return MotionGuess("rotary", why, False, rotor)
+    y = roles.columns["y"]
+    if is_count(y) and y.header.unit is None and not y.header.means:
+        return MotionGuess("rotary", "it has the steps of an encoder, which shafts mostly have", False)
     if sum(weak.values()) >= TURNING:
         most = roles.columns[max(weak, key=lambda one: weak[one])]
         why = f"machines that turn have names like {most.shown} more often"
@@ -72,7 +77,22 @@ def _counted_shaft(roles: Roles) -> bool:
 def is_count(y: Column) -> bool:
     """Whether a position has whole numbers of an encoder, by its unit or by its values."""
     unit = y.header.unit
-    return unit.quantity == "count" if unit else y.whole and len(y.levels) > COUNTED_LEVELS
+    if unit is not None:
+        return unit.quantity == "count"
+    if len(y.levels) <= COUNTED_LEVELS:
+        return False
+    return y.whole or _halved_counts(y.numbers)
+
+
+def _halved_counts(x: Array) -> bool:
+    """Whether steps are counts that a drive interpolates, in parts of a power of two."""
+    if float(np.ptp(x)) < MANY_COUNTS:
+        return False
+    parts = COUNT_PARTS * np.diff(x)
+    off = np.abs(parts - np.round(parts))
+    decimal = 1000.0 * np.diff(x)  # millimetres, or degrees, to three places have such steps too
+    return bool(np.mean(off < OFF_PART) > MOSTLY and np.mean(
+        np.abs(decimal - np.round(decimal)) < OFF_PART) < MOSTLY)  # fmt: skip
 
 
 def is_current(u: Column) -> bool:

@@ -26,6 +26,11 @@ SHORTEST_PERIOD = 1e-12  # s; what a clock ticks faster is none
 TELLS_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
 MOST_LOST = 8.0  # log-probability that one disagreement costs
 OFF_RATE = 0.05  # relative error from which clock and velocity contradict each other
+TICKS: Mapping[str, tuple[tuple[float, float], ...]] = {  # ticks a second, and what counts so
+    "10000000 1/s": ((1.2e17, 1.6e17), (6.2e17, 6.6e17)),  # 100 ns since 1601, since the year 1
+    "1.1574074074074073e-05 1/s": ((3.5e4, 6e4), (7.2e5, 7.6e5)),  # days since 1900, of MATLAB
+}
+SHORTEST_TICK, LONGEST_DAY = 1.0, 1e-3  # steps of a clock of ticks, and of one of days
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
@@ -44,6 +49,8 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
+    if "t" not in out and (ticking := _ticks(columns)):
+        out["t"] = ticking
     if "t" not in out and counts_samples(columns.clock):
         out["t"] = by_sample_number(columns, roles, out)
     out |= _jointly(columns, roles, motion, out)
@@ -99,6 +106,16 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
 def _open(name: str, given: Mapping[str, UnitGuess]) -> Mapping[str, float]:
     """The one unit that is given, else none."""
     return {given[name].unit: 0.0} if name in given else {}
+
+
+def _ticks(columns: Columns) -> UnitGuess | None:
+    """The rate of a clock that counts ticks or days since an epoch; None where it does not."""
+    first, step = float(columns.clock.values[0]), columns.step
+    for gain, ranges in TICKS.items():
+        fits = step >= SHORTEST_TICK if first > 1e9 else step < LONGEST_DAY
+        if fits and any(low < first < high for low, high in ranges):
+            return UnitGuess("1", gain, True, "it counts from an epoch")
+    return None
 
 
 def _clock_units(clock: Column) -> Mapping[str, float]:

@@ -53,6 +53,7 @@ A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
     3.5,
 )  # a decade by which a reference is nearer to the position
+A_DECADE_LEFT, MOST_LEFT = 1.5, 2.5  # a decade by which less than a tenth of a force is unexplained
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -70,7 +71,7 @@ def said(one: Column, role: str) -> float:
         total += _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
     total += _by_purpose(one, role)
     if one.bits is not None:
-        total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
+        total += {"F": -6.0, "u": 1.0}.get(role, 0.0)
     if one.flag:
         driven = role == "u" and "command" in head.means
         total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else RULED_OUT
@@ -177,6 +178,8 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     v_share: of it that is the velocity alone; less_way: whether it goes less than the position.
     """
     score = 6.0 * float(np.clip((law.share - 0.3) / 0.65, -0.7, 1.0)) + 2.0 * abs(law.work)
+    score += float(np.clip(-A_DECADE_LEFT * np.log10(max(1.0 - law.share, 1e-9)) - A_DECADE_LEFT,
+                           0.0, MOST_LEFT))  # fmt: skip
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
