@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import permutations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -21,9 +21,12 @@ from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
+MOST_CONSTANT = 0.3  # of a signal's spread, that a derivative is off the change of what it is of
+DIFFERENCE, SAME_FACTOR = 0.9995, 0.02  # share of an error that two signals' difference explains
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
 SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
@@ -39,6 +42,30 @@ class Pairs:
         self.alike = correlation(self.x)
         self.rate = _rates(self.x)
         self.stems = [stem(one.header) for one in signals]
+
+    @cached_property
+    def errors(self) -> set[int]:
+        """The places of signals that are the difference of two others, as a following error is.
+
+        Of three such the smallest is the error; what is fed forward goes less with either.
+        """
+        out = set[int]()
+        square = self.x - self.x.mean(axis=0)
+        gram = square.T @ square
+        spread = np.sqrt(np.diag(gram))
+        for i, j in combinations(range(len(self.signals)), 2):
+            if self.alike[i, j] < ONE_SIGNAL:
+                continue
+            solve = gram[np.ix_((i, j), (i, j))]
+            if abs(np.linalg.det(solve)) < 1e-12 * solve[0, 0] * solve[1, 1]:
+                continue
+            factors = np.linalg.solve(solve, gram[[i, j]])
+            share = np.sum(factors * gram[[i, j]], axis=0) / np.maximum(spread, 1e-300) ** 2
+            turned = np.abs(factors[0] + factors[1]) < SAME_FACTOR * np.abs(factors[0])
+            small = spread < np.minimum(spread[i], spread[j]) * np.abs(factors[0])
+            at = np.flatnonzero((share > DIFFERENCE) & turned & small)
+            out |= {k for k in at.tolist() if k not in (i, j)}
+        return out
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:
         """Commands before a limiter or a sum, by their place: the place of what comes out of it.
@@ -58,17 +85,25 @@ class Pairs:
 
 
 def _rates(x: Array) -> Array:
-    """How much of each signal (column) is the derivative of another (row), signed, (k, k)."""
+    """How much of each signal (column) is the derivative of another (row), signed, (k, k).
+
+    None of it where the two go together but for a constant, as friction does beside a velocity.
+    """
     best = np.zeros((x.shape[1], x.shape[1]))
-    mean = x - x.mean(axis=0)
+    mean, middle = x - x.mean(axis=0), x.mean(axis=0)
+    spread = np.maximum(np.std(x, axis=0), 1e-300)
     summed = np.vstack([np.zeros(x.shape[1]), np.cumsum(0.5 * (mean[1:] + mean[:-1]), axis=0)])
     for size in STRETCHES:
         if 4 * size > len(x):
             break
         every = max(1, size // 4)
         change = (mean[size:] - mean[:-size])[::every]
-        found = _normed(change).T @ _normed((summed[size:] - summed[:-size])[::every])
-        share = np.sign(found) * found**2
+        rise = (summed[size:] - summed[:-size])[::every]
+        found = _normed(change).T @ _normed(rise)
+        factor = found * np.std(rise, axis=0) / np.maximum(np.std(change, axis=0), 1e-300)[:, None]
+        constant = middle + (rise.mean(axis=0) - factor * change.mean(axis=0)[:, None]) / size
+        own = np.abs(constant) < MOST_CONSTANT * spread
+        share = np.where(own, np.sign(found) * found**2, 0.0)
         best = np.where(np.abs(share) > np.abs(best), share, best)
     np.fill_diagonal(best, 0.0)
     return best

@@ -32,6 +32,7 @@ KIND_WORDS = {
     "motor": "F_e = force_per_command * u",
 }
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
+COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 
@@ -363,9 +364,9 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
 
 
 def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
-    """What a signal would be otherwise: the next column where the column is open, else a unit."""
+    """What a signal would be otherwise: the next column where that is likely, else a unit."""
     other = roles.rivals.get(name)
-    if other is not None and (odds < SURE or not unit.rival):
+    if other is not None and (odds < COLUMN_OPEN or not unit.rival):
         return str(other.raw.key)
     return unit.rival
 

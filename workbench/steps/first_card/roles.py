@@ -28,6 +28,7 @@ from workbench.steps.first_card.weights import (
     acts,
     ahead_of,
     among_derivatives,
+    drives,
     driving,
     in_one_unit,
     less_way,
@@ -175,7 +176,7 @@ def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
         if max(as_force, as_command) <= -3.0:
             continue
         physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
-        physics += own
+        physics += own + drives(pairs, k)
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics)

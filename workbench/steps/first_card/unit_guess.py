@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.signals.relations import derivative
 from workbench.steps.first_card.columns import Column, Columns
-from workbench.steps.first_card.motion_guess import MotionGuess, is_current, unit_by_turn
+from workbench.steps.first_card.motion_guess import MotionGuess, is_count, is_current, unit_by_turn
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sensor_gain import by_reference, by_sample_number, counts_samples
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
@@ -57,7 +57,9 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
     if "r" not in out:
         out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
     for name, column in found.items():
-        if name not in out:
+        if name not in out and name == "u" and _beside_counts(roles):
+            out[name] = _command("A", "beside counts of an encoder mostly a current")
+        elif name not in out:
             out[name] = _alone(name, column, motion)
     return {name: out[name] for name in found}
 
@@ -225,6 +227,12 @@ def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
         return UnitGuess(unit, None, False, "by its size, the header says none", rival)
     unit = max(USUAL.get(name, {"1": 0.0}).items(), key=lambda one: one[1])[0]
     return UnitGuess(unit, None, False, "the usual one, the header says none")
+
+
+def _beside_counts(roles: Roles) -> bool:
+    """Whether a command of which its header says nothing stands beside counts."""
+    u = roles.columns["u"]
+    return is_count(roles.columns["y"]) and not u.header.means and u.bits is None
 
 
 def _of_command(column: Column) -> UnitGuess:

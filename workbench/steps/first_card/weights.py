@@ -33,6 +33,7 @@ LEAST_SCORE = 0.0  # of a role beside none at all
 AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are tried
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
+SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
@@ -44,6 +45,7 @@ SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's n
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
+AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
@@ -115,7 +117,7 @@ def moves_like_a_body(y: Column) -> float:
     """Log-odds of a position by its own course: a body's velocity is far above its noise."""
     assert y.motion is not None
     v_noise = max(y.motion.v_noise, 1e-300)
-    clear = float(np.std(y.motion.v)) / v_noise
+    clear = float(np.sqrt(np.mean(y.motion.v**2))) / v_noise
     few = len(y.levels) < 20
     return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
@@ -126,7 +128,9 @@ def among_derivatives(pairs: Pairs) -> Array:
     speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
     of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
     own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
-    return np.where(of_others > ALL_VELOCITY, -6.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
+    derived = np.where(of_others > ALL_VELOCITY, -6.0, 0.0)
+    derived += np.where(of_others > SURELY_VELOCITY, -4.0, 0.0)
+    return derived + np.where(own > ALL_VELOCITY, 1.0, 0.0)
 
 
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
@@ -152,6 +156,16 @@ def limits(pairs: Pairs) -> dict[int, int]:
     likely = [(said(one, "u"), k) for k, one in enumerate(pairs.signals) if not one.flag]
     likely = sorted((one for one in likely if one[0] > -1.0), reverse=True)[:MOST_COMMANDS]
     return pairs.behind(sorted(k for _, k in likely))
+
+
+def drives(pairs: Pairs, k: int) -> float:
+    """Log-odds of what drives a body by what it is of other signals: no error, no velocity."""
+    head = pairs.signals[k].header
+    named = max(head.means.get("force", 0.0), head.means.get("command", 0.0))
+    error = AN_ERROR if k in pairs.errors else 0.0
+    bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
+    rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
+    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY and named < BY_UNIT / 2 else 0.0)
 
 
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
