@@ -149,7 +149,9 @@ def _own_names(blocks: Sequence[Block], k: int) -> str:
     own = _keyed(blocks[k])
     others = [_keyed(one) for j, one in enumerate(blocks) if j != k]
     for key, value in own.items():
-        if not _COUNTED.fullmatch(value) and all(other.get(key, value) != value for other in others):
+        if not _COUNTED.fullmatch(value) and all(
+            other.get(key, value) != value for other in others
+        ):
             return value
     heads = _heads(blocks[k])
     if heads and all(_heads(one) != heads for j, one in enumerate(blocks) if j != k):

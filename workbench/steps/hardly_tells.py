@@ -94,8 +94,8 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
         )
     elif (share := derivative(found.motion, found.drive).share) > FOLLOWED:
         yield (
-            f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as of"
-            ' a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'
+            f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
+            ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'
         )
 
 

@@ -8,14 +8,13 @@ from identification.arrays import Array
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.registers import halved_counts
 from workbench.steps.first_card.roles import Roles
 
 WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one
 TURN_IN = {"rad": 2.0 * np.pi, "deg": 360.0}
 WRAPS = 0.02  # of a turn, that a leap or a range is off it
 TURNING = 1.0  # log-odds by words that may speak of a turn, from which it is guessed
-COUNT_PARTS, MANY_COUNTS = 256.0, 1000.0  # of a count that is halved, and counts of a position then
-OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 COUNTED_LEVELS = 200  # of a position of whole numbers, from which it is one of counts
 CURRENTS = ("current", "strom", "電流", "courant", "corrente", " iq ", " i q ", " isq ", " ia ",
             " i a ", " amp")  # fmt: skip
@@ -61,7 +60,9 @@ def told_motion(roles: Roles) -> MotionGuess:
         return MotionGuess("rotary", why, False, rotor)
     y = roles.columns["y"]
     if is_count(y) and y.header.unit is None and not y.header.means:
-        return MotionGuess("rotary", "it has the steps of an encoder, which shafts mostly have", False)
+        return MotionGuess(
+            "rotary", "it has the steps of an encoder, which shafts mostly have", False
+        )
     if sum(weak.values()) >= TURNING:
         most = roles.columns[max(weak, key=lambda one: weak[one])]
         why = f"machines that turn have names like {most.shown} more often"
@@ -81,18 +82,7 @@ def is_count(y: Column) -> bool:
         return unit.quantity == "count"
     if len(y.levels) <= COUNTED_LEVELS:
         return False
-    return y.whole or _halved_counts(y.numbers)
-
-
-def _halved_counts(x: Array) -> bool:
-    """Whether steps are counts that a drive interpolates, in parts of a power of two."""
-    if float(np.ptp(x)) < MANY_COUNTS:
-        return False
-    parts = COUNT_PARTS * np.diff(x)
-    off = np.abs(parts - np.round(parts))
-    decimal = 1000.0 * np.diff(x)  # millimetres, or degrees, to three places have such steps too
-    return bool(np.mean(off < OFF_PART) > MOSTLY and np.mean(
-        np.abs(decimal - np.round(decimal)) < OFF_PART) < MOSTLY)  # fmt: skip
+    return y.whole or halved_counts(y.numbers)
 
 
 def is_current(u: Column) -> bool:

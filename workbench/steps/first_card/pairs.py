@@ -165,7 +165,8 @@ def _both(one: Column, other: Column) -> tuple[Array, Array]:
 class Seen:
     """The other columns as a position sees them; `at` is its place among them.
 
-    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,).
+    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,);
+    v_constant: what is constant beside it, in units of the spread.
     """
 
     def __init__(self, pairs: Pairs, at: int) -> None:
@@ -179,6 +180,9 @@ class Seen:
         square, together = max(float(v @ v), 1e-300), v @ f
         self.v_factor = together / square
         self.v_share = together**2 / square / np.maximum(np.sum(f**2, axis=0), 1e-300)
+        spread = np.maximum(np.std(self.smooth[inside], axis=0), 1e-300)
+        constant = self.smooth[inside].mean(axis=0) - self.v_factor * self.motion.v[inside].mean()
+        self.v_constant = np.abs(constant) / spread
         self._leads = dict[int, Lead]()
         self.as_reference = dict[int, float]()
 

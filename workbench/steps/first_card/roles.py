@@ -16,7 +16,7 @@ from identification.arrays import Array
 from identification.log import RigKind
 from identification.signals.relations import ForceLaw, actuator_share, force_law
 from workbench.steps.first_card.columns import Column
-from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
@@ -44,6 +44,9 @@ MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
 COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
+MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
+SAME_POSITION = 0.95  # correlation with the position, that no command has
+CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
@@ -93,6 +96,7 @@ class _Choice:
     others: Mapping[str, Column]
     gains: Mapping[str, float]
     next_best: Mapping[str, Column]
+    behind: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def score(self) -> float:
@@ -259,7 +263,7 @@ def _filled(way: _Way) -> _Choice:
     gain = np.array([[_gain(way, k, role, float(moved[k])) for role in roles] for k in rest])
     kept = np.maximum(gain, LEAST_SCORE)
     rows, places = linear_sum_assignment(-kept)
-    others, gains, next_best = {}, {}, {}
+    others, gains, next_best, margins = {}, {}, {}, {}
     for i, j in zip(rows.tolist(), places.tolist(), strict=True):
         if kept[i, j] <= LEAST_SCORE:
             continue
@@ -267,8 +271,9 @@ def _filled(way: _Way) -> _Choice:
         behind = [m for m in np.argsort(-gain[:, j]).tolist() if m != i and gain[m, j] > -3.0]
         if behind:
             next_best[role] = signals[rest[behind[0]]]
+            margins[role] = float(gain[i, j] - gain[behind[0], j])
             gains[role] = float(min(gains[role], 2.0 * (gain[i, j] - gain[behind[0], j]) + 4.0))
-    return _Choice(way, others, gains, next_best)
+    return _Choice(way, others, gains, next_best, margins)
 
 
 def _gain(way: _Way, k: int, role: str, moved: float) -> float:
@@ -283,11 +288,14 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
     if role in ("u", "v", "a") and head < -3.0:
         return head
     if role == "v":
-        share = seen.v_share[k]
+        share = seen.v_share[k] if seen.v_constant[k] < MOST_CONSTANT else 0.0
         return head + (2.5 if share > ALL_VELOCITY else -0.5 if share > 0.8 else -3.0)
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
-        return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, 4.0))
+        most = MOST_BY_CHANGE if head >= HEADER_TELLS else MOST_UNNAMED
+        if head < HEADER_TELLS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
+            return -3.0  # one more position, of a model or another sensor
+        return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     return head + 1.0 if role == "F" else head - 1.0
 
 
@@ -321,6 +329,7 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         ahead = best.score - max(rivals, default=-np.inf)
         own = best.gains.get(role)
         odds = min(ahead, own) if own is not None else ahead
+        odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_TELLS
         out[role] = odds if told else min(odds, SURE - 1.0)
     return out

@@ -14,6 +14,7 @@ from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.registers import halved_counts
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
@@ -31,6 +32,7 @@ SURE = 3.0  # log-odds from which a role is called sure
 BY_UNIT, AGAINST_UNIT = 4.0, -6.0
 LEAST_SCORE = 0.0  # of a role beside none at all
 AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are tried
+USUAL_FRICTION = 0.02  # share of a force that the step at the reversal alone explains
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
@@ -46,6 +48,7 @@ ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
 AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
+COUNTED = 1.5  # for a position whose steps are parts of an encoder's count
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
@@ -119,7 +122,8 @@ def moves_like_a_body(y: Column) -> float:
     v_noise = max(y.motion.v_noise, 1e-300)
     clear = float(np.sqrt(np.mean(y.motion.v**2))) / v_noise
     few = len(y.levels) < 20
-    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
+    counted = COUNTED if not y.header.means and halved_counts(y.numbers) else 0.0
+    return counted + float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
 def among_derivatives(pairs: Pairs) -> Array:
@@ -197,6 +201,7 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
+    score += float(np.clip(0.75 * np.log10(max(law.friction, 1e-9) / USUAL_FRICTION), -0.75, 0.75))
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
     if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
@@ -221,7 +226,8 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
+    like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
+    score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
     score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
@@ -233,6 +239,12 @@ def ahead_of(seen: Seen, k: int) -> float:
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
     score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
     return score + _named_for(seen, k)
+
+
+def _alike_then(y: Array, r: Array, ahead: int) -> float:
+    """Correlation of a position with what is ahead of it by so many samples."""
+    late, early = (y[ahead:], r[: len(r) - ahead]) if ahead >= 0 else (y[:ahead], r[-ahead:])
+    return float(np.corrcoef(late, early)[0, 1])
 
 
 def _named_for(seen: Seen, k: int) -> float:
