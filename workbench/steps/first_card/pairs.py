@@ -33,14 +33,16 @@ MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind i
 class Pairs:
     """The signals of a log beside each other: `x` (n, k), `alike` and `rate` (k, k).
 
-    alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned.
+    alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned;
+    rate_but_constant: the same where the two may be a constant apart, as a friction force is from a
+    velocity.
     """
 
     def __init__(self, signals: Sequence[Column]) -> None:
         self.signals = tuple(signals)
         self.x = np.column_stack([one.x for one in signals])
         self.alike = correlation(self.x)
-        self.rate = _rates(self.x)
+        self.rate, self.rate_but_constant = _rates(self.x)
         self.stems = [stem(one.header) for one in signals]
 
     @cached_property
@@ -84,29 +86,30 @@ class Pairs:
         return out
 
 
-def _rates(x: Array) -> Array:
-    """How much of each signal (column) is the derivative of another (row), signed, (k, k).
-
-    None of it where the two go together but for a constant, as friction does beside a velocity.
-    """
+def _rates(x: Array) -> tuple[Array, Array]:
+    """How much of each signal (column) is the derivative of another (row), signed, (k, k): none of
+    it where the two are a constant apart, and whether they are or not."""
     best = np.zeros((x.shape[1], x.shape[1]))
+    every = best.copy()
     mean, middle = x - x.mean(axis=0), x.mean(axis=0)
     spread = np.maximum(np.std(x, axis=0), 1e-300)
     summed = np.vstack([np.zeros(x.shape[1]), np.cumsum(0.5 * (mean[1:] + mean[:-1]), axis=0)])
     for size in STRETCHES:
         if 4 * size > len(x):
             break
-        every = max(1, size // 4)
-        change = (mean[size:] - mean[:-size])[::every]
-        rise = (summed[size:] - summed[:-size])[::every]
+        step = max(1, size // 4)
+        change = (mean[size:] - mean[:-size])[::step]
+        rise = (summed[size:] - summed[:-size])[::step]
         found = _normed(change).T @ _normed(rise)
         factor = found * np.std(rise, axis=0) / np.maximum(np.std(change, axis=0), 1e-300)[:, None]
         constant = middle + (rise.mean(axis=0) - factor * change.mean(axis=0)[:, None]) / size
         own = np.abs(constant) < MOST_CONSTANT * spread
-        share = np.where(own, np.sign(found) * found**2, 0.0)
-        best = np.where(np.abs(share) > np.abs(best), share, best)
-    np.fill_diagonal(best, 0.0)
-    return best
+        share = np.sign(found) * found**2
+        every = np.where(np.abs(share) > np.abs(every), share, every)
+        best = np.where(own & (np.abs(share) > np.abs(best)), share, best)
+    for one in (best, every):
+        np.fill_diagonal(one, 0.0)
+    return best, every
 
 
 def _normed(x: Array) -> Array:

@@ -38,6 +38,7 @@ NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
+FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
@@ -130,7 +131,7 @@ def among_derivatives(pairs: Pairs) -> Array:
     """Log-odds of each column as a position, by what it is the derivative of, and what its own."""
     bodies = [i for i, one in enumerate(pairs.signals) if said(one, "y") > -4.0]
     speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
-    of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
+    of_others = np.max(pairs.rate_but_constant[bodies], axis=0, initial=0.0)
     own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
     derived = np.where(of_others > ALL_VELOCITY, -6.0, 0.0)
     derived += np.where(of_others > SURELY_VELOCITY, -4.0, 0.0)
@@ -238,6 +239,8 @@ def ahead_of(seen: Seen, k: int) -> float:
         score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
     calm = one.noise / max(float(np.std(one.x)), 1e-300)
     score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
+    if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
+        score = min(score, 0.0)
     return score + _named_for(seen, k)
 
 
