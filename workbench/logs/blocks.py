@@ -17,6 +17,7 @@ from identification.signals.check import SHORTEST_LOG
 from workbench.logs.table import RawColumn, Table
 
 FEWEST_BLOCKS = 2
+UNIT_KEYS = ("unit", "units", "einheit", "unité", "単位")  # of a line that gives a block's unit
 PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
@@ -93,6 +94,7 @@ def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
         clocks[group] = len(names)
         for column in range(block.width):
             plain = own if block.width == PAIR else heads[column] if heads else f"{own} {column}"
+            plain += _unit(block) if block.width == PAIR else ""
             names.append((heads[0] if heads else "time") if column == 0 else plain)
             groups.append(group)
             places.append((k, column))
@@ -149,6 +151,8 @@ def _own_names(blocks: Sequence[Block], k: int) -> str:
     own = _keyed(blocks[k])
     others = [_keyed(one) for j, one in enumerate(blocks) if j != k]
     for key, value in own.items():
+        if key.lower() in UNIT_KEYS:
+            continue
         if not _COUNTED.fullmatch(value) and all(
             other.get(key, value) != value for other in others
         ):
@@ -160,6 +164,12 @@ def _own_names(blocks: Sequence[Block], k: int) -> str:
     elsewhere = {line.strip().strip("[]#; ") for j, one in enumerate(blocks) if j != k
                  for line in one.above}  # fmt: skip
     return next((line for line in plain[::-1] if line and line not in elsewhere), "")
+
+
+def _unit(block: Block) -> str:
+    """The unit that a line above a block gives, in brackets."""
+    found = next((value for key, value in _keyed(block).items() if key.lower() in UNIT_KEYS), "")
+    return f" [{found.strip('[]()')}]" if found else ""
 
 
 def _keyed(block: Block) -> dict[str, str]:

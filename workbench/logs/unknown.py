@@ -64,8 +64,9 @@ def read_unknown(path: Path) -> UnknownLog:
     found, scalars = list[RawColumn](), list[RawColumn]()
     for number in range(len(table.names)):
         text = texts[number] if number < len(texts) and (table.headed or names) else ""
-        twice = full.count(full[number]) > 1
-        key = full[number] if headed and text and not twice else number
+        called = table.names if table.clocks and table.names.count(text) == 1 else full
+        twice = called.count(called[number]) > 1
+        key = called[number] if headed and text and not twice else number
         below = units[number] if number < len(units) else ""
         values, why = _numbers(table, number)
         if why.startswith("text") and (times := _times(table, number, path)) is not None:

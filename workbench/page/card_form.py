@@ -28,6 +28,7 @@ KIND_WORDS = {
     "electro-pneumatic": "two pressures make the force",
     "force": "the force is logged",
     "motor": "the force is a constant times the command",
+    "velocity": "the velocity follows the command (a valve and cylinder)",
 }
 RIG_NUMBERS = {  # key of the card: label, and unit
     "area_p_m2": ("area, positive side", "m^2"),

@@ -90,7 +90,7 @@ def is_current(u: Column) -> bool:
     text = f" {' '.join(words_of(u.header.name))} "
     if u.header.unit is not None:
         return u.header.unit.card in ("A", "mA")
-    return any(one in text for one in CURRENTS)
+    return any(one in text for one in CURRENTS) or (" i " in text and not u.whole)
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.log import RigKind
-from identification.signals.relations import force_law
+from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
@@ -21,6 +21,7 @@ from workbench.steps.first_card.roles import Roles, told_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
+from workbench.steps.hardly_tells import FOLLOWED
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
@@ -30,7 +31,9 @@ KIND_WORDS = {
     "electro-pneumatic": "F_e from two pressures",
     "force": "F_e is logged",
     "motor": "F_e = force_per_command * u",
+    "velocity": "the velocity follows u",
 }
+VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
@@ -150,8 +153,42 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     _refuse_resting(columns, roles)
     _refuse_sign_bits(columns, roles)
     named = _card_name(name or path.stem)
+    found = _of_roles(columns, roles, named)
+    if roles.kind == "motor" and (share := _velocity_in(roles)) > FOLLOWED:
+        return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
-    return replace(_of_roles(columns, roles, named), other=other)
+    return replace(found, other=other)
+
+
+def _velocity_in(roles: Roles) -> float:
+    """Share of the command that is the velocity."""
+    y = roles.columns["y"]
+    assert y.motion is not None
+    return derivative(y.motion, roles.columns["u"].x).share
+
+
+def _or_velocity(motor: Proposal, roles: Roles, share: float) -> Proposal:
+    """The proposal for a motor whose command is mostly the velocity, or for a valve and cylinder;
+    the other of the two is what it would be otherwise."""
+    text = roles.columns["u"].header.name.casefold()
+    valve = any(word in text for word in VALVES)
+    why = (
+        f"{share:.0%} of {roles.columns['u'].shown} is the velocity: a valve, or a motor by voltage"
+    )
+
+    def of_kind(of: Proposal, kind: RigKind, rival: RigKind) -> Proposal:
+        rig = [
+            RigGuess("kind", kind, "", False, f"{KIND_WORDS[kind]}; {why}", rival)
+            if one.key == "kind"
+            else one
+            for one in of.rig
+            if kind == "motor" or one.key != "force_per_command"
+        ]
+        return replace(of, kind=kind, rig=tuple(rig))
+
+    both = of_kind(motor, "motor", "velocity"), of_kind(motor, "velocity", "motor")
+    first, second = both[::-1] if valve else both
+    return replace(first, other=second)
 
 
 def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
