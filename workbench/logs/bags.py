@@ -14,7 +14,7 @@ from workbench.logs.messages import Container, Decoder, Message, message_table
 from workbench.logs.ros1 import ros1_decoder
 from workbench.logs.table import BINARY_BYTES, Table
 
-_CLOCKS = ("log_time",)
+_BAG_CLOCKS = ("log_time",)
 
 
 def read_bag(path: Path, spec: FileSpec) -> Table:
@@ -37,7 +37,7 @@ def read_bag(path: Path, spec: FileSpec) -> Table:
                               decoders[connection.id])  # fmt: skip
 
     try:
-        found = message_table(Container(path, _CLOCKS, messages), spec)
+        found = message_table(Container(path, _BAG_CLOCKS, messages), spec)
     except library.ReaderError as error:
         raise BadLog(
             f"{path}: the bag cannot be opened ({' '.join(str(error).split())}); run rosbag reindex"

@@ -22,8 +22,8 @@ PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
-_WORDS = re.compile(r"^[^\S\n]*[\[\"]?[^\W\d_]", re.M)
-_NO_WORDS = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
+_TEXT_LINE = re.compile(r"^[^\S\n]*[\[\"]?[^\W\d_]", re.M)
+_NO_TEXT = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
 _MARKS = (";", "\t", ",", " ", "|")
 _KEY = re.compile(r"^\s*([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
 _COUNTED = re.compile(r"\d+([.,]\d+)?")  # values that differ by chance: numbers of samples
@@ -119,8 +119,8 @@ def _may_have_blocks(text: str) -> bool:
     begin = re.search(r"^\s*[+-]?[\d.]+[^\n]*\n\s*[+-]?[\d.]+[^\n]*\n", text, re.M)
     if begin is None:
         return False
-    lines = islice(_WORDS.finditer(text, begin.end()), MOST_WORDS)
-    return any(not _NO_WORDS.match(text, one.end() - 1) for one in lines)
+    lines = islice(_TEXT_LINE.finditer(text, begin.end()), MOST_WORDS)
+    return any(not _NO_TEXT.match(text, one.end() - 1) for one in lines)
 
 
 def _mark(lines: Sequence[str]) -> str:

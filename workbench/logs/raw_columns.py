@@ -9,7 +9,7 @@ from identification.arrays import Array
 from identification.signals.check import SHORTEST_LOG
 from workbench.cards.headers import read_header
 
-SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
+FAR_SLOWER = 8.0  # times the fastest clock's period, from which a clock is not the one to look by
 LEAST_COMMON = 0.5  # of the clock's span, that another one shares
 
 
@@ -63,7 +63,7 @@ def _rises(x: Array) -> bool:
 def _base(columns: Sequence[RawColumn], times: Mapping[str, RawColumn]) -> str:
     """The group by whose clock the log is looked at."""
     period = {name: float(np.nanmedian(np.diff(one.values))) for name, one in times.items()}
-    quick = [name for name in times if period[name] < SLOWER * min(period.values())]
+    quick = [name for name in times if period[name] < FAR_SLOWER * min(period.values())]
     many = {name: sum(one.group == name and not one.unusable for one in columns) for name in quick}
     return max(quick, key=lambda name: (many[name], period[name]))
 

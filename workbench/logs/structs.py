@@ -8,9 +8,9 @@ import numpy as np
 from workbench.logs.table import RawColumn
 
 LABELS = ("name", "label", "signalname", "title")  # keys of what a table within a list is called
-MOST_COLUMNS = 32  # of an array of numbers that become columns; above, it is an image
+WIDEST_ARRAY = 32  # of an array of numbers that become columns; above, it is an image
 DEEPEST = 6  # tables in each other
-PLAIN = (bool, int, float, str, type(None))
+SINGLE_VALUES = (bool, int, float, str, type(None))
 
 
 def vectors_of(tree: Any) -> dict[str, RawColumn]:
@@ -63,7 +63,7 @@ def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]
         yield from own
     elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
         yield from _entries(path, value, depth)
-    elif isinstance(value, PLAIN):
+    elif isinstance(value, SINGLE_VALUES):
         yield path, np.atleast_1d(np.asarray(value))
     else:
         yield from _array(path, value)
@@ -73,7 +73,7 @@ def _entries(
     path: str, entries: Sequence[Mapping[str, Any]], depth: int
 ) -> Iterator[tuple[str, RawColumn]]:
     """Tables of a list: rows, where each holds single values, else one after the other."""
-    if len(entries) > MOST_COLUMNS:
+    if len(entries) > WIDEST_ARRAY:
         yield from _records(path, entries)
         return
     for k, one in enumerate(entries):
@@ -97,10 +97,10 @@ def _numbers(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
     if isinstance(value, Mapping) and depth < DEEPEST:
         for key, inner in value.items():
             yield from _numbers(f"{path}.{key}" if path else str(key), inner, depth + 1)
-    elif isinstance(value, list) and len(value) <= MOST_COLUMNS and depth < DEEPEST:
+    elif isinstance(value, list) and len(value) <= WIDEST_ARRAY and depth < DEEPEST:
         for k, inner in enumerate(value):
             yield from _numbers(f"{path}[{k}]", inner, depth + 1)
-    elif isinstance(value, PLAIN):
+    elif isinstance(value, SINGLE_VALUES):
         yield path, value
 
 
@@ -119,7 +119,7 @@ def _array(path: str, value: Any) -> Iterator[tuple[str, RawColumn]]:
     x = np.atleast_1d(np.squeeze(np.asarray(value)))
     if x.ndim == 1:
         yield path, x
-    elif x.ndim == 2 and min(x.shape) <= MOST_COLUMNS:
+    elif x.ndim == 2 and min(x.shape) <= WIDEST_ARRAY:
         for k, one in enumerate(x if x.shape[0] < x.shape[1] else x.T):
             yield f"{path}[{k}]", one
 

@@ -18,14 +18,16 @@ from identification.signals.check import work_share
 from identification.signals.differentiate import Motion, differentiate, low_pass
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
 
-SLOWEST_RATE = 50.0  # Hz, below which starts and stops lie between two samples
+TELLING_RATE = 50.0  # Hz, below which starts and stops lie between two samples
 NEARLY_ONE_WAY = 0.05  # of the motion, that goes the other way at most
 NO_WORK = 0.03  # of the work that a force exchanges with a body, that it does on the whole at least
 ALL_OF_PLACE = 0.97  # of a force, that place explains where it only bears a weight or a spring
 NO_FRICTION_IN_IT = 0.03  # of such a force's spread, that friction is at most
-FOLLOWED = 0.8  # of a command, that is the velocity
-SLOWED = 0.7  # of its speed at first, that a body which slows down keeps at most
-IDLE = 0.3  # correlation of a drive with velocity and acceleration, of one that does nothing
+ALL_FOLLOWED = 0.8  # of a command, that is the velocity
+KEPT_SPEED = 0.7  # of its speed at first, that a body which slows down keeps at most
+GOES_WITH_NEITHER = (
+    0.3  # correlation of a drive with velocity and acceleration, of one that does nothing
+)
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -50,9 +52,9 @@ def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
 
 def _of_rate(log: Log) -> Iterator[str]:
     rate = 1.0 / log.h
-    if rate < 0.999 * SLOWEST_RATE:
+    if rate < 0.999 * TELLING_RATE:
         yield (
-            f"sampled at {rate:.3g} Hz, slower than {SLOWEST_RATE:g} Hz: starts and stops lie"
+            f"sampled at {rate:.3g} Hz, slower than {TELLING_RATE:g} Hz: starts and stops lie"
             " between two samples, so bands and breakaway forces will hardly be told; log faster"
         )
 
@@ -92,7 +94,7 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
             " exchange): no friction takes it up, or something else moves the body, by hand or by a"
             " load; friction will hardly be told"
         )
-    elif (share := derivative(found.motion, found.drive).share) > FOLLOWED:
+    elif (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED:
         yield (
             f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
             ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'
@@ -113,7 +115,7 @@ def _said_of_one_way(up: float) -> str:
 def _said_of_coasting(found: _Moved) -> str:
     speed = np.abs(found.motion.v[found.sure])
     few = max(2, int(ENDS * len(speed)))
-    slower = speed[-few:].mean() < SLOWED * speed[:few].mean()
+    slower = speed[-few:].mean() < KEPT_SPEED * speed[:few].mean()
     how = "coasts" if slower else "coasts or is carried on at one speed"
     return (
         f"the body {how}: the {found.name} goes with neither its speed nor the change of it, so"
@@ -134,7 +136,7 @@ def _is_idle(found: _Moved, drive: Array) -> bool:
     if np.ptp(drive) == 0.0:
         return True
     v, a = found.motion.v[found.sure], found.motion.a[found.sure]
-    return all(abs(float(np.corrcoef(drive, x)[0, 1])) < IDLE for x in (v, a))
+    return all(abs(float(np.corrcoef(drive, x)[0, 1])) < GOES_WITH_NEITHER for x in (v, a))
 
 
 def _bears_place_alone(found: _Moved, drive: Array, *, rotary: bool) -> bool:

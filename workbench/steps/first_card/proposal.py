@@ -21,13 +21,13 @@ from workbench.steps.first_card.roles import Roles, told_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
-from workbench.steps.hardly_tells import FOLLOWED
+from workbench.steps.hardly_tells import ALL_FOLLOWED
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
 )
-KIND_WORDS = {
+DRIVEN_BY = {
     "electro-pneumatic": "F_e from two pressures",
     "force": "F_e is logged",
     "motor": "F_e = force_per_command * u",
@@ -154,7 +154,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     _refuse_sign_bits(columns, roles)
     named = _card_name(name or path.stem)
     found = _of_roles(columns, roles, named)
-    if roles.kind == "motor" and (share := _velocity_in(roles)) > FOLLOWED:
+    if roles.kind == "motor" and (share := _velocity_in(roles)) > ALL_FOLLOWED:
         return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
     return replace(found, other=other)
@@ -178,7 +178,7 @@ def _or_velocity(motor: Proposal, roles: Roles, share: float) -> Proposal:
 
     def of_kind(of: Proposal, kind: RigKind, rival: RigKind) -> Proposal:
         rig = [
-            RigGuess("kind", kind, "", False, f"{KIND_WORDS[kind]}; {why}", rival)
+            RigGuess("kind", kind, "", False, f"{DRIVEN_BY[kind]}; {why}", rival)
             if one.key == "kind"
             else one
             for one in of.rig
@@ -310,7 +310,7 @@ def _kind_guess(roles: Roles, other: Roles | None) -> RigGuess:
     """The kind of rig, by what drives the body; the next one with the column that would."""
     drive = next(iter(_drives(roles)))
     sure = bool(roles.ahead >= SURE and roles.odds[drive] >= SURE)
-    why = KIND_WORDS[roles.kind]
+    why = DRIVEN_BY[roles.kind]
     if not sure and other is not None:
         why += f", by {drive_columns(roles)}; a {other.kind} rig would be driven by"
         why += f" {drive_columns(other)}"

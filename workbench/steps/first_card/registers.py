@@ -11,7 +11,10 @@ FEWEST_BITS = 8  # of a magnitude beside its sign
 BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
 NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
 SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
-COUNT_PARTS, MANY_COUNTS = 256.0, 1000.0  # of a count that is halved, and counts of a position then
+COUNT_PARTS, LONG_WAY_OF_COUNTS = (
+    256.0,
+    1000.0,
+)  # of a count that is halved, and counts of a position then
 OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 
 
@@ -61,7 +64,7 @@ def _sign_and_magnitude(x: Array) -> Register | None:
 
 def halved_counts(x: Array) -> bool:
     """Whether steps are counts that a drive interpolates, in parts of a power of two."""
-    if float(np.ptp(x)) < MANY_COUNTS:
+    if float(np.ptp(x)) < LONG_WAY_OF_COUNTS:
         return False
     parts = COUNT_PARTS * np.diff(x)
     off = np.abs(parts - np.round(parts))

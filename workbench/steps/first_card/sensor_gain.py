@@ -17,7 +17,7 @@ ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors hav
 ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
 NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
-TURNS = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
+COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
 SENSOR_OUTPUTS = ("command", "count")
 
 
@@ -49,7 +49,7 @@ def by_reference(
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
     span = 2.0 ** np.ceil(np.log2(max(float(np.ptp(y.numbers)), 1.0)))
     one_turn = float(np.ptp(y.numbers)) > NEARLY_A_TURN * span
-    if motion == "rotary" and unit == "count" and one_turn and span in TURNS:
+    if motion == "rotary" and unit == "count" and one_turn and span in COUNTS_OF_A_TURN:
         rival = f"{number:.9g} {unit}/{per}"
         return UnitGuess(unit, f"{span:.9g} {unit}/{per}", False,
                          f"it spans nearly {span:.9g}, a turn it may be", rival)  # fmt: skip
