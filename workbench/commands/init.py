@@ -54,8 +54,8 @@ def command(
     _refuse_existing(card, force, asking)
     with progress("looking", as_json=as_json):
         found = proposed(log, name, axis)
-    if asking and axis is None and (chosen := _asked_axis(found)) != found.axis:
-        found = proposed(log, name, chosen)
+    if asking and axis is None and len(found.axes) > 1:
+        found = proposed(log, name, _asked_axis(found))
     if asking:
         found = _asked(found)
     with progress("reading", as_json=as_json):
@@ -81,12 +81,10 @@ def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
 
 
 def _asked_axis(of: "Proposal") -> str:
-    """The axis of the card, asked where the log has several."""
-    if len(of.axes) < 2:
-        return of.axis
+    """Which of several axes the card is to be of."""
     choice = click.Choice(of.axes, case_sensitive=False)
     own = of.axis or of.axes[0]
-    return str(click.prompt("Several axes in this log; the card is of", choice, default=own))
+    return str(click.prompt("Several axes in this log; the card is of", type=choice, default=own))
 
 
 def _asked(of: "Proposal") -> "Proposal":

@@ -25,9 +25,7 @@ ALL_OF_PLACE = 0.97  # of a force, that place explains where it only bears a wei
 NO_FRICTION_IN_IT = 0.03  # of such a force's spread, that friction is at most
 ALL_FOLLOWED = 0.8  # of a command, that is the velocity
 KEPT_SPEED = 0.7  # of its speed at first, that a body which slows down keeps at most
-GOES_WITH_NEITHER = (
-    0.3  # correlation of a drive with velocity and acceleration, of one that does nothing
-)
+GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a drive that is idle
 ENDS = 0.1  # of the motion, over which its first and last speed are taken
 
 
@@ -94,7 +92,9 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
             " exchange): no friction takes it up, or something else moves the body, by hand or by a"
             " load; friction will hardly be told"
         )
-    elif (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED:
+        return
+    alone = rig.kind == "motor" or (rig.kind == "force" and "u" not in log)
+    if alone and (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED:
         yield (
             f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
             ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'

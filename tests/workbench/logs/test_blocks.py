@@ -50,7 +50,7 @@ def test_runs_one_below_the_other_are_refused_as_that(tmp_path: Path) -> None:
     run = ["t;y;F", *(f"{k};{0.1 * k};{k % 7}" for k in range(ROWS))]
     path = tmp_path / "runs.csv"
     path.write_text("\n".join([*run, "", *run]), "utf-8")
-    with pytest.raises(BadLog, match="2 tables one below the other.*several runs") as refused:
+    with pytest.raises(BadLog, match=r"2 tables one below the other.*several runs") as refused:
         read_table(path, FileSpec())
     assert "\n" not in str(refused.value)
 

@@ -1,4 +1,4 @@
-"""Columns on clocks of their own in one table: pairs, two instruments, and what is no such thing."""
+"""Columns on clocks of their own in one table: pairs, two instruments, and what is none."""
 
 from pathlib import Path
 
@@ -79,8 +79,8 @@ def test_clocks_without_a_time_in_common_are_said_to_be(tmp_path: Path) -> None:
 
     columns = [
         RawColumn(0, "a/t", "t", "", T, group="a"), RawColumn(1, "a/y", "y", "", Y, group="a"),
-        RawColumn(2, "a/v", "v", "", F, group="a"), RawColumn(3, "b/t", "t", "", T + 900.0, group="b"),
-        RawColumn(4, "b/F", "F", "", F, group="b"),
+        RawColumn(2, "a/v", "v", "", F, group="a"), RawColumn(4, "b/F", "F", "", F, group="b"),
+        RawColumn(3, "b/t", "t", "", T + 900.0, group="b"),
     ]  # fmt: skip
     found = {one.key: one.unusable for one in on_clock_of_most(columns, {})}
     assert "hardly a time in common" in found["b/F"]

@@ -428,7 +428,9 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
     for one in columns.signals:
         name = next((name for name, c in roles.columns.items() if c is one), None)
         if one.raw.number not in used:
-            out[one.shown] = roles.why.get(name or "", "no signal that a card needs")
+            of_another = one.axis not in ("", roles.columns["y"].axis)
+            other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
+            out[one.shown] = roles.why.get(name or "", other)
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():
         out[shown[number]] = why

@@ -11,10 +11,8 @@ FEWEST_BITS = 8  # of a magnitude beside its sign
 BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
 NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
 SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
-COUNT_PARTS, LONG_WAY_OF_COUNTS = (
-    256.0,
-    1000.0,
-)  # of a count that is halved, and counts of a position then
+COUNT_PARTS = 256.0  # of a count that is halved again and again
+LONG_WAY_OF_COUNTS = 1000.0  # that such a position covers at least
 OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 
 
