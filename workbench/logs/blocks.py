@@ -22,7 +22,7 @@ PAIR = 2  # columns of a block of one variable: its clock, and its values
 MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
 MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
 _NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
-_TEXT_LINE = re.compile(r"^[^\S\n]*[\[\"]?[^\W\d_]", re.M)
+_TEXT_LINE = re.compile(r"\n[ \t]*[\[\"]?[^\W\d_]")
 _NO_TEXT = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
 _MARKS = (";", "\t", ",", " ", "|")
 _KEY = re.compile(r"^\s*([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
@@ -119,7 +119,7 @@ def _may_have_blocks(text: str) -> bool:
     begin = re.search(r"^\s*[+-]?[\d.]+[^\n]*\n\s*[+-]?[\d.]+[^\n]*\n", text, re.M)
     if begin is None:
         return False
-    lines = islice(_TEXT_LINE.finditer(text, begin.end()), MOST_WORDS)
+    lines = islice(_TEXT_LINE.finditer(text, begin.end() - 1), MOST_WORDS)
     return any(not _NO_TEXT.match(text, one.end() - 1) for one in lines)
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 
@@ -51,22 +51,23 @@ class Pairs:
 
         Of three such the smallest is the error; what is fed forward goes less with either.
         """
+        centred = self.x - self.x.mean(axis=0)
+        gram = centred.T @ centred
+        square = np.maximum(np.diag(gram), 1e-300)
         out = set[int]()
-        square = self.x - self.x.mean(axis=0)
-        gram = square.T @ square
-        spread = np.sqrt(np.diag(gram))
-        for i, j in combinations(range(len(self.signals)), 2):
-            if self.alike[i, j] < ONE_SIGNAL:
-                continue
-            solve = gram[np.ix_((i, j), (i, j))]
-            if abs(np.linalg.det(solve)) < 1e-12 * solve[0, 0] * solve[1, 1]:
-                continue
-            factors = np.linalg.solve(solve, gram[[i, j]])
-            share = np.sum(factors * gram[[i, j]], axis=0) / np.maximum(spread, 1e-300) ** 2
-            turned = np.abs(factors[0] + factors[1]) < SAME_FACTOR * np.abs(factors[0])
-            small = spread < np.minimum(spread[i], spread[j]) * np.abs(factors[0])
-            at = np.flatnonzero((share > DIFFERENCE) & turned & small)
-            out |= {k for k in at.tolist() if k not in (i, j)}
+        for i in range(len(self.signals) - 1):
+            near = np.flatnonzero(np.abs(self.alike[i, i + 1 :]) >= ONE_SIGNAL) + i + 1
+            det = (square[i] * square[near] - gram[i, near] ** 2)[:, None]
+            det = np.where(det > 1e-12 * square[i] * square[near, None], det, np.inf)
+            first = (square[near, None] * gram[i] - gram[i, near, None] * gram[near]) / det
+            second = (square[i] * gram[near] - gram[i, near, None] * gram[i]) / det
+            share = (first * gram[i] + second * gram[near]) / square
+            turned = np.abs(first + second) < SAME_FACTOR * np.abs(first)
+            small = square < np.minimum(square[i], square[near, None]) * first**2
+            found = (share > DIFFERENCE) & turned & small
+            found[:, i] = False
+            found[np.arange(len(near)), near] = False
+            out |= set(np.flatnonzero(found.any(axis=0)).tolist())
         return out
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:

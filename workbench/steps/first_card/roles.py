@@ -117,8 +117,9 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
         return None
     pairs = Pairs(signals)
     behind = limits(pairs)
-    acting = [acts(pairs, k, behind) for k in range(len(signals))]
-    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, acting)]
+    drive = [drives(pairs, k) for k in range(len(signals))]
+    acting = [drive[k] + acts(pairs, k, behind) for k in range(len(signals))]
+    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, drive, acting)]
     if not ways:
         return None
     ways.sort(key=lambda one: -_with_reference(one))
@@ -169,8 +170,13 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
     return [(Seen(pairs, k), score) for score, k in likely]
 
 
-def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
-    """What may drive the body: a force, the difference of two pressures, or the command itself."""
+def _ways(
+    seen: Seen, own: float, drive: Sequence[float], acting: Sequence[float]
+) -> Iterator[_Way]:
+    """What may drive the body: a force, the difference of two pressures, or the command itself.
+
+    drive, acting: log-odds of each signal as either, by what it is of the others.
+    """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
     for k, law in enumerate(laws):
         one = pairs.signals[k]
@@ -180,10 +186,10 @@ def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
         if max(as_force, as_command) <= -3.0:
             continue
         physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
-        physics += own + drives(pairs, k)
+        physics += own
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
-            yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics)
+            yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
         if as_command > -3.0:
             score = as_command + physics + of_a_motor(one) + acting[k]
             yield _Way(seen, "motor", {"u": one}, law, force, score)
