@@ -1,5 +1,6 @@
 """The format of a log file, by its first bytes, else by its name."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -53,6 +54,9 @@ _SUFFIXES: Mapping[str, Format] = {
 }
 
 
+_JSON = re.compile(rb"\s*(\{\s*[\"}]|\[\s*([\[{\"\d\]-]|true|false|null))")  # "[Name]" is a text's
+
+
 def checked_format(path: Path, spec: FileSpec) -> Format:
     """The file's format, as the card says or found; raises BadLog where its bytes are not so."""
     head = head_of(path)
@@ -72,7 +76,7 @@ def find_format(path: Path, head: bytes) -> Format:
         if head.startswith(magics):
             return form
     suffix = path.suffix.lower()
-    if suffix not in _SUFFIXES and head.lstrip()[:1] in (b"{", b"["):
+    if suffix not in _SUFFIXES and _JSON.match(head):
         return "json"
     return _SUFFIXES.get(suffix, "csv")
 

@@ -23,6 +23,7 @@ MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
+ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -240,7 +241,7 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
             means.get("time", 0.0)
             - means.get("count", 0.0)
             + (4.0 if unit and unit.quantity == "time" else 0.0)
-            - (1.0 if counted else 0.0)
+            - (ROW_NUMBERS if counted else 0.0)
             - (4.0 if unit and unit.quantity not in ("time", "count") else 0.0)
         )
 

@@ -46,15 +46,16 @@ class Pairs:
         self.stems = [stem(one.header) for one in signals]
 
     @cached_property
-    def errors(self) -> set[int]:
-        """The places of signals that are the difference of two others, as a following error is.
+    def errors(self) -> dict[int, set[tuple[int, int]]]:
+        """Signals that are the difference of two others, as a following error is, by their place:
+        the places of the two, the first before the second.
 
         Of three such the smallest is the error; what is fed forward goes less with either.
         """
         centred = self.x - self.x.mean(axis=0)
         gram = centred.T @ centred
         square = np.maximum(np.diag(gram), 1e-300)
-        out = set[int]()
+        out: dict[int, set[tuple[int, int]]] = {}
         for i in range(len(self.signals) - 1):
             near = np.flatnonzero(np.abs(self.alike[i, i + 1 :]) >= ONE_SIGNAL) + i + 1
             det = (square[i] * square[near] - gram[i, near] ** 2)[:, None]
@@ -67,7 +68,8 @@ class Pairs:
             found = (share > DIFFERENCE) & turned & small
             found[:, i] = False
             found[np.arange(len(near)), near] = False
-            out |= set(np.flatnonzero(found.any(axis=0)).tolist())
+            for row, k in np.argwhere(found).tolist():
+                out.setdefault(k, set()).add((i, int(near[row])))
         return out
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:

@@ -46,6 +46,7 @@ FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is no
 COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
+MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
@@ -295,7 +296,10 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
         return head
     if role == "v":
         share = seen.v_share[k] if seen.v_constant[k] < MOST_CONSTANT else 0.0
-        return head + (2.5 if share > ALL_VELOCITY else -0.5 if share > 0.8 else -3.0)
+        if share <= ALL_VELOCITY:
+            return head + (-0.5 if share > 0.8 else -3.0)
+        nearer = np.log10((1.0 - ALL_VELOCITY) / max(1.0 - float(share), 1e-9))
+        return head + 2.5 + float(np.clip(nearer, 0.0, MOST_NEARER))
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
         most = MOST_BY_CHANGE if head >= HEADER_TELLS else MOST_UNNAMED

@@ -39,6 +39,7 @@ SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of an
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
+MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
@@ -57,9 +58,9 @@ AS_FAR = 0.25  # of its range, that a reference of few levels is off the positio
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
-    3.5,
+    4.5,
 )  # a decade by which a reference is nearer to the position
-A_DECADE_LEFT, MOST_LEFT = 1.5, 2.5  # a decade by which less than a tenth of a force is unexplained
+A_DECADE_LEFT, MOST_LEFT = 2.0, 4.0  # a decade by which less than a tenth of a force is unexplained
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -241,6 +242,9 @@ def ahead_of(seen: Seen, k: int) -> float:
     score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
     if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
         score = min(score, 0.0)
+    pair = (min(k, seen.at), max(k, seen.at))
+    if any(pair in of for of in seen.pairs.errors.values()):
+        score += MAKES_AN_ERROR
     return score + _named_for(seen, k)
 
 
