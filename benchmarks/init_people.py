@@ -68,7 +68,7 @@ KINDS: tuple[Layout, ...] = (
     Layout("struct of a trace", layouts.struct, ("y", "F", "r")),
     Layout("rollout", layouts.rollouts, ("y", "v", "F", "r")),
     Layout("bag", layouts.bag, ("y", "F", "v"), named=False),
-    Layout("blocks", layouts.blocks, ("y", "F", "r", "mode")),
+    Layout("blocks", layouts.blocks, ("y", "F", "r", "mode"), alike=LOOSE),
     Layout("current", layouts.plain, ("y", "current", "v", "supply", "i2t")),
 )  # fmt: skip
 UNITS: Mapping[str, tuple[str, ...]] = {"y": ("mm", "m"), "v": ("mm/s", "m/s"), "F": ("N",),

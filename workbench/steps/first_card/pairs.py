@@ -35,7 +35,7 @@ class Pairs:
 
     alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned;
     rate_but_constant: the same where the two may be a constant apart, as a friction force is from a
-    velocity.
+    velocity; bodies: what others do to each of those that may be the position, by its place.
     """
 
     def __init__(self, signals: Sequence[Column]) -> None:
@@ -44,6 +44,7 @@ class Pairs:
         self.alike = correlation(self.x)
         self.rate, self.rate_but_constant = _rates(self.x)
         self.stems = [stem(one.header) for one in signals]
+        self.bodies = dict[int, Seen]()
 
     @cached_property
     def errors(self) -> dict[int, set[tuple[int, int]]]:

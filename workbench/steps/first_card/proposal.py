@@ -35,6 +35,7 @@ DRIVEN_BY = {
 }
 VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
+SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
 COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
@@ -154,7 +155,8 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     _refuse_sign_bits(columns, roles)
     named = _card_name(name or path.stem)
     found = _of_roles(columns, roles, named)
-    if roles.kind == "motor" and (share := _velocity_in(roles)) > ALL_FOLLOWED:
+    named_so = roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO
+    if named_so and (share := _velocity_in(roles)) > ALL_FOLLOWED:
         return _or_velocity(found, roles, share)
     other = None if roles.other is None else _of_roles(columns, roles.other, named)
     return replace(found, other=other)

@@ -23,6 +23,7 @@ from workbench.steps.first_card.weights import (
     LEAST_SCORE,
     LOOKS_LIKE_A_FORCE,
     MIRRORED,
+    RULED_OUT,
     SURE,
     SURELY_TURNED,
     acts,
@@ -47,6 +48,7 @@ COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
+MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
@@ -168,7 +170,8 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
         reverse=True,
     )  # fmt: skip
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
-    return [(Seen(pairs, k), score) for score, k in likely]
+    pairs.bodies = {k: Seen(pairs, k) for _, k in likely}
+    return [(pairs.bodies[k], score) for score, k in likely]
 
 
 def _ways(
@@ -243,8 +246,19 @@ def _with_reference(way: _Way) -> float:
     """Log-odds of a way with the likeliest reference of its position beside it."""
     taken = [way.y, *way.columns.values()]
     gains = [_gain_of_reference(way.seen, k) for k, one in enumerate(way.seen.pairs.signals)
-             if one not in taken]  # fmt: skip
+             if one not in taken and not _moves_rather(way, k)]  # fmt: skip
     return way.score + max([0.0, *gains])
+
+
+def _moves_rather(way: _Way, k: int) -> bool:
+    """Whether what drives the body drives another column far more exactly: then that is the
+    position, and the body here a copy of it, late or by a model."""
+    other = way.seen.pairs.bodies.get(k)
+    if other is None or len(way.columns) != 1 or not other.laws:
+        return False
+    (drive,) = way.columns.values()
+    left = 1.0 - other.laws[way.seen.pairs.signals.index(drive)].share
+    return left < MORE_EXACTLY * (1.0 - way.law.share)
 
 
 def _gain_of_reference(seen: Seen, k: int) -> float:
@@ -291,7 +305,7 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
     seen, one = way.seen, way.seen.pairs.signals[k]
     head = said(one, role) + together(seen.y, one)
     if role == "r":
-        return _gain_of_reference(seen, k)
+        return RULED_OUT if _moves_rather(way, k) else _gain_of_reference(seen, k)
     if role in ("u", "v", "a") and head < -3.0:
         return head
     if role == "v":

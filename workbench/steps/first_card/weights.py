@@ -40,6 +40,8 @@ ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no f
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
 FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
 MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
+BEHIND = -6.0  # for a reference that is behind the position, as another sensor or a model is
+ROUGHER = 3.0  # times the position's noise, that a reference hardly has
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
@@ -60,7 +62,7 @@ A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
     4.5,
 )  # a decade by which a reference is nearer to the position
-A_DECADE_LEFT, MOST_LEFT = 2.0, 4.0  # a decade by which less than a tenth of a force is unexplained
+A_DECADE_LEFT, MOST_LEFT = 2.5, 5.0  # a decade by which less than a tenth of a force is unexplained
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -230,7 +232,7 @@ def ahead_of(seen: Seen, k: int) -> float:
         return -3.0
     like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
     score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
-    score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
+    score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
@@ -238,8 +240,9 @@ def ahead_of(seen: Seen, k: int) -> float:
     if one.flag and found.likeness > AS_LIKE:
         far = float(np.ptp(one.x)) / float(np.diff(np.quantile(y.x, (0.02, 0.98)))[0])
         score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
-    calm = one.noise / max(float(np.std(one.x)), 1e-300)
-    score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
+    rough = one.noise / max(float(np.std(one.x)), 1e-300)
+    rough /= max(y.noise / max(float(np.std(y.x)), 1e-300), 1e-300)
+    score += 1.0 if rough < 1.0 else -1.0 if rough < ROUGHER else -2.0
     if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
         score = min(score, 0.0)
     pair = (min(k, seen.at), max(k, seen.at))
