@@ -118,9 +118,12 @@ def refuse_long(path: Path, rows: int) -> None:
 
 
 def damaged(path: Path, form: str, error: Exception) -> BadLog:
-    """The one-line error for a file on which its reader failed."""
+    """The one-line error for a file on which its reader failed, which may have two causes."""
     text = " ".join(str(error).split())[:120] or type(error).__name__
-    return BadLog(f"{path}: damaged or cut off, not a whole {form} file ({text}); copy it again")
+    return BadLog(
+        f"{path}: cannot be read as a {form} file ({text}): it is damaged or cut off, or laid out"
+        " as is not read here; copy it again, or write its columns as CSV"
+    )
 
 
 def _places(key: str, names: Sequence[str]) -> list[int]:

@@ -162,9 +162,12 @@ def _objects(path: Path) -> str:
 def _read_json(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
     try:
-        content = json.loads(path.read_text(encoding=spec.encoding))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        text = path.read_text(encoding=spec.encoding)
+        content = json.loads(text.removeprefix("\ufeff"))
+    except UnicodeDecodeError as error:
         raise damaged(path, "json", error) from None
+    except json.JSONDecodeError as error:
+        raise _no_json(path, text, error) from None
     outer = content if isinstance(content, dict) else {}
     rows = content
     for key in spec.rows.split(".") if spec.rows else ():
@@ -181,6 +184,24 @@ def _read_json(path: Path, spec: FileSpec) -> Table:
         raise BadLog(f"{path}: holds no list of rows; name its key in the card, [file] rows")
     scalars = {k: np.asarray([v]) for k, v in outer.items() if not isinstance(v, list | dict)}
     return _records(path, rows, scalars, spec)
+
+
+def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
+    """The one-line error for a text that is no JSON: cut off, lines of JSON, or wrong somewhere."""
+    if error.msg == "Extra data" and text[: error.pos].count("\n") == 1:
+        return BadLog(
+            f"{path}: holds one JSON value a line (JSON Lines), which is not read; write the lines"
+            " as one list, [a, b, ...], or its numbers as CSV"
+        )
+    if error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated"):
+        return BadLog(
+            f"{path}: the JSON ends in the middle (line {error.lineno}), damaged or cut off; copy"
+            " it again"
+        )
+    return BadLog(
+        f"{path}: line {error.lineno}, column {error.colno} is no JSON ({error.msg}); correct it"
+        " there, or write the columns as CSV"
+    )
 
 
 def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: FileSpec) -> Table:

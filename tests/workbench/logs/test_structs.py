@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 import scipy.io
 
+from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.logs.structs import vectors_of
+from workbench.logs.table import damaged
 from workbench.logs.tables import read_table
 from workbench.logs.unknown import read_unknown
 
@@ -71,3 +73,30 @@ def test_two_vectors_of_one_name_keep_apart() -> None:
     found = vectors_of({"x": [{"name": "a", "v": Q}, {"name": "a", "v": T}]})
     assert [one[10] for one in found.values()] == [3.0, 0.1]
     assert len(found) == 2
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('{"t": [0, 1, 2', "ends in the middle.*copy it again"),
+        ('{"t": 0}\n{"t": 1}\n{"t": 2}\n', "one JSON value a line"),
+        ('{"t": [0, 1, x]}', "line 1, column 14 is no JSON"),
+    ],
+)
+def test_what_is_wrong_with_a_json_is_said(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.json"
+    path.write_text(text, "utf-8")
+    with pytest.raises(BadLog, match=said) as refused:
+        read_table(path, FileSpec())
+    assert "\n" not in str(refused.value)
+
+
+def test_text_in_brackets_is_no_json(tmp_path: Path) -> None:
+    rows = [f"{k}\t{k % 7}" for k in range(N)]
+    (tmp_path / "a.txt").write_text("\n".join(["[Recording]", "t\tq", *rows]), "utf-8")
+    assert [one.header for one in read_unknown(tmp_path / "a.txt").columns] == ["t", "q"]
+
+
+def test_a_whole_file_of_another_layout_is_not_called_damaged_alone() -> None:
+    said = str(damaged(Path("a.mat"), "mat", ValueError("odd")))
+    assert "damaged or cut off, or laid out as is not read here" in said

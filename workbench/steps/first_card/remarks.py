@@ -58,9 +58,9 @@ def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
             f"{len(columns.axes)} axes in this log: {', '.join(columns.axes)}; {said}, another is"
             " had by --axis NAME"
         )
-    headers = [one.raw.header for one in columns.read if one.raw.header]
-    for name in (name for name, many in Counter(headers).items() if many > 1):
-        places = [str(one.raw.number) for one in columns.read if one.raw.header == name]
+    raw = [one.raw for one in columns.read if one.raw.header and isinstance(one.raw.key, int)]
+    for name in (name for name, many in Counter(one.header for one in raw).items() if many > 1):
+        places = [str(one.number) for one in raw if one.header == name]
         yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: told by number"
 
 
