@@ -93,8 +93,10 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
             " load; friction will hardly be told"
         )
         return
-    alone = rig.kind == "motor" or (rig.kind == "force" and "u" not in log)
-    if alone and (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED:
+    if (
+        rig.kind == "motor"
+        and (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED
+    ):
         yield (
             f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
             ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'

@@ -24,8 +24,8 @@ def columns(path: Path, content: object) -> dict[str, float]:
     path.write_text(json.dumps(content), "utf-8")
     found = read_unknown(path)
     table = read_table(path, found.spec)
-    assert {one.header for one in found.columns} <= set(table.names)
-    return {one.header: one.values[10] for one in found.columns if not one.unusable}
+    assert {one.key for one in found.columns} <= set(table.names)
+    return {str(one.key): one.values[10] for one in found.columns if not one.unusable}
 
 
 def test_lists_in_tables_go_by_their_path(tmp_path: Path) -> None:

@@ -48,6 +48,7 @@ COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
+EXACTLY = 0.01  # of a drive, left by its law along what it surely moves
 MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
@@ -120,8 +121,8 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
         return None
     pairs = Pairs(signals)
     behind = limits(pairs)
-    drive = [drives(pairs, k) for k in range(len(signals))]
-    acting = [drive[k] + acts(pairs, k, behind) for k in range(len(signals))]
+    drive = [drives(pairs, k, behind) for k in range(len(signals))]
+    acting = [drives(pairs, k, {}) + acts(pairs, k, behind) for k in range(len(signals))]
     ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, drive, acting)]
     if not ways:
         return None
@@ -182,6 +183,9 @@ def _ways(
     drive, acting: log-odds of each signal as either, by what it is of the others.
     """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
+    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_TELLS]
+    # what the velocity follows may well drive a valve, where nothing else is said to drive
+    alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
     for k, law in enumerate(laws):
         one = pairs.signals[k]
         if one is y:
@@ -189,8 +193,8 @@ def _ways(
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
             continue
-        physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
-        physics += own
+        v_share = 0.0 if one is alone else float(seen.v_share[k])
+        physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
             yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
@@ -258,7 +262,7 @@ def _moves_rather(way: _Way, k: int) -> bool:
         return False
     (drive,) = way.columns.values()
     left = 1.0 - other.laws[way.seen.pairs.signals.index(drive)].share
-    return left < MORE_EXACTLY * (1.0 - way.law.share)
+    return left < min(EXACTLY, MORE_EXACTLY * (1.0 - way.law.share))
 
 
 def _gain_of_reference(seen: Seen, k: int) -> float:

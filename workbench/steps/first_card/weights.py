@@ -166,13 +166,15 @@ def limits(pairs: Pairs) -> dict[int, int]:
     return pairs.behind(sorted(k for _, k in likely))
 
 
-def drives(pairs: Pairs, k: int) -> float:
-    """Log-odds of what drives a body by what it is of other signals: no error, no velocity."""
+def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
+    """Log-odds of what drives a body by what it is of other signals: no error, no velocity, and
+    not what stands before a limiter (behind: the place of what comes out, for each)."""
     head = pairs.signals[k].header
     named = max(head.means.get("force", 0.0), head.means.get("command", 0.0))
     error = AN_ERROR if k in pairs.errors else 0.0
     bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
     rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
+    error += BEFORE_LIMIT if k in behind and named < BY_UNIT / 2 else 0.0
     return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY and named < BY_UNIT / 2 else 0.0)
 
 
