@@ -126,9 +126,8 @@ def _cases(
         return (Case(path, said, truth | both, ("electro-pneumatic",), rotary, frozenset(),
                      kind.alike),)  # fmt: skip
     drive = next(key for key in ("F", "u", "current") if key in kind.holds)
-    names = {"F": ("F",), "u": ("u",), "current": ("u",)}[drive]
-    if not known and not shown:
-        names = ("F", "u")
+    own = "F" if drive == "F" else "u"
+    names = (own,) if known or shown else ("F", "u")
     loose = frozenset(() if shown else ("F", "u"))
     return tuple(
         Case(path, said, truth | {name: signals[drive]},

@@ -43,7 +43,7 @@ def entry(tree: Any, key: str) -> Any:
     raise LookupError(key)
 
 
-def records_of(rows: Sequence[Mapping[str, Any]]) -> dict[str, RawColumn]:
+def records_of(rows: Sequence[Any]) -> dict[str, RawColumn]:
     """A column for each number in tables of one kind, a row each, by its path in them."""
     return dict(_records("", rows))
 
@@ -84,7 +84,7 @@ def _entries(
             yield (name if len(long) == 1 else f"{name}.{key}"), x
 
 
-def _records(path: str, rows: Sequence[Mapping[str, Any]]) -> Iterator[tuple[str, RawColumn]]:
+def _records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
     """A column for each number in the tables of a list, one row each."""
     flat = [dict(_numbers("", row, 0)) if isinstance(row, Mapping) else {} for row in rows]
     for key in flat[0]:

@@ -1,7 +1,7 @@
 """A card as the fields of a form: filled from `init`'s proposal, corrected, and written as TOML."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -169,6 +169,7 @@ def _others(of: "Proposal") -> dict[str, tuple[str, Mapping[str, str]]]:
     from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
 
     before, out = _fields(of), dict[str, tuple[str, Mapping[str, str]]]()
+    guesses: list[tuple[str, str, Callable[[Proposal, str, str], Proposal], str]]
     guesses = [(_field(one.key), one.rival, with_rig, one.key) for one in of.rig if not one.sure]
     guesses += [(f"column_{one.name}", one.rival, with_signal, one.name)
                 for one in of.signals if not one.sure]  # fmt: skip
