@@ -91,6 +91,7 @@ _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]\s*(.*)$")
+_INDEX = re.compile(r"\w\[\d+\]$")
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
@@ -242,6 +243,8 @@ def written_unit(text: str) -> WrittenUnit | None:
 
 def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     """Name, unit, and whether the unit is doubtful."""
+    if _INDEX.search(text):  # "position[1]" of an array
+        return text, None, False
     if inside := _BRACKETS.match(text):
         if found := written_unit(inside[2]):
             return (f"{inside[1]} {inside[3]}".strip() or text), found, False
