@@ -33,6 +33,7 @@ BY_UNIT, AGAINST_UNIT = 4.0, -6.0
 LEAST_SCORE = 0.0  # of a role beside none at all
 AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are tried
 USUAL_FRICTION = 0.02  # share of a force that the step at the reversal alone explains
+A_DECADE_OF_FRICTION, LEAST_OF_FRICTION = 1.1, -0.75  # for a force by that share, in all
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
 SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
@@ -207,7 +208,8 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
-    score += float(np.clip(0.75 * np.log10(max(law.friction, 1e-9) / USUAL_FRICTION), -0.75, 0.75))
+    decades = float(np.log10(max(law.friction, 1e-9) / USUAL_FRICTION))
+    score += float(np.clip(A_DECADE_OF_FRICTION * decades, LEAST_OF_FRICTION, A_DECADE_OF_FRICTION))
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
     if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
