@@ -18,6 +18,7 @@ ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
 NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
 COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
+SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
 SENSOR_OUTPUTS = ("command", "count")
 
 
@@ -105,9 +106,11 @@ def _sensible(number: float, of_turn: bool = False) -> float:
 
 
 def counts_samples(clock: Column) -> bool:
-    """Whether the clock is the number of a sample."""
+    """Whether the clock is the number of a sample: by its name, or by its name and step."""
     means = clock.header.means
-    return clock.whole and means.get("count", 0.0) > means.get("time", 0.0)
+    called = means.get("count", 0.0) - means.get("time", 0.0)
+    by_ones = float(np.median(np.diff(clock.values))) == 1.0
+    return clock.whole and (called >= SURELY_A_NUMBER or (called > 0.0 and by_ones))
 
 
 def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:
