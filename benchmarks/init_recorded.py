@@ -116,7 +116,8 @@ def wrong_lines(found: Proposal, right: Right) -> dict[str, str]:
             wrong[name] = f"{shown} for {column!r}"
         elif unit and not any(one is not None and one.unit == unit for one in ones):
             wrong[name] = f"in {ones[0].unit if ones[0] else ''} for {unit}"
-    return wrong
+    turned = [one.name for one in found.signals if str(one.gain).startswith("-")]
+    return wrong | dict.fromkeys(turned, "turned, and no recorded signal is")
 
 
 def with_the_other(found: Proposal, right: Right) -> bool:

@@ -107,6 +107,19 @@ def test_the_pages_form_takes_the_other_of_a_guess(joint: dict[str, Array], tmp_
     assert turned["motion"] != form["motion"] and turned["unit_y"] != form["unit_y"]
 
 
+def test_a_sign_is_turned_only_where_the_force_tells_it(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    headers = "time [s],angle [rad],torque [Nm]"
+    found = propose(tmp_path, headers, T, joint["y"], -joint["F"])
+    assert found.signal("F").gain == -1.0  # type: ignore[union-attr]
+    swing = 0.9 * np.sin(1.9 * T) + 0.5 * np.sin(4.8 * T + 1.0)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((2, len(T)))
+    weight = -2.5 * np.sin(swing + noise[0]) + 100.0 * noise[1]
+    found = propose(tmp_path, headers, T, swing + noise[0], weight)
+    assert found.signal("F").gain is None  # type: ignore[union-attr]
+
+
 def test_a_clock_of_ticks_counts_from_its_epoch(joint: dict[str, Array], tmp_path: Path) -> None:
     ticks = 133_500_000_000_000_000 + np.round(1e7 * T)
     rows = [

@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from identification.errors import UserError
-from identification.remarks import Aside
+from identification.signals.renewal import RENEWED_AT
 from workbench.cards.card import card_from
 from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal
@@ -25,5 +25,5 @@ def looked_over(of: Proposal) -> Proposal:
     except UserError as error:
         return replace(of, refused=str(error))
     before = f"{of.path.name}: "
-    held = [str(one).removeprefix(before) for one in found.remarks if not isinstance(one, Aside)]
+    held = [one.removeprefix(before) for one in found.remarks if RENEWED_AT in one]
     return replace(of, hardly=tuple(dict.fromkeys([*lines, *held])))

@@ -14,7 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from identification.arrays import Array
 from identification.log import RigKind
-from identification.signals.relations import ForceLaw, actuator_share, force_law
+from identification.signals.relations import TELLS_SIGN, ForceLaw, actuator_share, force_law
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
 from workbench.steps.first_card.weights import (
@@ -44,6 +44,9 @@ from workbench.steps.first_card.weights import (
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
+FRICTION_TELLS_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
+MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
+WORK_TELLS_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
 COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
@@ -327,13 +330,22 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
     return head + 1.0 if role == "F" else head - 1.0
 
 
+def _tells_sign(law: ForceLaw) -> bool:
+    """Whether a law tells the sign of a force or command: by its work, or by friction in it."""
+    if abs(law.work) > TELLS_SIGN:
+        return law.share > COMMAND_TELLS_SIGN or abs(law.work) > WORK_TELLS_SIGN
+    onwards = law.friction is None  # one way: along it
+    in_it = law.friction is not None and law.friction > FRICTION_TELLS_SIGN
+    return (onwards or in_it) and law.share > MOSTLY_ITS_LAW
+
+
 def _signs(best: _Choice) -> dict[str, Sign]:
     """1 or -1 by signal: with which a force drives the body, and a command the force."""
     way, seen = best.way, best.way.seen
     out = dict.fromkeys(best.columns, 1.0)
     if way.kind != "electro-pneumatic":
         (name,) = way.columns
-        out[name] = way.law.way if way.law.share > COMMAND_TELLS_SIGN or name == "F" else 1.0
+        out[name] = way.law.way if _tells_sign(way.law) else 1.0
     if "u" in best.others:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]
