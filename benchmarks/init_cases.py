@@ -50,7 +50,8 @@ STYLES = ("{0} [{1}]", "{0} ({1})", "{0}/{1}", "{0}_{1}", "{0} in {1}", "{0}[{1}
 @dataclass(frozen=True)
 class Case:
     """A file and what it truly holds: signals in SI (n,) as they were before names, units and
-    signs were changed, kinds of rig that are right, and signals known up to a factor only."""
+    signs were changed, kinds of rig that are right, signals known up to a factor only, and the
+    correlation from which one is the true one."""
 
     path: Path
     said: str
@@ -58,6 +59,7 @@ class Case:
     kinds: tuple[str, ...]
     rotary: bool
     up_to_factor: frozenset[str]
+    alike: float = 0.9995
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,7 @@ from workbench.logs.runs import read_log
 from workbench.steps.first_card.proposal import Proposal
 from workbench.steps.first_card.written import written
 
-SLOPE, LIKE = 5e-3, 0.9995  # of one, that slope and correlation may be off
+SLOPE = 5e-3  # of one, that half the slope may be off
 
 
 def wrong_lines(found: Proposal, case: Case) -> dict[str, str]:
@@ -73,7 +73,7 @@ def _differs(log: Log, x: Array, case: Case, name: str) -> str:
     if np.std(at) == 0.0 or np.std(x) == 0.0:
         return "is constant"
     like = float(np.corrcoef(at, x)[0, 1])
-    if like < LIKE:
+    if like < case.alike:
         return f"{like:.2f} alike"
     ratio = float(np.std(x) / np.std(at))
     free = name in case.up_to_factor or (name == "u" and case.rotary)

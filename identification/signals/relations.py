@@ -203,9 +203,13 @@ def _explained(X: Array, b: Array) -> tuple[Any, Array]:
     """Share of the variance of b (r,) or (r, j) that the columns (r, k) explain, and how."""
     size = np.sqrt(np.mean(X**2, axis=0))
     size[size == 0.0] = 1.0
+    middle = b.mean(axis=0)
     theta = ((np.linalg.pinv(X / size, rcond=1e-10) @ b).T / size).T
-    spread = np.var(b, axis=0)
-    left = np.var(b - X @ theta, axis=0)
+    spread = np.mean((b - middle) ** 2, axis=0)
+    # what is left of each, without making it: of many signals the longest part
+    off = middle - X.mean(axis=0) @ theta
+    square = np.mean(b**2, axis=0) - np.sum(theta * (X.T @ b), axis=0) / len(b)
+    left = np.maximum(square - off**2, 0.0)
     share = np.maximum(0.0, 1.0 - left / np.where(spread > 0.0, spread, 1.0))
     return np.where(spread > 0.0, share, 0.0), theta
 

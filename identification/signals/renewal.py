@@ -17,6 +17,7 @@ IN_STEP = 0.85  # of the times between new values, that are the usual one (or ne
 FEWEST_NEW = 40  # new values, which tell the step
 MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
+RENEWED_AT = "the position is renewed at"
 COMMAND_COLUMN = "u"
 
 
@@ -43,7 +44,7 @@ def renewed(log: Log) -> Renewed:
     }
     rate = 1.0 / (step * log.h)
     said = (
-        f"{log.name}: the position is renewed at {rate:.3g} Hz and held in between, the log is"
+        f"{log.name}: {RENEWED_AT} {rate:.3g} Hz and held in between, the log is"
         f" written at {1.0 / log.h:.3g} Hz: only new positions were used"
     )
     return Renewed(Log(log.name, signals), (said,))

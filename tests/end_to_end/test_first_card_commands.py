@@ -165,7 +165,7 @@ def test_a_terminal_is_asked_about_each_guess(shop: Path) -> None:
     status, shown = on_a_terminal("n\n", "init", "run.csv")
     assert status == 2
     assert (shop / "card.toml").read_text("utf-8") == "mine"
-    status, shown = on_a_terminal("y\n\n\n\nfurlong\nkN\n\n\n\n\n", "init", "run.csv")
+    status, shown = on_a_terminal("y\n\n\n\n\nfurlong\nkN\n\n\n\n\n", "init", "run.csv")
     assert status == 0, shown
     assert "neither a column nor a unit" in shown
     card = tomllib.loads((shop / "card.toml").read_text("utf-8"))

@@ -333,7 +333,7 @@ def test_a_card_for_a_log_of_a_hundred_columns(
     assert "written: card.toml" in held_by_command("init", "run.csv")
     found = proposed(Path("run.csv"), None)
     unused = {f"channel {n}": "no signal that a card needs" for n in range(100)}
-    text = one_screen(proposal_view(replace(found, unused=unused), OUT / "card.toml", WHY))
+    text = one_screen(proposal_view(replace(found, unused=unused, refused=WHY), OUT / "card.toml"))
     assert "... and 95 more: --verbose" in text and text.splitlines()[-1].endswith("card.toml")
 
 

@@ -22,6 +22,7 @@ from workbench.cards.units import LONGEST_UNIT, Scale, force_unit
 
 Format = Literal[
     "csv", "parquet", "mat", "hdf5", "json", "tdms", "mdf", "mcap", "ulog", "excel", "npy",
+    "rosbag",
 ]  # fmt: skip
 
 

@@ -91,6 +91,7 @@ _NEWTON_METRE, _NANOMETRE = _UNITS["nm"], WrittenUnit("nm", "position")
 # One letter behind "_" or a space is as often part of a name (y_m: measured, p_a: chamber A).
 _SURE_SUFFIX = 2
 _BRACKETS = re.compile(r"^(.*?)\s*[\[({<]\s*([^\[\](){}<>]*(?:\(g\))?)\s*[\])}>]\s*(.*)$")
+_INDEX = re.compile(r"\w\[\d+\]$")
 _SLASH = re.compile(r"^([^/]+?)\s*/\s*(.+)$")
 _IN = re.compile(r"^(.+)\s+in\s+(\S+)$")
 _SUFFIX = re.compile(r"^(.+)(?:\s*[,;:]\s*|[\s_\-.]+)(\S+)$")
@@ -216,7 +217,7 @@ def read_header(text: str, unit_below: str = "") -> Header:
     whole = " ".join(words)
     purpose = _purpose(words, whole, means)
     lengths = unit is not None and unit.quantity == "position"
-    if lengths and "command" in words and not purpose:
+    if lengths and any(one.startswith("command") for one in words) and not purpose:
         means, purpose = {"position": 1.5}, "reference"
     if purpose == "reference" and "command" in means and "position" not in means:
         purpose = "demand"  # a voltage or current that is asked for is the command
@@ -242,6 +243,8 @@ def written_unit(text: str) -> WrittenUnit | None:
 
 def _without_unit(text: str) -> tuple[str, WrittenUnit | None, bool]:
     """Name, unit, and whether the unit is doubtful."""
+    if _INDEX.search(text):  # "position[1]" of an array
+        return text, None, False
     if inside := _BRACKETS.match(text):
         if found := written_unit(inside[2]):
             return (f"{inside[1]} {inside[3]}".strip() or text), found, False
@@ -320,7 +323,7 @@ def _purpose(words: list[str], whole: str, means: Mapping[Quantity, float]) -> P
         return "model"
     if any(one in whole for one in _REFERENCE) or any(one in _REFERENCE_SHORT for one in words):
         return "reference"
-    if "command" in words and "position" in means:
+    if any(one.startswith("command") for one in words) and "position" in means:
         return "reference"
     if any(one in whole for one in _MEASURED) or any(one in _MEASURED_SHORT for one in words):
         return "measured"

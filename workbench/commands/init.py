@@ -40,25 +40,28 @@ def command(
     It looks at the headers, and at how the columns hang together: a force accelerates the body and
     is eaten up by friction, a reference is ahead of the position, a speed is its derivative, what
     comes out of a limiter acts. On a terminal it asks about each guess; else the card is written
-    with a remark on each line, "sure" or "guess", why, and what it would be otherwise. Of several
-    axes --axis names the one. A card that is there is replaced only with --force or your yes.
+    with a remark on each line, "sure" or "guess", why, and what it would be otherwise; and with
+    what the log will hardly tell. Of several axes --axis names the one. A card that is there is
+    replaced only with --force or your yes.
     """
     from workbench.report.first_card import proposal_view
+    from workbench.steps.first_card.looked_over import looked_over
     from workbench.steps.first_card.proposal import proposed
-    from workbench.steps.first_card.written import refusal, written
+    from workbench.steps.first_card.written import written
 
     card = _place(out)
     asking = not (yes or as_json) and sys.stdin.isatty() and sys.stdout.isatty()
     _refuse_existing(card, force, asking)
     with progress("looking", as_json=as_json):
         found = proposed(log, name, axis)
+    if asking and axis is None and len(found.axes) > 1:
+        found = proposed(log, name, _asked_axis(found))
     if asking:
         found = _asked(found)
-    text = written(found, asked=asking)
-    write_whole(card, text, "--out")
-    refused = refusal(log, card)
-    result = {**found.as_json(), "refused": refused or None, "out": card}
-    emit(result, as_json, lambda: proposal_view(found, card, refused))
+    with progress("reading", as_json=as_json):
+        found = looked_over(found)
+    write_whole(card, written(found, asked=asking), "--out")
+    emit({**found.as_json(), "out": card}, as_json, lambda: proposal_view(found, card))
 
 
 def _place(out: Path | None) -> Path:
@@ -77,6 +80,13 @@ def _refuse_existing(card: Path, force: bool, asking: bool) -> None:
     )
 
 
+def _asked_axis(of: "Proposal") -> str:
+    """Which of several axes the card is to be of."""
+    choice = click.Choice(of.axes, case_sensitive=False)
+    own = of.axis or of.axes[0]
+    return str(click.prompt("Several axes in this log; the card is of", type=choice, default=own))
+
+
 def _asked(of: "Proposal") -> "Proposal":
     """The proposal after questions on its guesses; Enter takes one as it is."""
     click.echo(
@@ -84,12 +94,13 @@ def _asked(of: "Proposal") -> "Proposal":
     )
     click.echo("For each guess: Enter if it is right, '+' for the other, else a column, a unit, or"
                " both ('x3 mm'); '-' leaves it out.")  # fmt: skip
+    for key in ("kind", "motion"):  # the columns hang on the one, the units on the other
+        if any(guess.key == key and not guess.sure for guess in of.rig):
+            of = _asked_rig(of, key)
     keys = [guess.key for guess in of.rig if not guess.sure]
-    for key in (key for key in keys if key == "motion"):  # the units hang on it
-        of = _asked_rig(of, key)
     for name in [one.name for one in of.signals if not one.sure]:
         of = _asked_signal(of, name)
-    for key in (key for key in keys if key != "motion"):
+    for key in (key for key in keys if key not in ("kind", "motion")):
         of = _asked_rig(of, key)
     return of
 

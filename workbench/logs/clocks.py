@@ -11,6 +11,7 @@ from identification.remarks import Aside
 from identification.signals.clean import LONGEST_GAP, at_times
 
 _SENSED = ("y", "F", "p_p", "p_n")
+FEW_ROWS = 3  # at the end, by which columns of one clock may differ
 _SLOWEST = 1.5  # times the clock's period that a measured signal's may be
 
 Clock = Callable[[str], Array]
@@ -43,6 +44,11 @@ def on_one_clock(
     for group in members:
         times = clock(group)
         if _same(times, base):
+            continue
+        if _same_but_for_ends(times, base):
+            for name in members[group]:
+                every[name] = _as_long(signals[name], len(base))
+            kept[len(times) :] = False
             continue
         known = np.isfinite(times)
         _check(f"{where}, the clock of group {group!r}", times[known])
@@ -81,6 +87,21 @@ def _members(signals: Mapping[str, Array], groups: Mapping[str, str]) -> dict[st
 
 def _same(times: Array, base: Array) -> bool:
     return times.shape == base.shape and bool(np.array_equal(times, base, equal_nan=True))
+
+
+def _same_but_for_ends(times: Array, base: Array) -> bool:
+    """Whether one clock is the other's beginning, a few rows at the end apart."""
+    both = min(len(times), len(base))
+    rows = abs(len(times) - len(base))
+    return 0 < rows <= FEW_ROWS and bool(np.array_equal(times[:both], base[:both]))
+
+
+def _as_long(values: Array, length: int) -> Array:
+    """Values cut, or with missing ones at the end, so that there are as many."""
+    out = np.full(length, np.nan)
+    both = min(len(values), length)
+    out[:both] = values[:both]
+    return out
 
 
 def _period(times: Array) -> float:

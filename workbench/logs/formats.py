@@ -1,5 +1,6 @@
 """The format of a log file, by its first bytes, else by its name."""
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -29,6 +30,7 @@ _MAGIC: Mapping[Format, tuple[bytes, ...]] = {  # how files begin
     "mcap": (b"\x89MCAP0\r\n",),
     "ulog": (b"ULog\x01\x12\x35",),
     "npy": (b"\x93NUMPY",),
+    "rosbag": (b"#ROSBAG V2.0",),
 }
 _SUFFIXES: Mapping[str, Format] = {
     ".parquet": "parquet",
@@ -48,7 +50,11 @@ _SUFFIXES: Mapping[str, Format] = {
     ".ods": "excel",
     ".npy": "npy",
     ".npz": "npy",
+    ".bag": "rosbag",
 }
+
+
+_JSON = re.compile(rb"\s*(\{\s*[\"}]|\[\s*([\[{\"\d\]-]|true|false|null))")  # "[Name]" is a text's
 
 
 def checked_format(path: Path, spec: FileSpec) -> Format:
@@ -70,7 +76,7 @@ def find_format(path: Path, head: bytes) -> Format:
         if head.startswith(magics):
             return form
     suffix = path.suffix.lower()
-    if suffix not in _SUFFIXES and head.lstrip()[:1] in (b"{", b"["):
+    if suffix not in _SUFFIXES and _JSON.match(head):
         return "json"
     return _SUFFIXES.get(suffix, "csv")
 

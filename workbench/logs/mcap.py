@@ -5,57 +5,36 @@ Python's own. For ROS 1 see workbench/logs/ros1.py.
 """
 
 import json
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
-from functools import partial
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
-from workbench.logs.channels import Channel, channel_table, optional
+from workbench.logs.channels import optional
+from workbench.logs.messages import Container, Decoder, Message, message_table
 from workbench.logs.ros1 import ros1_decoder
-from workbench.logs.table import BINARY_BYTES, RawColumn, Table, refuse_long
-
-Decoder = Callable[[bytes], Any]
+from workbench.logs.table import BINARY_BYTES, Table
 
 _CHUNK_BYTES = 200_000_000  # of a chunk unpacked; writers make them of a megabyte or a few
-_ELEMENTS = 64  # of an array of numbers that become columns; above, it is an image or a scan
-_DEPTH = 16  # of messages within messages
-_STAMPS = ({"sec", "nanosec"}, {"secs", "nsecs"}, {"seconds", "nanos"})
-_EPOCH = 100_000_000  # s; above, a stamp is a date and no duration
 _CLOCKS = ("log_time", "publish_time")
 
 
 @dataclass(frozen=True)
-class _Container:
-    """An open kind of file: the libraries, its path, and the time of its first message [ns]."""
+class _Libraries:
+    """The file's path, the library of the container, and those of its encodings."""
 
     path: Path
     library: Any
     decoders: tuple[Any, ...]
-    begun: int = 0
-
-
-@dataclass
-class _Topic:
-    """A topic as found: the names of its columns, by its first message, and how many it has."""
-
-    decode: Decoder
-    names: tuple[str, ...]
-    count: int = 0
-    columns: dict[str, RawColumn] = field(default_factory=dict)
 
 
 def read_mcap(path: Path, spec: FileSpec) -> Table:
-    """The messages of the file by topic, a group each.
+    """The messages of the file by topic, a group each, as `message_table` says.
 
-    Columns are the numbers of a message by their path in it ("pose.position.x", "position[0]"), and
-    "log_time" and "publish_time". Times, also stamps in messages, are in seconds since the first
-    message of the file. Raises BadLog where no topic has an encoding that is read.
+    Raises BadLog where no topic has an encoding that is read.
     """
     refuse_larger(path, BINARY_BYTES, "an MCAP file", BadLog)
     library = optional("mcap.stream_reader", "mcap", path)
@@ -63,44 +42,28 @@ def read_mcap(path: Path, spec: FileSpec) -> Table:
         optional(name, "mcap", path).DecoderFactory()
         for name in ("mcap_ros2.decoder", "mcap_protobuf.decoder")
     )
-    topics, others, begun = _topics(_Container(path, library, decoders), spec.rows)
-    file = _Container(path, library, decoders, begun)
-    if not topics and others:
+    file = _Libraries(path, library, decoders)
+    found = message_table(Container(path, _CLOCKS, lambda: _decoded(file)), spec)
+    if found is None:
+        encodings = {str(channel.message_encoding) for _, channel, _ in _messages(file)}
         raise BadLog(
-            f"{path}: has no topic whose encoding is read (there is: {', '.join(sorted(others))});"
-            " cdr (ROS 2), ros1, protobuf and json are"
+            f"{path}: has no topic whose encoding is read (there is:"
+            f" {', '.join(sorted(encodings))}); cdr (ROS 2), ros1, protobuf and json are"
         )
-    channels = [
-        Channel(name, column, partial(_column, file, name, topic, column))
-        for name, topic in topics.items()
-        for column in (*_CLOCKS, *topic.names)
-    ]
-    return channel_table(path, channels, spec)
+    return found
 
 
-def _topics(file: _Container, only: str | None) -> tuple[dict[str, _Topic], set[str], int]:
-    """Topics whose messages hold numbers, encodings that are not read, the first message's time."""
-    topics = dict[str, _Topic]()
-    silent, others = set[str](), set[str]()
-    begun: int | None = None
+def _decoded(file: _Libraries) -> Iterator[Message]:
+    """The messages, each with what reads those of its channel."""
+    known = dict[int, Decoder | None]()
     for schema, channel, message in _messages(file):
-        begun = message.log_time if begun is None else min(begun, message.log_time)
-        name = str(channel.topic)
-        if name in silent or (only is not None and name != only):
-            continue
-        if name not in topics:
-            decode = _decoder(file, channel, schema)
-            if decode is None:
-                others.add(str(channel.message_encoding))
-                silent.add(name)
-                continue
-            topics[name] = _Topic(decode, tuple(dict(_numbers(decode(message.data), 0))))
-        topics[name].count += 1
-        refuse_long(file.path, topics[name].count)
-    return topics, others, begun or 0
+        if channel.id not in known:
+            known[channel.id] = _decoder(file, channel, schema)
+        times = (int(message.log_time), int(message.publish_time))
+        yield Message(str(channel.topic), times, message.data, known[channel.id])
 
 
-def _decoder(file: _Container, channel: Any, schema: Any) -> Decoder | None:
+def _decoder(file: _Libraries, channel: Any, schema: Any) -> Decoder | None:
     if channel.message_encoding == "json":
         return json.loads
     if channel.message_encoding == "ros1" and schema is not None:
@@ -109,25 +72,7 @@ def _decoder(file: _Container, channel: Any, schema: Any) -> Decoder | None:
     return next((decode for decode in found if decode is not None), None)
 
 
-def _column(file: _Container, name: str, topic: _Topic, column: str) -> RawColumn:
-    if not topic.columns:
-        topic.columns.update(_columns(file, name, topic))
-    return topic.columns[column]
-
-
-def _columns(file: _Container, name: str, topic: _Topic) -> dict[str, RawColumn]:
-    out = {key: np.full(topic.count, np.nan) for key in (*_CLOCKS, *topic.names)}
-    own = (message for _, channel, message in _messages(file) if channel.topic == name)
-    for row, message in enumerate(sorted(own, key=lambda message: int(message.log_time))):
-        out["log_time"][row] = (message.log_time - file.begun) * 1e-9
-        out["publish_time"][row] = (message.publish_time - file.begun) * 1e-9
-        for key, value in _numbers(topic.decode(message.data), file.begun):
-            if key in out:
-                out[key][row] = value
-    return out
-
-
-def _messages(file: _Container) -> Iterator[tuple[Any, Any, Any]]:
+def _messages(file: _Libraries) -> Iterator[tuple[Any, Any, Any]]:
     """Schema (or None), channel and message of every message, as they stand in the file."""
     schemas: dict[int, Any] = {0: None}
     channels: dict[int, Any] = {}
@@ -146,7 +91,7 @@ def _messages(file: _Container) -> Iterator[tuple[Any, Any, Any]]:
                     yield schemas[channel.schema_id], channel, record
 
 
-def _records(file: _Container, reader: Any) -> Iterator[Any]:
+def _records(file: _Libraries, reader: Any) -> Iterator[Any]:
     unpacked = 0
     for record in reader.records:
         if type(record).__name__ != "Chunk":
@@ -180,60 +125,3 @@ def _unpacked(path: Path, chunk: Any) -> bytes:
     if len(data) > most:
         raise BadLog(f"{path}: a chunk of it unpacks to more than {most / 1e6:g} MB; write it anew")
     return data
-
-
-def _numbers(message: Any, begun: int) -> Iterator[tuple[str, float]]:
-    """The numbers of a message by their path in it."""
-    for path, value in _leaves("", message, 0):
-        if isinstance(value, tuple):
-            whole, nano = value
-            yield (
-                path,
-                (whole - (begun // 10**9 if whole > _EPOCH else 0))
-                + 1e-9 * (nano - (begun % 10**9 if whole > _EPOCH else 0)),
-            )
-        else:
-            yield path, float(value)
-
-
-def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
-    """Numbers below `value` by path; a stamp is the pair of its seconds and nanoseconds."""
-    if depth > _DEPTH:
-        return
-    if isinstance(value, bool | int | float):
-        yield path, value
-        return
-    parts = _parts(value)
-    if parts is None:
-        return
-    if isinstance(parts, list):
-        for k, part in enumerate(parts if len(parts) <= _ELEMENTS else ()):
-            yield from _leaves(f"{path}[{k}]", part, depth + 1)
-    elif set(parts) in _STAMPS and path:
-        whole, nano = parts.values()
-        yield path, (int(whole), int(nano))
-    else:
-        for key, part in parts.items():
-            yield from _leaves(f"{path}.{key}" if path else str(key), part, depth + 1)
-
-
-def _parts(value: Any) -> Mapping[str, Any] | list[Any] | None:
-    """What a message or an array is made of; None of what holds no numbers."""
-    if isinstance(value, str | bytes | bytearray | memoryview):
-        return None
-    if isinstance(value, Mapping):
-        return value
-    if hasattr(value, "DESCRIPTOR"):  # of protobuf
-        parts = value.DESCRIPTOR.fields
-        return {part.name: getattr(value, part.name) for part in parts if _is_set(value, part)}
-    if hasattr(value, "__slots__") and hasattr(type(value), "_full_text"):  # of ROS 2
-        return {key: getattr(value, key) for key in type(value).__slots__}
-    if hasattr(value, "__len__") and hasattr(value, "__getitem__"):
-        return list(value) if len(value) <= _ELEMENTS else []
-    return None
-
-
-def _is_set(message: Any, part: Any) -> bool:
-    """Whether a field is there; a number that is 0 is, though protobuf leaves it out."""
-    single = part.message_type is not None and not part.is_repeated
-    return not single or bool(message.HasField(part.name))

@@ -142,8 +142,10 @@ def _signals_of(table: Table, path: Path, card: Card) -> _Raw:
         return _Raw(Log(shown_name(path), same), table.first_row, ())
 
     def clock(group: str) -> Array:
-        wanted = table.names[table.number(card.signals["t"].column, f"{path}, signals.t")]
-        number = table.number(f"{group}/{wanted}", f"{path}, the clock of group {group!r}")
+        number = table.clocks.get(group)
+        if number is None:
+            wanted = table.names[table.number(card.signals["t"].column, f"{path}, signals.t")]
+            number = table.number(f"{group}/{wanted}", f"{path}, the clock of group {group!r}")
         return _signal(table, number, "t", card, path)
 
     found = on_one_clock(signals, groups, clock, shown_name(path))
@@ -254,7 +256,11 @@ def _refuse_absurd(values: Array, name: str, path: Path, first_row: int) -> None
 
 
 def _same_length(signals: Mapping[str, Array], path: Path) -> dict[str, Array]:
-    """The signals at the length of `t`, single values spread; others raise BadLog."""
+    """The signals at the length of `t`, single values spread, a row more or less of one cut off;
+    others raise BadLog."""
+    lengths = {len(values) for values in signals.values() if len(values) > 1}
+    if lengths and max(lengths) - min(lengths) == 1:  # vectors of a file, not rows
+        signals = {k: v[: min(lengths)] if len(v) > 1 else v for k, v in signals.items()}
     length = len(signals["t"])
     for name, values in signals.items():
         if len(values) not in (1, length):

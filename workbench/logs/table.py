@@ -1,7 +1,7 @@
 """A file as named columns, which its reader hands out one by one."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +27,8 @@ class Table:
 
     `headed` is false where the file gives no names: then columns go by number alone. `groups`
     names the group of each column where a file holds several, each with a clock of its own; a
-    column then also goes by "group/name".
+    column then also goes by "group/name". `clocks`: the column of a group's clock, where it has a
+    name of its own.
     """
 
     names: tuple[str, ...]
@@ -35,6 +36,7 @@ class Table:
     first_row: int = 1
     headed: bool = True
     groups: tuple[str, ...] = ()
+    clocks: Mapping[str, int] = field(default_factory=dict)
 
     def column(self, key: str | int, where: str) -> RawColumn:
         """The column named or numbered `key`; raises BadLog with the nearest name."""
@@ -116,9 +118,12 @@ def refuse_long(path: Path, rows: int) -> None:
 
 
 def damaged(path: Path, form: str, error: Exception) -> BadLog:
-    """The one-line error for a file on which its reader failed."""
+    """The one-line error for a file on which its reader failed, which may have two causes."""
     text = " ".join(str(error).split())[:120] or type(error).__name__
-    return BadLog(f"{path}: damaged or cut off, not a whole {form} file ({text}); copy it again")
+    return BadLog(
+        f"{path}: cannot be read as a {form} file ({text}): it is damaged or cut off, or laid out"
+        " as is not read here; copy it again, or write its columns as CSV"
+    )
 
 
 def _places(key: str, names: Sequence[str]) -> list[int]:

@@ -15,12 +15,14 @@ from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.nearest import nearest
 from workbench.files import refuse_larger
+from workbench.logs.bags import read_bag
 from workbench.logs.excel import read_excel
 from workbench.logs.formats import HDF5_MAGIC, checked_format, head_of
 from workbench.logs.mat import tags_are_sound
 from workbench.logs.mcap import read_mcap
 from workbench.logs.mdf import read_mdf
 from workbench.logs.numpy_files import read_numpy
+from workbench.logs.structs import entry, plain_tree, records_of, vectors_of
 from workbench.logs.table import (
     BINARY_BYTES,
     RawColumn,
@@ -53,6 +55,7 @@ def read_table(path: Path, spec: FileSpec) -> Table:
         "ulog": read_ulog,
         "excel": read_excel,
         "npy": read_numpy,
+        "rosbag": read_bag,
     }
     try:
         return readers[form](path, spec)
@@ -95,17 +98,18 @@ def _read_mat(path: Path, spec: FileSpec) -> Table:
     for _name, shape, _kind in found_there:
         refuse_long(path, max(shape, default=0))
     content: Any = scipy.io.loadmat(str(path), squeeze_me=True, struct_as_record=False)
-    found = {name: value for name, value in content.items() if not name.startswith("__")}
+    found: Any = {
+        name: plain_tree(value) for name, value in content.items() if not name.startswith("__")
+    }
     for key in spec.rows.split(".") if spec.rows else ():
-        if key not in found:
-            raise BadLog(f"{path}: no variable {spec.rows!r}{nearest(key, found)}")
-        inner = found[key]
-        if isinstance(inner, np.ndarray):
-            return of_matrix(path, inner, spec)
-        found = {name: getattr(inner, name) for name in inner._fieldnames}
-    return of_vectors(
-        {name: np.atleast_1d(np.asarray(value)) for name, value in found.items()}, spec
-    )
+        try:
+            found = entry(found, key)
+        except LookupError:
+            there = found if isinstance(found, dict) else ()
+            raise BadLog(f"{path}: no variable {spec.rows!r}{nearest(key, there)}") from None
+    if isinstance(found, np.ndarray):
+        return of_matrix(path, found, spec)
+    return of_vectors(vectors_of(found), spec)
 
 
 def _read_hdf5(path: Path, spec: FileSpec) -> Table:
@@ -158,29 +162,51 @@ def _objects(path: Path) -> str:
 def _read_json(path: Path, spec: FileSpec) -> Table:
     refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
     try:
-        content = json.loads(path.read_text(encoding=spec.encoding))
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        text = path.read_text(encoding=spec.encoding)
+        content = json.loads(text.removeprefix("\ufeff"))
+    except UnicodeDecodeError as error:
         raise damaged(path, "json", error) from None
+    except json.JSONDecodeError as error:
+        raise _no_json(path, text, error) from None
     outer = content if isinstance(content, dict) else {}
     rows = content
     for key in spec.rows.split(".") if spec.rows else ():
-        if not isinstance(rows, dict) or key not in rows:
+        try:
+            rows = entry(rows, key)
+        except LookupError:
             there = rows if isinstance(rows, dict) else ()
-            raise BadLog(f"{path}: no key {spec.rows!r} for the rows{nearest(key, there)}")
-        rows = rows[key]
+            raise BadLog(
+                f"{path}: no key {spec.rows!r} for the rows{nearest(key, there)}"
+            ) from None
     if isinstance(rows, dict):
-        return of_vectors({name: np.atleast_1d(np.asarray(v)) for name, v in rows.items()}, spec)
+        return of_vectors(vectors_of(rows), spec)
     if not isinstance(rows, list) or not rows:
         raise BadLog(f"{path}: holds no list of rows; name its key in the card, [file] rows")
     scalars = {k: np.asarray([v]) for k, v in outer.items() if not isinstance(v, list | dict)}
     return _records(path, rows, scalars, spec)
 
 
+def _no_json(path: Path, text: str, error: json.JSONDecodeError) -> BadLog:
+    """The one-line error for a text that is no JSON: cut off, lines of JSON, or wrong somewhere."""
+    if error.msg == "Extra data" and text[: error.pos].count("\n") == 1:
+        return BadLog(
+            f"{path}: holds one JSON value a line (JSON Lines), which is not read; write the lines"
+            " as one list, [a, b, ...], or its numbers as CSV"
+        )
+    if error.pos >= len(text.rstrip()) or error.msg.startswith("Unterminated"):
+        return BadLog(
+            f"{path}: the JSON ends in the middle (line {error.lineno}), damaged or cut off; copy"
+            " it again"
+        )
+    return BadLog(
+        f"{path}: line {error.lineno}, column {error.colno} is no JSON ({error.msg}); correct it"
+        " there, or write the columns as CSV"
+    )
+
+
 def _records(path: Path, rows: list[Any], scalars: dict[str, RawColumn], spec: FileSpec) -> Table:
     if isinstance(rows[0], dict):
-        names = [str(name) for name in rows[0]]
-        columns = {name: np.asarray([row.get(name) for row in rows]) for name in names}
-        return of_vectors({**columns, **scalars}, spec)
+        return of_vectors({**records_of(rows), **scalars}, spec)
     for number, row in enumerate(rows, start=1):
         if not isinstance(row, list) or len(row) != len(rows[0]):
             raise BadLog(f"{path}: row {number} has not the length of row 1 ({len(rows[0])})")

@@ -3,16 +3,19 @@
 import csv
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.arrays import Array
 from identification.errors import BadLog
 from workbench.cards.card_tables import FileSpec
 from workbench.files import refuse_larger
+from workbench.logs.blocks import Block, block_table, blocks_of, decimal_of
+from workbench.logs.clock_groups import clock_groups
 from workbench.logs.layout import Layout, find_layout, is_number
 from workbench.logs.table import Table
 
@@ -41,6 +44,8 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     """
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
     text = _decode(path, spec.encoding)
+    if blocks := _blocks(text, spec):
+        return block_table(path, blocks, spec.decimal or decimal_of(blocks))
     lines = text[:_LOOK].splitlines()
     start = spec.skip_rows
     while start < len(lines) and _skipped(lines[start], spec.comment):
@@ -67,7 +72,35 @@ def read_text_table(path: Path, spec: FileSpec) -> Table:
     content = body.encode("utf-8")
     del text, body  # of a long log a gigabyte
     columns = _parse(path, content, marks, len(names), first_row)
-    return Table(names, columns, first_row, bool(found.names), found.groups)
+    table = Table(names, columns, first_row, bool(found.names), found.groups)
+    if found.groups or not found.names:
+        return table
+    return _grouped(table, fields[found.data : found.data + _COMPARED], marks)
+
+
+def holds_blocks(path: Path, spec: FileSpec) -> bool:
+    """Whether the tables of several variables stand one below the other in a text file."""
+    return bool(_blocks(_decode(path, spec.encoding), spec))
+
+
+def _blocks(text: str, spec: FileSpec) -> list[Block]:
+    """The blocks of a text of which the card does not say where its table begins."""
+    return blocks_of(text) if not spec.skip_rows and spec.header is None else []
+
+
+def _grouped(table: Table, rows: Sequence[Sequence[str]], marks: _Marks) -> Table:
+    """The table, its columns in groups where each of several has a clock before it."""
+    width = len(table.names)
+    whole = [row for row in rows if len(row) == width]
+    first = [_numbers([row[k] for row in whole], marks) for k in range(width)]
+    found = clock_groups(table.names, first, table.fetch)
+    return replace(table, groups=found.groups, clocks=found.clocks) if found else table
+
+
+def _numbers(cells: Sequence[str], marks: _Marks) -> Array:
+    """The cells as numbers, those that are none left out."""
+    plain = (cell.replace(marks.decimal, ".") for cell in cells if cell and is_number(cell))
+    return np.array([float(cell) for cell in plain], dtype=np.float64)
 
 
 def _first_line_layout(

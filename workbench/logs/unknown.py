@@ -2,7 +2,8 @@
 
 import json
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -16,38 +17,31 @@ from workbench.cards.headers import written_unit
 from workbench.files import refuse_larger
 from workbench.logs.formats import find_format, head_of
 from workbench.logs.layout import is_number
+from workbench.logs.raw_columns import RawColumn, on_clock_of_most
 from workbench.logs.table import Table
 from workbench.logs.tables import JSON_BYTES, read_table
-from workbench.logs.text import TEXT_BYTES, first_lines
+from workbench.logs.text import TEXT_BYTES, first_lines, holds_blocks
 from workbench.logs.times import seconds
 
 _BELOW = 5  # rows of numbers by which the first of them is known
 _MOSTLY = 0.5  # share of a row's fields, that are numbers where it is data, or units
-_DEEPEST = 3  # tables in each other, in which the rows are looked for
+ONE_ROW = 1  # by which vectors of one log may differ in length
+_OF_PATHS = ("json", "mat", "hdf5", "mcap", "rosbag")  # formats whose names are paths
+_ONLY_NUMBER = ("data", "value")  # of a message that holds one number
+_DEEPEST = 5  # tables in each other, in which the rows are looked for
 _ENCODINGS = ("utf-8", "cp932", "cp1252", "latin-1")
 
 
 @dataclass(frozen=True, eq=False)
-class RawColumn:
-    """One column: its number from 0, what a card calls it, its header and the unit below it, its
-    values (n,) (NaN where there is no number), and why they cannot be used (else empty)."""
-
-    number: int
-    key: str | int
-    header: str
-    unit_below: str
-    values: Array
-    unusable: str = ""
-
-
-@dataclass(frozen=True, eq=False)
 class UnknownLog:
-    """The columns of a file, how it has to be read, and single values that stand beside them."""
+    """The columns of a file, how it has to be read, single values that stand beside them, and what
+    else the file holds."""
 
     path: Path
     spec: FileSpec
     columns: tuple[RawColumn, ...]
     scalars: tuple[RawColumn, ...]
+    notes: tuple[str, ...] = ()
 
 
 def read_unknown(path: Path) -> UnknownLog:
@@ -57,29 +51,52 @@ def read_unknown(path: Path) -> UnknownLog:
     file, are found by looking. Raises BadLog, one line, where there are no columns of numbers.
     """
     form = find_format(path, head_of(path))
-    spec, names, units = _text_layout(path) if form == "csv" else _other_layout(path, form)
+    names, units, notes = tuple[str, ...](), tuple[str, ...](), tuple[str, ...]()
+    if form == "csv":
+        spec, names, units = _text_layout(path)
+    else:
+        spec, notes = _other_layout(path, form)
     table = read_table(path, spec)
     headed = table.headed and not names
-    texts, full = names or table.names, table.full_names()
+    texts, full = names or _plain_names(table, form), table.full_names()
     if form == "csv" and (rows := len(table.fetch(0))) < SHORTEST_LOG:
         raise BadLog(_too_short(path, f"{rows} row" + ("s" if rows != 1 else "")))
     found, scalars = list[RawColumn](), list[RawColumn]()
     for number in range(len(table.names)):
         text = texts[number] if number < len(texts) and (table.headed or names) else ""
-        twice = full.count(full[number]) > 1
-        key = full[number] if headed and text and not twice else number
+        called = table.names if table.clocks and table.names.count(text) == 1 else full
+        twice = called.count(called[number]) > 1
+        key = called[number] if headed and text and not twice else number
         below = units[number] if number < len(units) else ""
         values, why = _numbers(table, number)
         if why.startswith("text") and (times := _times(table, number, path)) is not None:
             values, why, below = times, "", "s"
-        one = RawColumn(number, key, text, below, values, why)
+        group = table.groups[number] if table.groups else ""
+        one = RawColumn(number, key, text, below, values, why, group)
         (scalars if len(values) == 1 else found).append(one)
+    found = on_clock_of_most(found, table.clocks)
     longest = max((len(one.values) for one in found if not one.unusable), default=0)
     if longest < SHORTEST_LOG:
         many = f"{longest} rows of numbers" if longest else "no column of numbers"
         raise BadLog(_too_short(path, many))
-    same = [one for one in found if len(one.values) == longest]
-    return UnknownLog(path, spec, tuple(same), tuple(scalars))
+    same = [one for one in found if longest - ONE_ROW <= len(one.values) <= longest]
+    rows = min((len(one.values) for one in same), default=0)
+    same = [replace(one, values=one.values[:rows]) for one in same]
+    return UnknownLog(path, spec, tuple(same), tuple(scalars), notes)
+
+
+def _plain_names(table: Table, form: Format) -> tuple[str, ...]:
+    """What to read of the columns' names: of a path within tables its last part, where no other
+    column has that, and of a message's only number its topic."""
+    if form not in _OF_PATHS:
+        return table.names
+    topics = table.groups or ("",) * len(table.names)
+    last = [
+        topic.strip("/") if name in _ONLY_NUMBER and topic else name.rpartition(".")[2] or name
+        for name, topic in zip(table.names, topics, strict=True)
+    ]
+    return tuple(one if last.count(one) == 1 else name
+                 for one, name in zip(last, table.names, strict=True))  # fmt: skip
 
 
 def _too_short(path: Path, found: str) -> str:
@@ -126,6 +143,8 @@ def _text_layout(path: Path) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]
     refuse_larger(path, TEXT_BYTES, "a text log", BadLog)
     encoding = _encoding(path)
     spec = FileSpec() if encoding == "utf-8" else FileSpec(encoding=encoding)
+    if holds_blocks(path, spec):
+        return spec, (), ()
     rows = first_lines(path, spec)
     at = _first_of_data(rows)
     if at is None:
@@ -190,36 +209,73 @@ def _encoding(path: Path) -> str:
     return "utf-8"
 
 
-def _other_layout(path: Path, form: Format) -> tuple[FileSpec, tuple[str, ...], tuple[str, ...]]:
-    """Where the rows of a file that is no text table lie: of a JSON or MAT file within it."""
-    finders = {"mat": _struct_of, "json": _rows_of}
-    rows = finders[form](path) if form in finders else None
-    return (FileSpec(rows=rows) if rows else FileSpec()), (), ()
+def _other_layout(path: Path, form: Format) -> tuple[FileSpec, tuple[str, ...]]:
+    """Where the rows of a file that is no text table lie: of a JSON or MAT file within it; and what
+    else is said of it."""
+    rows, said = None, ""
+    if form == "mat":
+        rows = _struct_of(path)
+    elif form == "json":
+        rows, said = _rows_of(path)
+    return (FileSpec(rows=rows) if rows else FileSpec()), (said,) if said else ()
 
 
-def _rows_of(path: Path) -> str | None:
-    """Key of the longest list in a JSON file, "a.b" in nested ones; None where it is at the top."""
+def _rows_of(path: Path) -> tuple[str | None, str]:
+    """Where the rows of a JSON file lie ("a.b", "a.0.b" within lists; None: at the top), and what
+    else is there."""
     refuse_larger(path, JSON_BYTES, "a JSON log", BadLog)
     try:
         content = json.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, ValueError, RecursionError):
-        return None  # the reader of tables says what is wrong with it
-    if isinstance(content, list):
-        return None
-    found = [(len(one), key) for key, one in _lists(content, "", _DEEPEST)]
-    length, key = max(found, default=(0, ""))
-    columns = [one for one in found if one[0] == length]
-    if len(columns) > 1:  # a list a column: their table is what holds them
-        return columns[0][1].rpartition(".")[0] or None
-    return key or None
+        return None, ""  # the reader of tables says what is wrong with it
+    lists = list(_lists(content, (), _DEEPEST))
+    if (isinstance(content, list) and len(content) >= SHORTEST_LOG) or not lists:
+        return None, ""
+    longest = max(len(one) for one, _ in lists)
+    long = [(one, place) for one, place in lists if len(one) >= longest - ONE_ROW]
+    run, said = _run_of([place for _, place in long])
+    own = [(one, place) for one, place in long if place[: len(run)] == run]
+    if isinstance(own[0][0][0], dict | list):
+        return ".".join(own[0][1]) or None, said
+    place = _shared([place for _, place in own])
+    return ".".join(place[:-1] if len(own) == 1 else place) or None, said
 
 
-def _lists(value: Any, place: str, depth: int) -> Iterator[tuple[str, list[Any]]]:
-    if isinstance(value, list):
-        yield place, value
+def _shared(places: Sequence[tuple[str, ...]]) -> tuple[str, ...]:
+    """The beginning that all places share."""
+    levels = zip(*places, strict=False)
+    same = takewhile(lambda keys: len(set(keys)) == 1, levels)
+    return tuple(keys[0] for keys in same)
+
+
+def _run_of(places: Sequence[tuple[str, ...]]) -> tuple[tuple[str, ...], str]:
+    """The first of several runs in a list, by the places of its vectors, and what is said of it.
+
+    A table in a list that holds one vector alone is a signal, and no run.
+    """
+    for place in places:
+        at = next((k for k, key in enumerate(place) if key.isdigit()), None)
+        if at is None or sum(other[: at + 1] == place[: at + 1] for other in places) < 2:
+            continue
+        several = {other[: at + 1] for other in places if other[:at] == place[:at]}
+        name = ".".join(place[:at]) or "the file"
+        said = f"{len(several)} runs in {name}: the card reads the first" if several else ""
+        return place[: at + 1], said if len(several) > 1 else ""
+    return (), ""
+
+
+def _lists(
+    value: Any, place: tuple[str, ...], depth: int
+) -> Iterator[tuple[list[Any], tuple[str, ...]]]:
+    """The lists that are long enough for a log, each with its place."""
+    if isinstance(value, list) and len(value) >= SHORTEST_LOG:
+        yield value, place
+    elif isinstance(value, list) and depth:
+        for k, inner in enumerate(value):
+            yield from _lists(inner, (*place, str(k)), depth - 1)
     elif isinstance(value, dict) and depth:
         for key, inner in value.items():
-            yield from _lists(inner, f"{place}.{key}" if place else str(key), depth - 1)
+            yield from _lists(inner, (*place, str(key)), depth - 1)
 
 
 def _struct_of(path: Path) -> str | None:

@@ -1,7 +1,7 @@
 """A card as the fields of a form: filled from `init`'s proposal, corrected, and written as TOML."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -28,6 +28,7 @@ KIND_WORDS = {
     "electro-pneumatic": "two pressures make the force",
     "force": "the force is logged",
     "motor": "the force is a constant times the command",
+    "velocity": "the velocity follows the command (a valve and cylinder)",
 }
 RIG_NUMBERS = {  # key of the card: label, and unit
     "area_p_m2": ("area, positive side", "m^2"),
@@ -37,6 +38,7 @@ RIG_NUMBERS = {  # key of the card: label, and unit
     "control_limit": ("limit of the command", "unit of u"),
 }
 LONGEST_FIELD = 200
+OTHER_FIELD = "other"  # names the guess that is to be what it would be otherwise
 _TEXTS = ("force_per_command", "control_limit")  # that may be "35 N/A" too
 
 
@@ -44,7 +46,8 @@ _TEXTS = ("force_per_command", "control_limit")  # that may be "35 N/A" too
 class CardForm:
     """The fields by name, each a text; columns: key and words of each column that may be chosen.
 
-    why: by field, how sure the proposal is of it and why; layout: the card's [file].
+    why: by field, how sure the proposal is of it and why; layout: the card's [file]; others: by
+    field, what it would be otherwise in words, and the fields that are then others.
     """
 
     fields: Mapping[str, str]
@@ -52,6 +55,7 @@ class CardForm:
     why: Mapping[str, tuple[bool, str]] = field(default_factory=dict)
     remarks: Sequence[str] = ()
     layout: Mapping[str, Any] = field(default_factory=dict)
+    others: Mapping[str, tuple[str, Mapping[str, str]]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> str:
         return self.fields.get(name, "")
@@ -61,9 +65,15 @@ class CardForm:
         texts = {
             name: " ".join(str(given.get(name, "")).split())[:LONGEST_FIELD] for name in _names()
         }
+        wanted = str(given.get(OTHER_FIELD, ""))
+        if wanted in self.others:
+            texts |= self.others[wanted][1]
         changed = {name for name in texts if texts[name] != self[name]}
+        changed |= {f"column_{name.partition('_')[2]}" for name in changed if "_" in name}
+        changed |= {"kind", "motion"} if {"kind", "motion"} & changed else set()
         why = {name: said for name, said in self.why.items() if name not in changed}
-        return CardForm(texts, self.columns, why, self.remarks, self.layout)
+        others = {name: one for name, one in self.others.items() if name not in changed}
+        return CardForm(texts, self.columns, why, self.remarks, self.layout, others)
 
     def text(self, file: str) -> str:
         """The card; raises BadCard where a field can be none."""
@@ -109,7 +119,7 @@ class CardForm:
         """Write the form beside its log."""
         content = {"fields": dict(self.fields), "columns": list(self.columns),
                    "why": dict(self.why), "remarks": list(self.remarks),
-                   "layout": dict(self.layout)}  # fmt: skip
+                   "layout": dict(self.layout), "others": dict(self.others)}  # fmt: skip
         write_whole(folder / FORM_FILE, json.dumps(content), "form")
 
 
@@ -121,28 +131,59 @@ def kept_form(folder: Path) -> CardForm | None:
     found = json.loads(path.read_text(encoding="utf-8"))
     columns = [(str(key), str(words)) for key, words in found["columns"]]
     why = {name: (bool(sure), str(said)) for name, (sure, said) in found["why"].items()}
-    return CardForm(found["fields"], columns, why, found["remarks"], found["layout"])
+    others = {name: (str(words), dict(one)) for name, (words, one) in found["others"].items()}
+    return CardForm(found["fields"], columns, why, found["remarks"], found["layout"], others)
 
 
 def form_of(of: "Proposal", file: str) -> CardForm:
     """The proposal as a form; file: name of the log, of which the machine's is made."""
+    why = {_field(one.key): (one.sure, one.why) for one in of.rig}
+    why |= {f"column_{one.name}": (one.sure, one.why) for one in of.signals}
+    columns = [(json.dumps(one.key), one.header or one.shown) for one in of.columns]
+    unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
+    layout = of.spec.model_dump(exclude_defaults=True)
+    remarks = [*of.hardly, *of.remarks, *unused]
+    return CardForm(_fields(of), columns, why, remarks, layout, _others(of))
+
+
+def _field(key: str) -> str:
+    return "control_limit" if key == "control_limit_v" else key
+
+
+def _fields(of: "Proposal") -> dict[str, str]:
+    """The proposal as fields by name."""
     fields = {"name": of.name, "kind": of.kind, "motion": of.motion}
-    why: dict[str, tuple[bool, str]] = {}
     for one in of.rig:
-        name = "control_limit" if one.key == "control_limit_v" else one.key
-        fields[name] = "" if one.value is None else _written(one.value)
-        why[name] = (one.sure, one.why)
+        fields[_field(one.key)] = "" if one.value is None else _written(one.value)
     for signal in of.signals:
         name = signal.name
         fields[f"column_{name}"] = json.dumps(signal.column)
         fields[f"unit_{name}"] = signal.unit
         fields[f"gain_{name}"] = "" if signal.gain is None else _written(signal.gain)
         fields[f"bits_{name}"] = "" if signal.bits is None else str(signal.bits)
-        why[f"column_{name}"] = (signal.sure, signal.why)
-    columns = [(json.dumps(one.key), one.header or one.shown) for one in of.columns]
-    unused = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
-    layout = of.spec.model_dump(exclude_defaults=True)
-    return CardForm(fields, columns, why, [*of.remarks, *unused], layout)
+    return fields
+
+
+def _others(of: "Proposal") -> dict[str, tuple[str, Mapping[str, str]]]:
+    """By the field of each guess that has another, this in words, and the fields that change."""
+    from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
+
+    before, out = _fields(of), dict[str, tuple[str, Mapping[str, str]]]()
+    guesses: list[tuple[str, str, Callable[[Proposal, str, str], Proposal], str]]
+    guesses = [(_field(one.key), one.rival, with_rig, one.key) for one in of.rig if not one.sure]
+    guesses += [(f"column_{one.name}", one.rival, with_signal, one.name)
+                for one in of.signals if not one.sure]  # fmt: skip
+    for name, rival, changed, key in guesses:
+        if not rival:
+            continue
+        try:
+            after = _fields(changed(of, key, THE_OTHER))
+        except BadAnswer:
+            continue
+        every = dict.fromkeys([*before, *after])
+        out[name] = (rival, {one: after.get(one, "") for one in every
+                             if after.get(one, "") != before.get(one, "")})  # fmt: skip
+    return out
 
 
 def empty_form(columns: Sequence[tuple[str, str | int, str]], name: str) -> CardForm:

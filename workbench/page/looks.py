@@ -81,11 +81,12 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 
 
 def proposal(path: Path) -> "Proposal":
-    """The card that `init` proposes; raises BadLook."""
+    """The card that `init` proposes, and what the log will hardly tell; raises BadLook."""
+    from workbench.steps.first_card.looked_over import looked_over
     from workbench.steps.first_card.proposal import proposed
 
     try:
-        return proposed(path)
+        return looked_over(proposed(path))
     except UserError as error:
         raise BadLook(without_path(str(error), [path])) from None
 

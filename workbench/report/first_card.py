@@ -10,20 +10,18 @@ MOST_LEFT_OUT = 5  # columns that one screen names
 NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
-def proposal_view(of: Proposal, card: Path, refused: str) -> Screen:
-    """What the card says, what is left out of it, and what to do next.
-
-    refused: why the log cannot be read by the card yet, empty where it can.
-    """
+def proposal_view(of: Proposal, card: Path) -> Screen:
+    """What the card says, what the log will hardly tell, what is left out, and what to do next."""
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
     guesses = [row[0] for row in rows if row[3] == "guess"]
     looked = f"look at the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
     parts: list[Part | str] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
     parts.append(next_step(NEXT_COMMAND.format(log=of.path, card=card)))
-    if refused:
-        parts.append(f"With this card the log cannot be read yet: {refused}")
+    if of.refused:
+        parts.append(f"With this card the log cannot be read yet: {of.refused}")
     left_out = (f"left out: {shown} ({why})" for shown, why in of.unused.items())
     parts += [
+        listed(f"hardly told: {line}" for line in of.hardly),
         tabled(("", "column or value", "unit", "", "why"), rows, right=()),
         listed(f"note: {line}" for line in of.remarks),
         listed(left_out, MOST_LEFT_OUT),

@@ -36,6 +36,7 @@ from workbench.cards.units import conversion
 from workbench.documents.model import Told
 from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import read_signals, with_force
+from workbench.steps.hardly_tells import hardly_tells
 from workbench.steps.runs_tell import RunsTell, runs_tell
 from workbench.steps.told_by_log import Ways
 
@@ -196,6 +197,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
     late = _late_command(runs, found.rig) if runs and not found.refused and seen.motion else None
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
+        remarks += hardly_tells(runs, found.rig)
     return Examined(
         file=found.file,
         rig=found.rig,

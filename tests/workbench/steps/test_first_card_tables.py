@@ -118,7 +118,7 @@ def test_a_velocity_makes_sure_of_a_position(joint: dict[str, Array], tmp_path: 
 
 def test_sizes_alone_make_nothing_sure(joint: dict[str, Array], tmp_path: Path) -> None:
     found = propose(tmp_path, "time,position,force", T, plain(joint), joint["F"])
-    assert [one.name for one in found.signals if one.sure] == ["t"]
+    assert [one.name for one in found.signals if one.sure] == []
     motion = next(one for one in found.rig if one.key == "motion")
     assert (motion.sure, motion.rival) == (False, "rotary")
     turned = with_rig(found, "motion", "+")
@@ -128,7 +128,7 @@ def test_sizes_alone_make_nothing_sure(joint: dict[str, Array], tmp_path: Path) 
 
 
 def test_the_other_guess_is_one_key_away(joint: dict[str, Array], tmp_path: Path) -> None:
-    found = propose(tmp_path, "time,angle,torque", T, plain(joint), joint["F"])
+    found = propose(tmp_path, "time [s],angle,torque", T, plain(joint), joint["F"])
     y = found.signal("y")
     assert y is not None and y.rival
     after = with_signal(found, "y", "+").signal("y")

@@ -15,6 +15,7 @@ LEAVE_OUT, THE_OTHER = "-", "+"
 CONFIRMED = "confirmed"
 OTHER_MOTION = {"m": "rad", "mm": "deg", "um": "deg", "rad": "m", "deg": "mm", "turn": "mm",
                 "N": "N m", "kN": "N m", "mN": "mN m", "N m": "N", "mN m": "N"}  # fmt: skip
+NEXT_UNIT = {"m": "mm", "mm": "m", "rad": "deg", "deg": "rad", "N m": "mN m", "N": "kN"}
 OTHER_GAIN = {"mm": "turn", "turn": "mm"}
 WRITTEN_GAIN = re.compile(r"[\d.]+ \S+/\S+")
 
@@ -53,6 +54,10 @@ def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
     one = next(guess for guess in of.rig if guess.key == key)
     text = _other(answer.strip(), one.rival)
     found: RigGuess = replace(one, sure=one.value is not None, why=CONFIRMED)
+    if key == "kind" and text not in ("", of.kind):
+        return _of_kind(of, text)
+    if key == "kind":
+        return replace(of, rig=tuple(found if x is one else x for x in of.rig))
     if key == "motion" and text:
         if text not in ("linear", "rotary"):
             raise BadAnswer(f"{text!r}: linear or rotary needed")
@@ -78,6 +83,19 @@ def with_rig(of: Proposal, key: str, answer: str) -> Proposal:
     return replace(of, rig=tuple(found if x is one else x for x in of.rig))
 
 
+def _of_kind(of: Proposal, kind: str) -> Proposal:
+    """The proposal for a rig of the other kind, which is then given."""
+    other = of.other
+    if other is None or other.kind != kind:
+        there = f"{of.kind} or {other.kind}" if other is not None else of.kind
+        raise BadAnswer(f"{kind!r}: {there} is what the columns here can drive")
+    rig = tuple(
+        replace(x, sure=True, why=CONFIRMED, rival=of.kind) if x.key == "kind" else x
+        for x in other.rig
+    )
+    return replace(other, rig=rig, other=replace(of, other=None))
+
+
 def _turned(one: SignalGuess) -> SignalGuess:
     """A signal as a guess for the other kind of motion: its unit, and per what its gain is."""
     gain = one.gain
@@ -85,7 +103,10 @@ def _turned(one: SignalGuess) -> SignalGuess:
         number, _, per = gain.partition(" ")
         above, _, below = per.partition("/")
         gain = f"{number} {above}/{OTHER_GAIN.get(below, OTHER_MOTION.get(below, below))}"
-    return replace(one, unit=OTHER_MOTION.get(one.unit, one.unit), gain=gain, rival="")
+    rival = OTHER_MOTION.get(one.rival, "") if one.rival != one.column else one.rival
+    unit = OTHER_MOTION.get(one.unit, one.unit)
+    rival = NEXT_UNIT.get(unit, "") if rival in ("", unit) else rival
+    return replace(one, unit=unit, gain=gain, rival="" if one.sure else rival)
 
 
 def _other(text: str, rival: str) -> str:

@@ -23,8 +23,12 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
         for place, word in enumerate(own):
             if _may_be_a_name(word):
                 families.setdefault((*own[:place], "*", *own[place + 1 :]), {})[word] = k
-    found = [one for one in families.values() if len(one) > 1]
-    best = max((_positions(one, heads, alike, found) for one in found), key=len, default=())
+    found = {key: one for key, one in families.items() if len(one) > 1}
+    every = list(found.values())
+    best = max(
+        (_positions(one, heads, alike, every, alone=key == ("*",)) for key, one in found.items()),
+        key=len, default=(),
+    )  # fmt: skip
     if len(best) < 2:
         return {}
     out = {}
@@ -45,11 +49,18 @@ def _positions(
     heads: Sequence[Header],
     alike: Array,
     families: Sequence[Mapping[str, int]],
+    *,
+    alone: bool,
 ) -> tuple[str, ...]:
-    """The words of a family that are axes: those of positions, each of which moves for itself."""
+    """The words of a family that are axes: those of positions, each of which moves for itself.
+
+    alone: whether the headers are these words alone; then other headers have to hold them too.
+    """
     kept = [(word, k) for word, k in family.items() if _is_position(heads[k])]
     names = {word for word, _ in kept}
     elsewhere = sum(names <= set(other) for other in families)
+    if alone and elsewhere < 2:
+        return ()
     apart = list[tuple[str, int]]()
     for word, k in kept:
         if elsewhere > 1 or all(abs(alike[k, j]) < SAME_MOTION for _, j in apart):

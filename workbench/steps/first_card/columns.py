@@ -14,7 +14,8 @@ from identification.signals.noise import local_noise
 from identification.signals.relations import motion_of
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.headers import Header, read_header
-from workbench.logs.unknown import RawColumn, UnknownLog
+from workbench.logs.raw_columns import RawColumn
+from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
 
@@ -23,6 +24,7 @@ MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
 FEW_LEVELS = 8  # values at most, of a flag, mode or state
+ROW_NUMBERS = 2.5  # for a clock that goes up by one a row, beside others
 SECOND_CLOCK = 2e-3  # of its range, that a clock is off another one at most
 SAME_SIGNAL = 1.5  # times their rounding, that two columns of one signal are apart at most
 NEARLY_ALIKE = 0.999  # correlation of two columns that may be one signal
@@ -109,7 +111,8 @@ class Column:
 class Columns:
     """The clock, the columns that may be signals, and why each of the others is not.
 
-    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`.
+    step: the median step of the clock in its own unit; grid: samples of the file in one of `x`;
+    notes: what else the file holds.
     """
 
     path: Path
@@ -121,6 +124,7 @@ class Columns:
     left_out: Mapping[int, str]
     read: tuple[Column, ...]
     scalars: tuple[Column, ...] = field(default=())
+    notes: tuple[str, ...] = ()
 
     @property
     def axes(self) -> tuple[str, ...]:
@@ -144,7 +148,7 @@ def columns_of(log: UnknownLog) -> Columns:
     kept = _with_axes(kept)
     return Columns(
         log.path, log.spec, clock, step, grid, tuple(kept), left_out | twice,
-        tuple(read), tuple(_column(one) for one in log.scalars),
+        tuple(read), tuple(_column(one) for one in log.scalars), log.notes,
     )  # fmt: skip
 
 
@@ -238,7 +242,7 @@ def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Co
             means.get("time", 0.0)
             - means.get("count", 0.0)
             + (4.0 if unit and unit.quantity == "time" else 0.0)
-            - (1.0 if counted else 0.0)
+            - (ROW_NUMBERS if counted else 0.0)
             - (4.0 if unit and unit.quantity not in ("time", "count") else 0.0)
         )
 

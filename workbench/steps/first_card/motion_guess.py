@@ -8,6 +8,7 @@ from identification.arrays import Array
 from workbench.cards.headers import words_of
 from workbench.cards.units import Motion
 from workbench.steps.first_card.columns import Column
+from workbench.steps.first_card.registers import halved_counts
 from workbench.steps.first_card.roles import Roles
 
 WHOLE_POWER = 1e-4  # of a binary logarithm, that a turn over a step is off a whole one
@@ -57,6 +58,11 @@ def told_motion(roles: Roles) -> MotionGuess:
     if _counted_shaft(roles):
         why = "counts of an encoder beside a motor's current are mostly those of a shaft"
         return MotionGuess("rotary", why, False, rotor)
+    y = roles.columns["y"]
+    if is_count(y) and y.header.unit is None and not y.header.means:
+        return MotionGuess(
+            "rotary", "it has the steps of an encoder, which shafts mostly have", False
+        )
     if sum(weak.values()) >= TURNING:
         most = roles.columns[max(weak, key=lambda one: weak[one])]
         why = f"machines that turn have names like {most.shown} more often"
@@ -72,7 +78,11 @@ def _counted_shaft(roles: Roles) -> bool:
 def is_count(y: Column) -> bool:
     """Whether a position has whole numbers of an encoder, by its unit or by its values."""
     unit = y.header.unit
-    return unit.quantity == "count" if unit else y.whole and len(y.levels) > COUNTED_LEVELS
+    if unit is not None:
+        return unit.quantity == "count"
+    if len(y.levels) <= COUNTED_LEVELS:
+        return False
+    return y.whole or halved_counts(y.numbers)
 
 
 def is_current(u: Column) -> bool:
@@ -80,7 +90,7 @@ def is_current(u: Column) -> bool:
     text = f" {' '.join(words_of(u.header.name))} "
     if u.header.unit is not None:
         return u.header.unit.card in ("A", "mA")
-    return any(one in text for one in CURRENTS)
+    return any(one in text for one in CURRENTS) or (" i " in text and not u.whole)
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:

@@ -21,24 +21,57 @@ from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
+MOST_CONSTANT = 0.3  # of a signal's spread, that a derivative is off the change of what it is of
+DIFFERENCE, SAME_FACTOR = 0.9995, 0.02  # share of an error that two signals' difference explains
 ONE_UNIT, MOST_ADDED = 0.15, 0.3  # slope off one, and share of the variance, of what is added
 MOSTLY_PAST, PASSES = 0.8, 1.05  # samples at the limit, and range, of the one before a limiter
 SAME_SUM, MOSTLY_ADDED, SELDOM = 1e-4, 0.95, 0.02  # of its range, and of the rows, in a sum
+ONE_SIGNAL = 0.5  # correlation of a reference with what follows it, at least
 MAYBE_ONE = 0.5  # correlation of a command before a limiter or sum and behind it, at least
 
 
 class Pairs:
     """The signals of a log beside each other: `x` (n, k), `alike` and `rate` (k, k).
 
-    alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned.
+    alike: correlation; rate[i, j]: how much of j is the derivative of i, negative where turned;
+    rate_but_constant: the same where the two may be a constant apart, as a friction force is from a
+    velocity; bodies: what others do to each of those that may be the position, by its place.
     """
 
     def __init__(self, signals: Sequence[Column]) -> None:
         self.signals = tuple(signals)
         self.x = np.column_stack([one.x for one in signals])
         self.alike = correlation(self.x)
-        self.rate = _rates(self.x)
+        self.rate, self.rate_but_constant = _rates(self.x)
         self.stems = [stem(one.header) for one in signals]
+        self.bodies = dict[int, Seen]()
+
+    @cached_property
+    def errors(self) -> dict[int, set[tuple[int, int]]]:
+        """Signals that are the difference of two others, as a following error is, by their place:
+        the places of the two, the first before the second.
+
+        Of three such the smallest is the error; what is fed forward goes less with either.
+        """
+        centred = self.x - self.x.mean(axis=0)
+        gram = centred.T @ centred
+        square = np.maximum(np.diag(gram), 1e-300)
+        out: dict[int, set[tuple[int, int]]] = {}
+        for i in range(len(self.signals) - 1):
+            near = np.flatnonzero(np.abs(self.alike[i, i + 1 :]) >= ONE_SIGNAL) + i + 1
+            det = (square[i] * square[near] - gram[i, near] ** 2)[:, None]
+            det = np.where(det > 1e-12 * square[i] * square[near, None], det, np.inf)
+            first = (square[near, None] * gram[i] - gram[i, near, None] * gram[near]) / det
+            second = (square[i] * gram[near] - gram[i, near, None] * gram[i]) / det
+            share = (first * gram[i] + second * gram[near]) / square
+            turned = np.abs(first + second) < SAME_FACTOR * np.abs(first)
+            small = square < np.minimum(square[i], square[near, None]) * first**2
+            found = (share > DIFFERENCE) & turned & small
+            found[:, i] = False
+            found[np.arange(len(near)), near] = False
+            for row, k in np.argwhere(found).tolist():
+                out.setdefault(k, set()).add((i, int(near[row])))
+        return out
 
     def behind(self, commands: Sequence[int]) -> dict[int, int]:
         """Commands before a limiter or a sum, by their place: the place of what comes out of it.
@@ -57,21 +90,30 @@ class Pairs:
         return out
 
 
-def _rates(x: Array) -> Array:
-    """How much of each signal (column) is the derivative of another (row), signed, (k, k)."""
+def _rates(x: Array) -> tuple[Array, Array]:
+    """How much of each signal (column) is the derivative of another (row), signed, (k, k): none of
+    it where the two are a constant apart, and whether they are or not."""
     best = np.zeros((x.shape[1], x.shape[1]))
-    mean = x - x.mean(axis=0)
+    every = best.copy()
+    mean, middle = x - x.mean(axis=0), x.mean(axis=0)
+    spread = np.maximum(np.std(x, axis=0), 1e-300)
     summed = np.vstack([np.zeros(x.shape[1]), np.cumsum(0.5 * (mean[1:] + mean[:-1]), axis=0)])
     for size in STRETCHES:
         if 4 * size > len(x):
             break
-        every = max(1, size // 4)
-        change = (mean[size:] - mean[:-size])[::every]
-        found = _normed(change).T @ _normed((summed[size:] - summed[:-size])[::every])
+        step = max(1, size // 4)
+        change = (mean[size:] - mean[:-size])[::step]
+        rise = (summed[size:] - summed[:-size])[::step]
+        found = _normed(change).T @ _normed(rise)
+        factor = found * np.std(rise, axis=0) / np.maximum(np.std(change, axis=0), 1e-300)[:, None]
+        constant = middle + (rise.mean(axis=0) - factor * change.mean(axis=0)[:, None]) / size
+        own = np.abs(constant) < MOST_CONSTANT * spread
         share = np.sign(found) * found**2
-        best = np.where(np.abs(share) > np.abs(best), share, best)
-    np.fill_diagonal(best, 0.0)
-    return best
+        every = np.where(np.abs(share) > np.abs(every), share, every)
+        best = np.where(own & (np.abs(share) > np.abs(best)), share, best)
+    for one in (best, every):
+        np.fill_diagonal(one, 0.0)
+    return best, every
 
 
 def _normed(x: Array) -> Array:
@@ -130,7 +172,8 @@ def _both(one: Column, other: Column) -> tuple[Array, Array]:
 class Seen:
     """The other columns as a position sees them; `at` is its place among them.
 
-    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,).
+    smooth: all (n, k) as smooth as its motion; v_share, v_factor: of its velocity in each, (k,);
+    v_constant: what is constant beside it, in units of the spread.
     """
 
     def __init__(self, pairs: Pairs, at: int) -> None:
@@ -144,6 +187,9 @@ class Seen:
         square, together = max(float(v @ v), 1e-300), v @ f
         self.v_factor = together / square
         self.v_share = together**2 / square / np.maximum(np.sum(f**2, axis=0), 1e-300)
+        spread = np.maximum(np.std(self.smooth[inside], axis=0), 1e-300)
+        constant = self.smooth[inside].mean(axis=0) - self.v_factor * self.motion.v[inside].mean()
+        self.v_constant = np.abs(constant) / spread
         self._leads = dict[int, Lead]()
         self.as_reference = dict[int, float]()
 

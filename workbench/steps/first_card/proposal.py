@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.errors import BadLog
 from identification.log import RigKind
-from identification.signals.relations import force_law
+from identification.signals.relations import derivative, force_law
 from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
@@ -21,12 +21,22 @@ from workbench.steps.first_card.roles import Roles, told_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
+from workbench.steps.hardly_tells import ALL_FOLLOWED
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
     r"(g|k)_?(tau|t|a|f|m)$|(force|torque|motor|thrust)[ _]?(const|gain)|kraftkonst", re.I
 )
+DRIVEN_BY = {
+    "electro-pneumatic": "F_e from two pressures",
+    "force": "F_e is logged",
+    "motor": "F_e = force_per_command * u",
+    "velocity": "the velocity follows u",
+}
+VALVES = ("valve", "ventil", "valvola", "válvula", "vanne", "バルブ", "弁")
 MOST_EXTRA = 6  # columns that are offered as what the rest may depend on
+SAID_SO = 2.0  # log-odds of a command by its header, from which it is no force rather
+COLUMN_OPEN = 1.0  # log-odds of a column, below which another one is likelier than another unit
 AT_LIMIT = 3  # samples in a row at its largest value, of a command that is limited
 LEVELS_OF_COMMAND = 10  # values that a command takes at least where its limit is looked for
 
@@ -73,8 +83,12 @@ class FileColumn:
 @dataclass(frozen=True)
 class Proposal:
     """What a card should say of a log: signals and rig, columns that are left out (shown: why),
-    every column of the file, what else was noticed, the axes that the file holds, and what else
-    was measured (name: column)."""
+    every column of the file, what else was noticed, the axes that the file holds and the one of the
+    card, what else was measured (name: column), and what it should say of a rig of the next likely
+    kind.
+
+    hardly: what the log will hardly tell; refused: why it cannot be read by the card; both empty
+    until it was tried (`looked_over`)."""
 
     path: Path
     name: str
@@ -87,7 +101,11 @@ class Proposal:
     columns: tuple[FileColumn, ...]
     remarks: tuple[str, ...] = ()
     axes: tuple[str, ...] = ()
+    axis: str = ""
     extra: Mapping[str, str | int] = field(default_factory=dict)
+    other: "Proposal | None" = None
+    hardly: tuple[str, ...] = ()
+    refused: str = ""
 
     def signal(self, name: str) -> SignalGuess | None:
         """The signal of that name; None where the card has none."""
@@ -100,6 +118,8 @@ class Proposal:
             "log": str(self.path),
             "rig": {"kind": self.kind, "motion": self.motion,
                     **{one.key: one.value for one in self.rig}},
+            "sure": {one.key: one.sure for one in self.rig},
+            "else": {one.key: one.rival for one in self.rig if one.rival},
             "signals": {
                 one.name: {"column": one.column, "unit": one.unit, "gain": one.gain,
                            "bits": one.bits, "sure": one.sure, "why": one.why, "else": one.rival}
@@ -107,8 +127,11 @@ class Proposal:
             },
             "file": self.spec.model_dump(exclude_defaults=True),
             "unused": dict(self.unused),
+            "hardly_told": self.hardly,
             "remarks": self.remarks,
+            "refused": self.refused or None,
             "axes": self.axes,
+            "axis": self.axis,
         }  # fmt: skip
 
 
@@ -130,15 +153,58 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
         )
     _refuse_resting(columns, roles)
     _refuse_sign_bits(columns, roles)
+    named = _card_name(name or path.stem)
+    found = _of_roles(columns, roles, named)
+    named_so = roles.kind == "motor" and said(roles.columns["u"], "u") >= SAID_SO
+    if named_so and (share := _velocity_in(roles)) > ALL_FOLLOWED:
+        return _or_velocity(found, roles, share)
+    other = None if roles.other is None else _of_roles(columns, roles.other, named)
+    return replace(found, other=other)
+
+
+def _velocity_in(roles: Roles) -> float:
+    """Share of the command that is the velocity."""
+    y = roles.columns["y"]
+    assert y.motion is not None
+    return derivative(y.motion, roles.columns["u"].x).share
+
+
+def _or_velocity(motor: Proposal, roles: Roles, share: float) -> Proposal:
+    """The proposal for a motor whose command is mostly the velocity, or for a valve and cylinder;
+    the other of the two is what it would be otherwise."""
+    text = roles.columns["u"].header.name.casefold()
+    valve = any(word in text for word in VALVES)
+    why = (
+        f"{share:.0%} of {roles.columns['u'].shown} is the velocity: a valve, or a motor by voltage"
+    )
+
+    def of_kind(of: Proposal, kind: RigKind, rival: RigKind) -> Proposal:
+        rig = [
+            RigGuess("kind", kind, "", False, f"{DRIVEN_BY[kind]}; {why}", rival)
+            if one.key == "kind"
+            else one
+            for one in of.rig
+            if kind == "motor" or one.key != "force_per_command"
+        ]
+        return replace(of, kind=kind, rig=tuple(rig))
+
+    both = of_kind(motor, "motor", "velocity"), of_kind(motor, "velocity", "motor")
+    first, second = both[::-1] if valve else both
+    return replace(first, other=second)
+
+
+def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
+    """The card by these roles."""
+    other = roles.other
     roles, area = _pressure_beside_force(columns, roles)
     motion = told_motion(roles)
     units = guessed_units(columns, roles, motion)
-    rig = [_motion_guess(motion), *_rig(columns, roles, motion.motion)]
+    rig = [_kind_guess(roles, other), _motion_guess(motion), *_rig(columns, roles, motion.motion)]
     if area is not None:
         rig.append(_area_of(area, roles, units))
     return Proposal(
-        path=path,
-        name=_card_name(name or path.stem),
+        path=columns.path,
+        name=name,
         kind=roles.kind,
         motion=motion.motion,
         spec=columns.spec,
@@ -149,8 +215,9 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
             FileColumn(one.raw.number, one.raw.header, one.raw.key, one.shown)
             for one in columns.read
         ),
-        remarks=tuple(remarks_on(columns, roles, units)),
+        remarks=(*columns.notes, *remarks_on(columns, roles, units)),
         axes=columns.axes,
+        axis=roles.columns["y"].axis,
         extra=_extra(columns, roles),
     )
 
@@ -241,6 +308,26 @@ def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGues
     return RigGuess(key, float(f"{area:.3g}"), "m^2", False, why)
 
 
+def _kind_guess(roles: Roles, other: Roles | None) -> RigGuess:
+    """The kind of rig, by what drives the body; the next one with the column that would."""
+    drive = next(iter(_drives(roles)))
+    sure = bool(roles.ahead >= SURE and roles.odds[drive] >= SURE)
+    why = DRIVEN_BY[roles.kind]
+    if not sure and other is not None:
+        why += f", by {drive_columns(roles)}; a {other.kind} rig would be driven by"
+        why += f" {drive_columns(other)}"
+    return RigGuess("kind", roles.kind, "", sure, why, "" if sure or other is None else other.kind)
+
+
+def _drives(roles: Roles) -> tuple[str, ...]:
+    return {"electro-pneumatic": ("p_p", "p_n"), "force": ("F",)}.get(roles.kind, ("u",))
+
+
+def drive_columns(roles: Roles) -> str:
+    """The columns that drive the body, in words."""
+    return " and ".join(roles.columns[name].shown for name in _drives(roles))
+
+
 def _motion_guess(found: MotionGuess) -> RigGuess:
     rival = "" if found.sure else "linear" if found.motion == "rotary" else "rotary"
     return RigGuess("motion", found.motion, "", found.sure, found.why, rival)
@@ -316,9 +403,9 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
 
 
 def _rival(name: str, odds: float, unit: UnitGuess, roles: Roles) -> str:
-    """What a signal would be otherwise: the next column where the column is open, else a unit."""
+    """What a signal would be otherwise: the next column where that is likely, else a unit."""
     other = roles.rivals.get(name)
-    if other is not None and (odds < SURE or not unit.rival):
+    if other is not None and (odds < COLUMN_OPEN or not unit.rival):
         return str(other.raw.key)
     return unit.rival
 
@@ -343,7 +430,9 @@ def _unused(columns: Columns, roles: Roles) -> dict[str, str]:
     for one in columns.signals:
         name = next((name for name, c in roles.columns.items() if c is one), None)
         if one.raw.number not in used:
-            out[one.shown] = roles.why.get(name or "", "no signal that a card needs")
+            of_another = one.axis not in ("", roles.columns["y"].axis)
+            other = f"of the axis {one.axis}" if of_another else "no signal that a card needs"
+            out[one.shown] = roles.why.get(name or "", other)
     shown = {one.raw.number: one.shown for one in columns.read}
     for number, why in columns.left_out.items():
         out[shown[number]] = why

@@ -1,4 +1,4 @@
-"""Registers that count below zero: as two's complement, or with a bit of their own for the sign."""
+"""Registers: counts below zero in two's complement or by a bit of sign, and parts of counts."""
 
 from typing import NamedTuple
 
@@ -11,6 +11,9 @@ FEWEST_BITS = 8  # of a magnitude beside its sign
 BETWEEN_SIGNS = 0.01  # samples at most in the middle of its range
 NEAR_ZERO = 0.1  # of the range on both sides of the jump, at which a sign changes
 SMOOTHER = 0.25  # of the largest step as it stands, that steps are at most once the sign is read
+COUNT_PARTS = 256.0  # of a count that is halved again and again
+LONG_WAY_OF_COUNTS = 1000.0  # that such a position covers at least
+OFF_PART, MOSTLY = 0.05, 0.98  # of a part, that steps of one in single precision are off; of steps
 
 
 class Register(NamedTuple):
@@ -55,3 +58,14 @@ def _sign_and_magnitude(x: Array) -> Register | None:
     if np.nanmedian(size) > NEAR_ZERO * float(np.nanmax(np.abs(read))):
         return None
     return Register(read, None, bit, int(leaps[0]) + 2)
+
+
+def halved_counts(x: Array) -> bool:
+    """Whether steps are counts that a drive interpolates, in parts of a power of two."""
+    if float(np.ptp(x)) < LONG_WAY_OF_COUNTS:
+        return False
+    parts = COUNT_PARTS * np.diff(x)
+    off = np.abs(parts - np.round(parts))
+    decimal = 1000.0 * np.diff(x)  # millimetres, or degrees, to three places have such steps too
+    return bool(np.mean(off < OFF_PART) > MOSTLY and np.mean(
+        np.abs(decimal - np.round(decimal)) < OFF_PART) < MOSTLY)  # fmt: skip

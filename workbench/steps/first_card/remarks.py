@@ -1,5 +1,5 @@
-"""What a first card cannot hold: gaps, delays, axes, doubled names, a clock that a velocity denies,
-and what kind of rig it would be otherwise."""
+"""What a first card cannot hold: gaps, delays, axes, doubled names, a clock that a velocity
+denies."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -35,9 +35,6 @@ def remarks_on(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -
         found = lead(roles.columns["r"].x, roles.columns["y"].x)
         late = found.samples * h * columns.grid
         yield f"the position follows the reference by {1e3 * late:.3g} ms"
-    if roles.rival_kind is not None:
-        kind, column = roles.rival_kind
-        yield f'else a rig of kind "{kind}", driven by column {column.shown}'
 
 
 def _of_clock(columns: Columns, second: float, h: float) -> Iterator[str]:
@@ -61,9 +58,9 @@ def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
             f"{len(columns.axes)} axes in this log: {', '.join(columns.axes)}; {said}, another is"
             " had by --axis NAME"
         )
-    headers = [one.raw.header for one in columns.read if one.raw.header]
-    for name in (name for name, many in Counter(headers).items() if many > 1):
-        places = [str(one.raw.number) for one in columns.read if one.raw.header == name]
+    raw = [one.raw for one in columns.read if one.raw.header and isinstance(one.raw.key, int)]
+    for name in (name for name, many in Counter(one.header for one in raw).items() if many > 1):
+        places = [str(one.number) for one in raw if one.header == name]
         yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: told by number"
 
 

@@ -6,7 +6,7 @@ that are left; the largest sum of log-odds (`weights`) decides.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -14,20 +14,22 @@ from scipy.optimize import linear_sum_assignment
 
 from identification.arrays import Array
 from identification.log import RigKind
-from identification.signals.relations import ForceLaw, actuator_share, force_law
+from identification.signals.relations import TELLS_SIGN, ForceLaw, actuator_share, force_law
 from workbench.steps.first_card.columns import Column
-from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
     LEAST_SCORE,
     LOOKS_LIKE_A_FORCE,
     MIRRORED,
+    RULED_OUT,
     SURE,
     SURELY_TURNED,
     acts,
     ahead_of,
     among_derivatives,
+    drives,
     driving,
     in_one_unit,
     less_way,
@@ -42,7 +44,16 @@ from workbench.steps.first_card.weights import (
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
+FRICTION_TELLS_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
+MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
+WORK_TELLS_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
 COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
+MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
+SAME_POSITION = 0.95  # correlation with the position, that no command has
+MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
+EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
+MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
+CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
 HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
@@ -53,8 +64,8 @@ class Roles:
     """Signals by canonical name, their signs, and how sure each is (log-odds over the next).
 
     law: what of the driving signal is inertia and friction along y; area_ratio: of the chambers;
-    why: reasons by signal; rivals: the next best column of each, where there is one; rival_kind:
-    the next best kind of rig, with the column that would drive it.
+    why: reasons by signal; rivals: the next best column of each, where there is one; ahead: of the
+    kind of rig over the next best one [log-odds], whose roles are `other`.
     """
 
     kind: RigKind
@@ -65,7 +76,8 @@ class Roles:
     law: ForceLaw
     area_ratio: float = 1.0
     rivals: Mapping[str, Column] = field(default_factory=dict)
-    rival_kind: tuple[RigKind, Column] | None = None
+    ahead: float = np.inf
+    other: "Roles | None" = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,6 +103,7 @@ class _Choice:
     others: Mapping[str, Column]
     gains: Mapping[str, float]
     next_best: Mapping[str, Column]
+    behind: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def score(self) -> float:
@@ -111,14 +124,23 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
         return None
     pairs = Pairs(signals)
     behind = limits(pairs)
-    acting = [acts(pairs, k, behind) for k in range(len(signals))]
-    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, acting)]
+    drive = [drives(pairs, k, behind) for k in range(len(signals))]
+    acting = [drives(pairs, k, {}) + acts(pairs, k, behind) for k in range(len(signals))]
+    ways = [way for seen, own in _bodies(pairs, only) for way in _ways(seen, own, drive, acting)]
     if not ways:
         return None
     ways.sort(key=lambda one: -_with_reference(one))
     choices = [_filled(way) for way in ways[:MOST_WAYS]]
     choices.sort(key=lambda one: -one.score)
     best = choices[0]
+    other = _of_another_kind(best, choices)
+    rest = None if other is None else _roles_of(other, [one for one in choices if one is not best])
+    ahead = np.inf if other is None else best.score - other.score
+    return replace(_roles_of(best, choices), other=rest, ahead=ahead)
+
+
+def _roles_of(best: _Choice, choices: Sequence[_Choice]) -> Roles:
+    """The roles by one choice beside the others."""
     return Roles(
         kind=best.way.kind,
         columns=best.columns,
@@ -128,7 +150,6 @@ def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles |
         law=best.way.law,
         area_ratio=best.way.area_ratio,
         rivals=_rivals(best, choices),
-        rival_kind=_rival_kind(best, choices),
     )
 
 
@@ -153,12 +174,21 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
         reverse=True,
     )  # fmt: skip
     likely = [one for one in found if one[0] > found[0][0] - FAR_BEHIND][:MOST_BODIES]
-    return [(Seen(pairs, k), score) for score, k in likely]
+    pairs.bodies = {k: Seen(pairs, k) for _, k in likely}
+    return [(pairs.bodies[k], score) for score, k in likely]
 
 
-def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
-    """What may drive the body: a force, the difference of two pressures, or the command itself."""
+def _ways(
+    seen: Seen, own: float, drive: Sequence[float], acting: Sequence[float]
+) -> Iterator[_Way]:
+    """What may drive the body: a force, the difference of two pressures, or the command itself.
+
+    drive, acting: log-odds of each signal as either, by what it is of the others.
+    """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
+    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_TELLS]
+    # what the velocity follows may well drive a valve, where nothing else is said to drive
+    alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
     for k, law in enumerate(laws):
         one = pairs.signals[k]
         if one is y:
@@ -166,11 +196,11 @@ def _ways(seen: Seen, own: float, acting: Sequence[float]) -> Iterator[_Way]:
         as_force, as_command = said(one, "F"), said(one, "u")
         if max(as_force, as_command) <= -3.0:
             continue
-        physics = driving(law, float(seen.v_share[k]), less_way(y, one)) + together(y, one)
-        physics += own
+        v_share = 0.0 if one is alone else float(seen.v_share[k])
+        physics = driving(law, v_share, less_way(y, one)) + together(y, one) + own
         force = law.way * seen.smooth[:, k]
         if as_force > -3.0:
-            yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics)
+            yield _Way(seen, "force", {"F": one}, law, force, 0.5 + as_force + physics + drive[k])
         if as_command > -3.0:
             score = as_command + physics + of_a_motor(one) + acting[k]
             yield _Way(seen, "motor", {"u": one}, law, force, score)
@@ -223,8 +253,19 @@ def _with_reference(way: _Way) -> float:
     """Log-odds of a way with the likeliest reference of its position beside it."""
     taken = [way.y, *way.columns.values()]
     gains = [_gain_of_reference(way.seen, k) for k, one in enumerate(way.seen.pairs.signals)
-             if one not in taken]  # fmt: skip
+             if one not in taken and not _moves_rather(way, k)]  # fmt: skip
     return way.score + max([0.0, *gains])
+
+
+def _moves_rather(way: _Way, k: int) -> bool:
+    """Whether what drives the body drives another column far more exactly: then that is the
+    position, and the body here a copy of it, late or by a model."""
+    other = way.seen.pairs.bodies.get(k)
+    if other is None or len(way.columns) != 1 or not other.laws:
+        return False
+    (drive,) = way.columns.values()
+    left = 1.0 - other.laws[way.seen.pairs.signals.index(drive)].share
+    return left < min(EXACTLY, MORE_EXACTLY * (1.0 - way.law.share))
 
 
 def _gain_of_reference(seen: Seen, k: int) -> float:
@@ -250,7 +291,7 @@ def _filled(way: _Way) -> _Choice:
     gain = np.array([[_gain(way, k, role, float(moved[k])) for role in roles] for k in rest])
     kept = np.maximum(gain, LEAST_SCORE)
     rows, places = linear_sum_assignment(-kept)
-    others, gains, next_best = {}, {}, {}
+    others, gains, next_best, margins = {}, {}, {}, {}
     for i, j in zip(rows.tolist(), places.tolist(), strict=True):
         if kept[i, j] <= LEAST_SCORE:
             continue
@@ -258,8 +299,9 @@ def _filled(way: _Way) -> _Choice:
         behind = [m for m in np.argsort(-gain[:, j]).tolist() if m != i and gain[m, j] > -3.0]
         if behind:
             next_best[role] = signals[rest[behind[0]]]
+            margins[role] = float(gain[i, j] - gain[behind[0], j])
             gains[role] = float(min(gains[role], 2.0 * (gain[i, j] - gain[behind[0], j]) + 4.0))
-    return _Choice(way, others, gains, next_best)
+    return _Choice(way, others, gains, next_best, margins)
 
 
 def _gain(way: _Way, k: int, role: str, moved: float) -> float:
@@ -270,16 +312,31 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
     seen, one = way.seen, way.seen.pairs.signals[k]
     head = said(one, role) + together(seen.y, one)
     if role == "r":
-        return _gain_of_reference(seen, k)
+        return RULED_OUT if _moves_rather(way, k) else _gain_of_reference(seen, k)
     if role in ("u", "v", "a") and head < -3.0:
         return head
     if role == "v":
-        share = seen.v_share[k]
-        return head + (2.5 if share > ALL_VELOCITY else -0.5 if share > 0.8 else -3.0)
+        share = seen.v_share[k] if seen.v_constant[k] < MOST_CONSTANT else 0.0
+        if share <= ALL_VELOCITY:
+            return head + (-0.5 if share > 0.8 else -3.0)
+        nearer = np.log10((1.0 - ALL_VELOCITY) / max(1.0 - float(share), 1e-9))
+        return head + 2.5 + float(np.clip(nearer, 0.0, MOST_NEARER))
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
-        return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, 4.0))
+        most = MOST_BY_CHANGE if head >= HEADER_TELLS else MOST_UNNAMED
+        if head < HEADER_TELLS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
+            return -3.0  # one more position, of a model or another sensor
+        return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     return head + 1.0 if role == "F" else head - 1.0
+
+
+def _tells_sign(law: ForceLaw) -> bool:
+    """Whether a law tells the sign of a force or command: by its work, or by friction in it."""
+    if abs(law.work) > TELLS_SIGN:
+        return law.share > COMMAND_TELLS_SIGN or abs(law.work) > WORK_TELLS_SIGN
+    onwards = law.friction is None  # one way: along it
+    in_it = law.friction is not None and law.friction > FRICTION_TELLS_SIGN
+    return (onwards or in_it) and law.share > MOSTLY_ITS_LAW
 
 
 def _signs(best: _Choice) -> dict[str, Sign]:
@@ -288,7 +345,7 @@ def _signs(best: _Choice) -> dict[str, Sign]:
     out = dict.fromkeys(best.columns, 1.0)
     if way.kind != "electro-pneumatic":
         (name,) = way.columns
-        out[name] = way.law.way if way.law.share > COMMAND_TELLS_SIGN or name == "F" else 1.0
+        out[name] = way.law.way if _tells_sign(way.law) else 1.0
     if "u" in best.others:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]
@@ -312,6 +369,7 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         ahead = best.score - max(rivals, default=-np.inf)
         own = best.gains.get(role)
         odds = min(ahead, own) if own is not None else ahead
+        odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
         told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_TELLS
         out[role] = odds if told else min(odds, SURE - 1.0)
     return out
@@ -328,12 +386,10 @@ def _rivals(best: _Choice, choices: Sequence[_Choice]) -> dict[str, Column]:
     return out
 
 
-def _rival_kind(best: _Choice, choices: Sequence[_Choice]) -> tuple[RigKind, Column] | None:
+def _of_another_kind(best: _Choice, choices: Sequence[_Choice]) -> _Choice | None:
     """The likeliest choice of another kind of rig with the same position."""
-    for one in choices[1:]:
-        if one.way.kind != best.way.kind and one.way.y is best.way.y:
-            return one.way.kind, next(iter(one.way.columns.values()))
-    return None
+    others = (one for one in choices if one.way.y is best.way.y)
+    return next((one for one in others if one.way.kind != best.way.kind), None)
 
 
 def _reasons(best: _Choice) -> dict[str, str]:

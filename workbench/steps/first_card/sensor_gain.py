@@ -16,6 +16,9 @@ WELL_KNOWN = 0.85  # likeness of position and reference, from which their ratio 
 ROUND_DIGITS = (1.0, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # of gains that sensors have
 ABOUT = 0.05  # that a round gain is off what the log shows
 SLOW_STRETCHES = 24  # of a log, over whose means position and reference are compared
+NEARLY_A_TURN = 0.98  # of a power of two, that counts span which may be a turn
+COUNTS_OF_A_TURN = tuple(2.0**bits for bits in range(10, 25))  # counts that encoders have a turn
+SURELY_A_NUMBER = 2.0  # log-odds of a clock by its name, from which it numbers samples
 SENSOR_OUTPUTS = ("command", "count")
 
 
@@ -45,6 +48,12 @@ def by_reference(
             why = f"by its size beside the reference {r.shown}"
             return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why)
     number, other = (4096.0, 8192.0) if motion == "rotary" else (1000.0, 2000.0)
+    span = 2.0 ** np.ceil(np.log2(max(float(np.ptp(y.numbers)), 1.0)))
+    one_turn = float(np.ptp(y.numbers)) > NEARLY_A_TURN * span
+    if motion == "rotary" and unit == "count" and one_turn and span in COUNTS_OF_A_TURN:
+        rival = f"{number:.9g} {unit}/{per}"
+        return UnitGuess(unit, f"{span:.9g} {unit}/{per}", False,
+                         f"it spans nearly {span:.9g}, a turn it may be", rival)  # fmt: skip
     rival = f"{other:.9g} {unit}/{per}"
     if unit == "V":
         number = _sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0))
@@ -97,9 +106,11 @@ def _sensible(number: float, of_turn: bool = False) -> float:
 
 
 def counts_samples(clock: Column) -> bool:
-    """Whether the clock is the number of a sample."""
+    """Whether the clock is the number of a sample: by its name, or by its name and step."""
     means = clock.header.means
-    return clock.whole and means.get("count", 0.0) > means.get("time", 0.0)
+    called = means.get("count", 0.0) - means.get("time", 0.0)
+    by_ones = float(np.median(np.diff(clock.values))) == 1.0
+    return clock.whole and (called >= SURELY_A_NUMBER or (called > 0.0 and by_ones))
 
 
 def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:

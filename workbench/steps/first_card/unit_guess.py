@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.signals.relations import derivative
 from workbench.steps.first_card.columns import Column, Columns
-from workbench.steps.first_card.motion_guess import MotionGuess, is_current, unit_by_turn
+from workbench.steps.first_card.motion_guess import MotionGuess, is_count, is_current, unit_by_turn
 from workbench.steps.first_card.roles import Roles
 from workbench.steps.first_card.sensor_gain import by_reference, by_sample_number, counts_samples
 from workbench.steps.first_card.sizes import USUAL, UnitGuess, factor, likeliest, metre, near
@@ -25,8 +25,12 @@ SAME_RATE = 0.03  # the same, within which it makes sure of a unit
 SHORTEST_PERIOD = 1e-12  # s; what a clock ticks faster is none
 TELLS_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
 MOST_LOST = 8.0  # log-probability that one disagreement costs
-SURE_OF_CLOCK = 6.0  # log-probability by which a clock's unit is ahead, where others cannot be
 OFF_RATE = 0.05  # relative error from which clock and velocity contradict each other
+TICKS: Mapping[str, tuple[tuple[float, float], ...]] = {  # ticks a second, and what counts so
+    "10000000 1/s": ((1.2e17, 1.6e17), (6.2e17, 6.6e17)),  # 100 ns since 1601, since the year 1
+    "1.1574074074074073e-05 1/s": ((3.5e4, 6e4), (7.2e5, 7.6e5)),  # days since 1900, of MATLAB
+}
+SHORTEST_TICK, LONGEST_DAY = 1.0, 1e-3  # steps of a clock of ticks, and of one of days
 FITS = {"t": "time", "y": "position", "r": "position", "F": "force", "p_p": "pressure",
         "p_n": "pressure", "u": "command", "v": "velocity", "a": "acceleration",
         "temperature": "temperature"}  # fmt: skip
@@ -45,13 +49,17 @@ def guessed_units(columns: Columns, roles: Roles, motion: MotionGuess) -> Units:
         out["y"] = UnitGuess(turn[0], None, True, turn[1])
     if "y" not in out and (counted := by_reference(columns, roles, given, motion.motion)):
         out["y"] = counted
+    if "t" not in out and (ticking := _ticks(columns)):
+        out["t"] = ticking
     if "t" not in out and counts_samples(columns.clock):
         out["t"] = by_sample_number(columns, roles, out)
     out |= _jointly(columns, roles, motion, out)
     if "r" not in out:
         out["r"] = _of_reference(roles, out["y"]) if "r" in found else out["y"]
     for name, column in found.items():
-        if name not in out:
+        if name not in out and name == "u" and _beside_counts(roles):
+            out[name] = _command("A", "beside counts of an encoder mostly a current")
+        elif name not in out:
             out[name] = _alone(name, column, motion)
     return {name: out[name] for name in found}
 
@@ -81,23 +89,35 @@ def _jointly(columns: Columns, roles: Roles, motion: MotionGuess, given: Units) 
         likely = usual + _plausible(columns, roles, motion.machine, names, given)
         scored.append((likely - _disagreement(names, given, slope), names))
     scored.sort(key=lambda one: -one[0])
-    best, names = scored[0]
+    _, names = scored[0]
     out = {}
     for name, unit in names.items():
         if name in given or unit == "":
             continue
         others = [(score, other[name]) for score, other in scored if other[name] != unit]
-        clear = name == "t" and best - max([-np.inf, *(one for one, _ in others)]) > SURE_OF_CLOCK
+        counted = name == "t" and not others  # from 1970 on
         related = _by_relation(name, names, given, slope)
-        why = "by the velocity and the position" if related else "by its size, the header says none"
+        why = "by its size, the header says none"
+        if counted or related:
+            why = "it counts from 1970" if counted else "by the velocity and the position"
         rival = others[0][1] if others else ""
-        out[name] = UnitGuess(unit, None, clear or related, why, rival)
+        out[name] = UnitGuess(unit, None, counted or related, why, rival)
     return out
 
 
 def _open(name: str, given: Mapping[str, UnitGuess]) -> Mapping[str, float]:
     """The one unit that is given, else none."""
     return {given[name].unit: 0.0} if name in given else {}
+
+
+def _ticks(columns: Columns) -> UnitGuess | None:
+    """The rate of a clock that counts ticks or days since an epoch; None where it does not."""
+    first, step = float(columns.clock.values[0]), columns.step
+    for gain, ranges in TICKS.items():
+        fits = step >= SHORTEST_TICK if first > 1e9 else step < LONGEST_DAY
+        if fits and any(low < first < high for low, high in ranges):
+            return UnitGuess("1", gain, True, "it counts from an epoch")
+    return None
 
 
 def _clock_units(clock: Column) -> Mapping[str, float]:
@@ -207,6 +227,12 @@ def _alone(name: str, column: Column, motion: MotionGuess) -> UnitGuess:
         return UnitGuess(unit, None, False, "by its size, the header says none", rival)
     unit = max(USUAL.get(name, {"1": 0.0}).items(), key=lambda one: one[1])[0]
     return UnitGuess(unit, None, False, "the usual one, the header says none")
+
+
+def _beside_counts(roles: Roles) -> bool:
+    """Whether a command of which its header says nothing stands beside counts."""
+    u = roles.columns["u"]
+    return is_count(roles.columns["y"]) and not u.header.means and u.bits is None
 
 
 def _of_command(column: Column) -> UnitGuess:

@@ -14,6 +14,7 @@ from workbench.cards.headers import Quantity
 from workbench.cards.units import conversion
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import Pairs, Seen
+from workbench.steps.first_card.registers import halved_counts
 
 ROLES_OF: Mapping[Quantity, tuple[str, ...]] = {
     "time": (),
@@ -31,10 +32,17 @@ SURE = 3.0  # log-odds from which a role is called sure
 BY_UNIT, AGAINST_UNIT = 4.0, -6.0
 LEAST_SCORE = 0.0  # of a role beside none at all
 AREA_RATIOS = (0.6, 0.8, 1.0, 1.25, 1.67)  # areas of the two chambers that are tried
+USUAL_FRICTION = 0.02  # share of a force that the step at the reversal alone explains
+A_DECADE_OF_FRICTION, LEAST_OF_FRICTION = 1.1, -0.75  # for a force by that share, in all
 LITTLE_FRICTION = 1e-3  # share of a velocity that a step at the reversal explains at most
 NO_FRICTION = 3e-4  # the same, of any signal that is no force
+SURELY_VELOCITY = 0.99  # share of a signal, from which it is the velocity of another
 ALL_VELOCITY = 0.97  # share of a signal, from which it is the velocity and no force
 AS_LIKE = 0.8  # likeness to the position, from which a column of few levels may be its reference
+FOLLOWED_UNNAMED = 0.9  # likeness from which a column of which no word says so may be one
+MAKES_AN_ERROR = 2.0  # for a reference whose difference from the position is logged too
+BEHIND = -6.0  # for a reference that is behind the position, as another sensor or a model is
+ROUGHER = 3.0  # times the position's noise, that a reference hardly has
 SURELY_TURNED = 0.9  # likeness from which a reference has the other sign
 SAME_UNIT = 0.15  # that the slope between reference and position is off a power of ten
 LOOKS_LIKE_A_FORCE = 0.9  # share of a signal that is inertia and friction, the same
@@ -44,6 +52,8 @@ SAME_STEM, OTHER_STEM = 1.5, -3.0  # for a reference that repeats a position's n
 ACTS, BEFORE_LIMIT = 1.5, -4.0  # for a command behind a limiter, and before it
 MOST_COMMANDS = 12  # among which a limiter is looked for
 A_VELOCITY = -12.0  # for a drive that is the velocity alone
+AN_ERROR, OF_A_VELOCITY = -6.0, -3.0  # for a drive that is an error, or another column's velocity
+STEPS_OF_COUNTS = 1.5  # for a position whose steps are parts of an encoder's count
 STEADY = 3.0  # times its spread that the mean of a signal of one sign is, which drives nothing
 RULED_OUT = -9.0
 FLAG_AS_REFERENCE = -3.0  # made good where it goes as far as the position behind it
@@ -51,8 +61,9 @@ AS_FAR = 0.25  # of its range, that a reference of few levels is off the positio
 OF_A_MODEL = -9.0  # for what another model says, beside what is measured
 A_DECADE_ALIKE, MOST_ALIKE = (
     1.5,
-    3.5,
+    4.5,
 )  # a decade by which a reference is nearer to the position
+A_DECADE_LEFT, MOST_LEFT = 2.5, 5.0  # a decade by which less than a tenth of a force is unexplained
 LEAST_ALIKE = 0.3  # correlation of a reference with the position, without any shift
 LEAST_WAY = 0.8  # of the position's way in units of its range, that a force goes at least
 
@@ -70,7 +81,7 @@ def said(one: Column, role: str) -> float:
         total += _by_unit(one, role) * (0.3 if head.doubtful else 1.0)
     total += _by_purpose(one, role)
     if one.bits is not None:
-        total += {"F": -3.0, "u": 1.0}.get(role, 0.0)
+        total += {"F": -6.0, "u": 1.0}.get(role, 0.0)
     if one.flag:
         driven = role == "u" and "command" in head.means
         total += FLAG_AS_REFERENCE if role == "r" else 0.0 if driven else RULED_OUT
@@ -114,18 +125,21 @@ def moves_like_a_body(y: Column) -> float:
     """Log-odds of a position by its own course: a body's velocity is far above its noise."""
     assert y.motion is not None
     v_noise = max(y.motion.v_noise, 1e-300)
-    clear = float(np.std(y.motion.v)) / v_noise
+    clear = float(np.sqrt(np.mean(y.motion.v**2))) / v_noise
     few = len(y.levels) < 20
-    return float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
+    counted = STEPS_OF_COUNTS if not y.header.means and halved_counts(y.numbers) else 0.0
+    return counted + float(np.clip(2.0 * np.log10(clear) - 1.5, -3.0, 2.5)) - (3.0 if few else 0.0)
 
 
 def among_derivatives(pairs: Pairs) -> Array:
     """Log-odds of each column as a position, by what it is the derivative of, and what its own."""
     bodies = [i for i, one in enumerate(pairs.signals) if said(one, "y") > -4.0]
     speeds = [j for j, one in enumerate(pairs.signals) if said(one, "v") > -1.0]
-    of_others = np.max(pairs.rate[bodies], axis=0, initial=0.0)
+    of_others = np.max(pairs.rate_but_constant[bodies], axis=0, initial=0.0)
     own = np.max(pairs.rate[:, speeds], axis=1, initial=0.0)
-    return np.where(of_others > ALL_VELOCITY, -6.0, 0.0) + np.where(own > ALL_VELOCITY, 1.0, 0.0)
+    derived = np.where(of_others > ALL_VELOCITY, -6.0, 0.0)
+    derived += np.where(of_others > SURELY_VELOCITY, -4.0, 0.0)
+    return derived + np.where(own > ALL_VELOCITY, 1.0, 0.0)
 
 
 def in_one_unit(one: Column, other: Column) -> tuple[float, float]:
@@ -153,6 +167,18 @@ def limits(pairs: Pairs) -> dict[int, int]:
     return pairs.behind(sorted(k for _, k in likely))
 
 
+def drives(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
+    """Log-odds of what drives a body by what it is of other signals: no error, no velocity, and
+    not what stands before a limiter (behind: the place of what comes out, for each)."""
+    head = pairs.signals[k].header
+    named = max(head.means.get("force", 0.0), head.means.get("command", 0.0))
+    error = AN_ERROR if k in pairs.errors else 0.0
+    bodies = [i for i, one in enumerate(pairs.signals) if i != k and said(one, "y") > -4.0]
+    rate = float(np.max(pairs.rate[bodies, k], initial=0.0))
+    error += BEFORE_LIMIT if k in behind and named < BY_UNIT / 2 else 0.0
+    return error + (OF_A_VELOCITY if rate > SURELY_VELOCITY and named < BY_UNIT / 2 else 0.0)
+
+
 def acts(pairs: Pairs, k: int, behind: Mapping[int, int]) -> float:
     """Log-odds of a command by its place before or behind a limiter, and of a steady supply."""
     x = pairs.signals[k].x
@@ -177,9 +203,13 @@ def driving(law: ForceLaw, v_share: float, less_way: bool) -> float:
     v_share: of it that is the velocity alone; less_way: whether it goes less than the position.
     """
     score = 6.0 * float(np.clip((law.share - 0.3) / 0.65, -0.7, 1.0)) + 2.0 * abs(law.work)
+    score += float(np.clip(-A_DECADE_LEFT * np.log10(max(1.0 - law.share, 1e-9)) - A_DECADE_LEFT,
+                           0.0, MOST_LEFT))  # fmt: skip
     if law.friction is None:
         return score - 2.0
     score += 1.0 if law.way * law.coulomb > 0.0 else -2.0
+    decades = float(np.log10(max(law.friction, 1e-9) / USUAL_FRICTION))
+    score += float(np.clip(A_DECADE_OF_FRICTION * decades, LEAST_OF_FRICTION, A_DECADE_OF_FRICTION))
     if law.m * law.way < 0.0 and law.share > 0.5:
         score -= 0.5
     if law.friction < LITTLE_FRICTION and v_share > ALL_VELOCITY:
@@ -204,8 +234,9 @@ def ahead_of(seen: Seen, k: int) -> float:
     found = seen.lead(k)
     if found.likeness < 0.6:
         return -3.0
-    score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - found.likeness, 1e-9))), MOST_ALIKE)
-    score += 2.0 if found.samples > 0.3 else (-4.0 if found.samples < -0.3 else 0.0)
+    like = max(found.likeness, _alike_then(y.x, one.x, round(found.samples)))
+    score = min(-A_DECADE_ALIKE * float(np.log10(max(1.0 - like, 1e-9))), MOST_ALIKE)
+    score += 2.0 if found.samples > 0.3 else (BEHIND if found.samples < -0.3 else 0.0)
     if np.max(seen.pairs.rate[:, k]) > ALL_VELOCITY:  # the derivative of whatever
         score -= 4.0
     slope = np.log10(max(float(np.std(y.x)) / max(float(np.std(one.x)), 1e-300), 1e-300))
@@ -213,9 +244,21 @@ def ahead_of(seen: Seen, k: int) -> float:
     if one.flag and found.likeness > AS_LIKE:
         far = float(np.ptp(one.x)) / float(np.diff(np.quantile(y.x, (0.02, 0.98)))[0])
         score -= FLAG_AS_REFERENCE if abs(far - 1.0) < AS_FAR else 0.0
-    calm = one.noise / max(float(np.std(one.x)), 1e-300)
-    score += 1.0 if calm < y.noise / max(float(np.std(y.x)), 1e-300) else -1.0
+    rough = one.noise / max(float(np.std(one.x)), 1e-300)
+    rough /= max(y.noise / max(float(np.std(y.x)), 1e-300), 1e-300)
+    score += 1.0 if rough < 1.0 else -1.0 if rough < ROUGHER else -2.0
+    if like < FOLLOWED_UNNAMED and said(one, "r") < BY_UNIT / 2:
+        score = min(score, 0.0)
+    pair = (min(k, seen.at), max(k, seen.at))
+    if any(pair in of for of in seen.pairs.errors.values()):
+        score += MAKES_AN_ERROR
     return score + _named_for(seen, k)
+
+
+def _alike_then(y: Array, r: Array, ahead: int) -> float:
+    """Correlation of a position with what is ahead of it by so many samples."""
+    late, early = (y[ahead:], r[: len(r) - ahead]) if ahead >= 0 else (y[:ahead], r[-ahead:])
+    return float(np.corrcoef(late, early)[0, 1])
 
 
 def _named_for(seen: Seen, k: int) -> float:

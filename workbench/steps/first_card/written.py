@@ -9,11 +9,6 @@ from workbench.cards.card_text import Line, card_text, toml
 from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
-_RIG_WORDS = {
-    "electro-pneumatic": "F_e from two pressures",
-    "force": "F_e is logged",
-    "motor": "F_e = force_per_command * u",
-}
 LEGEND = (
     '"sure" and "guess" say how far the log itself tells a line; look at each guess before you use',
     "the card. Every key is explained in the manual: The card, key by key.",
@@ -26,7 +21,7 @@ def written(of: Proposal, *, asked: bool = False) -> str:
     head = (f"Written by workbench init from {of.path.name}{by}.", *LEGEND)
     tables: dict[str, Sequence[Line]] = {
         "card": [Line("name", of.name)],
-        "rig": [Line("kind", of.kind, _RIG_WORDS[of.kind]), *map(_rig_line, of.rig)],
+        "rig": [*map(_rig_line, of.rig)],
         "signals": [_signal_line(one) for one in of.signals],
     }
     layout = of.spec.model_dump(exclude_defaults=True)
@@ -58,7 +53,7 @@ def _remark(sure: bool, why: str, rival: str) -> str:
 
 def _tail(of: Proposal) -> list[str]:
     lines = [f"left out: column {shown}: {why}" for shown, why in of.unused.items()]
-    return [*of.remarks, *lines, *_extra(of)]
+    return [*of.hardly, *of.remarks, *lines, *_extra(of)]
 
 
 def _extra(of: Proposal) -> list[str]:

@@ -1,0 +1,153 @@
+"""A first card of files as people have them: their layouts, and names that no word list holds."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.init_people import KINDS, make_file
+from benchmarks.init_real_tables import fewest_wrong, machine
+from benchmarks.init_table_words import KINDS as TABLES
+from identification.arrays import Array
+from workbench.cards.card import load_card
+from workbench.logs.runs import read_runs
+from workbench.page.card_form import OTHER_FIELD, form_of
+from workbench.steps.first_card.answers import BadAnswer, with_rig
+from workbench.steps.first_card.looked_over import looked_over
+from workbench.steps.first_card.proposal import Proposal, proposed
+from workbench.steps.first_card.written import written
+
+T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
+
+
+@pytest.fixture(scope="module")
+def joint() -> dict[str, Array]:
+    """The signals of a joint behind a limited loop, in SI."""
+    return machine(np.random.default_rng(5), T, TABLES["choose"][0])
+
+
+def propose(folder: Path, headers: str, *columns: Array) -> Proposal:
+    rows = (",".join(f"{one:.9g}" for one in row) for row in np.column_stack(columns).tolist())
+    path = folder / "run.csv"
+    path.write_text("\n".join([headers, *rows]), "utf-8")
+    return proposed(path)
+
+
+@pytest.mark.parametrize("seed", range(len(KINDS)), ids=[one.said for one in KINDS])
+def test_a_file_of_each_layout_is_right(tmp_path: Path, seed: int) -> None:
+    table = make_file(100 * len(KINDS) + seed, "choose", tmp_path)
+    assert fewest_wrong(proposed(table.path), table) == {}
+
+
+def test_the_other_kind_is_one_key_away(joint: dict[str, Array], tmp_path: Path) -> None:
+    found = propose(tmp_path, "t,a1,a2", T, joint["y"], joint["F"])
+    kind = next(one for one in found.rig if one.key == "kind")
+    assert not kind.sure and {found.kind, kind.rival} == {"force", "motor"}
+    other = with_rig(found, "kind", "+")
+    assert other.kind == kind.rival
+    assert other.signal("F" if other.kind == "force" else "u") is not None
+    assert with_rig(other, "kind", "+").kind == found.kind
+    with pytest.raises(BadAnswer, match="'steam': "):
+        with_rig(found, "kind", "steam")
+    (tmp_path / "card.toml").write_text(written(other), "utf-8")
+    assert read_runs(tmp_path / "run.csv", load_card(tmp_path / "card.toml")).runs
+
+
+def test_a_command_that_is_the_velocity_may_be_a_valves(tmp_path: Path) -> None:
+    rng = np.random.default_rng(3)
+    u = np.repeat(rng.uniform(-5.0, 5.0, 50), 100)
+    v = np.convolve(0.02 * u, np.exp(-np.arange(60) / 10.0) / 10.5)[: len(T)]
+    y = np.cumsum(v) * 2e-3 + 1e-6 * rng.standard_normal(len(T))
+    found = propose(tmp_path, "time_s,stroke_m,valve_V", T, y, u + 0.2 * np.sign(u))
+    assert found.kind == "velocity"
+    assert with_rig(found, "kind", "+").kind == "motor"
+    named = propose(tmp_path, "time_s,stroke_m,command_V", T, y, u + 0.2 * np.sign(u))
+    assert named.kind == "motor"
+    assert with_rig(named, "kind", "+").kind == "velocity"
+
+
+def test_an_error_drives_nothing_and_names_its_reference(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    """The difference of two columns is an error, whatever it is called."""
+    y = joint["y"] + 1e-5 * np.random.default_rng(1).standard_normal(len(T))
+    found = propose(
+        tmp_path, "t,c1,c2,c3,c4,c5", T, joint["r"] - y, y, joint["target"], joint["F"], joint["r"]
+    )
+    columns = {one.name: one.column for one in found.signals}
+    assert columns["y"] == "c2" and columns["r"] == "c5"
+    assert "c4" in (columns.get("F"), columns.get("u"))
+
+
+def test_what_is_hardly_told_stands_in_the_card(joint: dict[str, Array], tmp_path: Path) -> None:
+    held = joint["y"][(np.arange(len(T)) // 10) * 10]
+    found = looked_over(propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, held, joint["F"]))
+    assert any("the position is renewed at 50 Hz" in one for one in found.hardly)
+    assert "# the position is renewed at 50 Hz" in written(found)
+    assert found.as_json()["hardly_told"] == found.hardly
+    sound = looked_over(
+        propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, joint["y"], joint["F"])
+    )
+    assert sound.hardly == () and sound.refused == ""
+
+
+def test_the_pages_form_takes_the_other_of_a_guess(joint: dict[str, Array], tmp_path: Path) -> None:
+    y = joint["y"] + 1e-4 * np.random.default_rng(1).standard_normal(len(T))
+    found = propose(tmp_path, "t,a1,a2", T, y, joint["F"])
+    form = form_of(found, "run.csv")
+    rival = next(one.rival for one in found.rig if one.key == "kind")
+    assert form.others["kind"][0] == rival
+    after = form.with_fields({**form.fields, OTHER_FIELD: "kind"})
+    assert after["kind"] == rival and "kind" not in after.others
+    drive = {"force": "F", "motor": "u"}
+    assert after[f"column_{drive[rival]}"] == form[f"column_{drive[found.kind]}"]
+    assert after[f"column_{drive[found.kind]}"] == ""
+    turned = form.with_fields({**form.fields, OTHER_FIELD: "motion"})
+    assert turned["motion"] != form["motion"] and turned["unit_y"] != form["unit_y"]
+
+
+def test_a_sign_is_turned_only_where_the_force_tells_it(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    headers = "time [s],angle [rad],torque [Nm]"
+    found = propose(tmp_path, headers, T, joint["y"], -joint["F"])
+    assert found.signal("F").gain == -1.0  # type: ignore[union-attr]
+    swing = 0.9 * np.sin(1.9 * T) + 0.5 * np.sin(4.8 * T + 1.0)
+    noise = 1e-4 * np.random.default_rng(1).standard_normal((2, len(T)))
+    weight = -2.5 * np.sin(swing + noise[0]) + 100.0 * noise[1]
+    found = propose(tmp_path, headers, T, swing + noise[0], weight)
+    assert found.signal("F").gain is None  # type: ignore[union-attr]
+
+
+def test_a_clock_of_ticks_counts_from_its_epoch(joint: dict[str, Array], tmp_path: Path) -> None:
+    ticks = 133_500_000_000_000_000 + np.round(1e7 * T)
+    rows = [
+        f"{int(t)},{y:.9g},{F:.9g}" for t, y, F in zip(ticks, joint["y"], joint["F"], strict=True)
+    ]
+    path = tmp_path / "run.csv"
+    path.write_text("\n".join(["stamp,angle [rad],torque [Nm]", *rows]), "utf-8")
+    t = proposed(path).signal("t")
+    assert t is not None and (t.unit, t.gain, t.sure) == ("1", "10000000 1/s", True)
+
+
+def test_a_row_number_is_no_clock_beside_one(joint: dict[str, Array], tmp_path: Path) -> None:
+    rows = np.arange(float(len(T)))
+    found = propose(tmp_path, ",k0,a1,a2", rows, T, joint["y"], joint["F"])
+    assert found.signal("t").column == "k0"  # type: ignore[union-attr]
+
+
+def test_axes_need_more_than_names_of_their_own(joint: dict[str, Array], tmp_path: Path) -> None:
+    """A position, its reference and its target are no axes, whatever they are called."""
+    found = propose(tmp_path, "t,c1 [rad],c2 [rad],c3 [rad],c4 [Nm]", T, joint["y"], joint["r"],
+                    joint["target"], joint["F"])  # fmt: skip
+    assert found.axes == ()
+    assert {one.name: one.column for one in found.signals}["y"] == "c1 [rad]"
+
+
+def test_a_proposal_keeps_its_other_through_answers(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    found = propose(tmp_path, "t,a1,a2", T, joint["y"], joint["F"])
+    assert replace(found, name="b").other is found.other
+    assert with_rig(found, "kind", "").kind == found.kind

@@ -1,0 +1,61 @@
+"""What a log will hardly tell, said before a fit: of each kind, and of a sound log nothing."""
+
+import numpy as np
+import pytest
+
+from benchmarks.init_real_tables import machine
+from benchmarks.init_table_words import KINDS
+from identification.arrays import Array
+from identification.log import Log, Rig
+from workbench.steps.hardly_tells import hardly_tells
+
+T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
+FORCE = Rig("force", motion="rotary")
+MOTOR = Rig("motor", motion="rotary")
+
+
+def noise(size: float) -> Array:
+    return np.asarray(size * np.random.default_rng(7).standard_normal(len(T)))
+
+
+def said(rig: Rig, t: Array, y: Array, drive: Array) -> str:
+    name = "F" if rig.kind == "force" else "u"
+    return " ".join(hardly_tells([Log("run", {"t": t, "y": y, name: drive})], rig))
+
+
+SWING: Array = 0.9 * np.sin(1.9 * T) + 0.5 * np.sin(4.8 * T + 1.0)
+ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
+
+
+@pytest.mark.parametrize(
+    ("words", "rig", "t", "y", "drive"),
+    [
+        ("hardly anything moves", FORCE, T, noise(1e-5), noise(0.1)),
+        ("slower than 50 Hz", FORCE, 15.0 * T, SWING, np.gradient(SWING, T)),
+        ("motion one way", FORCE, T, ONWARDS + noise(1e-5), np.cos(4.4 * T)),
+        ("coasts:", MOTOR, T, np.cumsum(np.maximum(9.0 - 0.8 * T, 0.4)) * 2e-3, noise(0.02)),
+        ("at one speed", MOTOR, T, 50.0 * T + 0.01 * np.sin(300.0 * T), 0.1 + noise(0.04)),
+        ("by hand it seems", FORCE, T, SWING + noise(1e-5), 2.5 * np.sin(SWING) + noise(0.01)),
+        ("hardly any work", FORCE, T, SWING + noise(1e-5), 0.9 + noise(0.01)),
+        ('kind = "velocity"', MOTOR, T, SWING + noise(1e-5), 3.0 * np.gradient(SWING, T)),
+    ],
+)  # fmt: skip
+def test_what_is_hardly_told_is_said(
+    words: str, rig: Rig, t: Array, y: Array, drive: Array
+) -> None:
+    assert words in said(rig, t, y, drive)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_of_a_sound_log_nothing_is_said(seed: int) -> None:
+    found = machine(np.random.default_rng(seed), T, KINDS["choose"][0])
+    assert said(FORCE, T, found["y"], found["F"]) == ""
+
+
+def test_nearly_one_way_is_told_by_its_share() -> None:
+    y = np.concatenate([-0.02 * T[:200], -0.02 * T[200] + 0.3 * (T[200:] - T[200])])
+    assert "nearly one way (9" in said(FORCE, T, y + 1e-3 * np.sin(T), np.gradient(y) + noise(1e-6))
+
+
+def test_where_nothing_is_said_no_run_is_needed() -> None:
+    assert hardly_tells([], FORCE) == ()

@@ -1,0 +1,178 @@
+"""Text in which tables stand one below the other: a block for each variable of a PLC's trace.
+
+Above each block a tool writes its variable: as "key;value", "key=value", in a row of names, or as a
+line by itself. What differs from block to block is the name.
+"""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from identification.errors import BadLog
+from identification.signals.check import SHORTEST_LOG
+from workbench.logs.table import RawColumn, Table
+
+FEWEST_BLOCKS = 2
+UNIT_KEYS = ("unit", "units", "einheit", "unité", "単位")  # of a line that gives a block's unit
+PAIR = 2  # columns of a block of one variable: its clock, and its values
+MOST_WORDS = 1000  # lines that begin with a letter, among which one is looked for that is no row
+MOST_LETTERS = 100_000_000  # of a text that is looked through line by line
+_NUMBER = re.compile(r"[+-]?(\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf", re.I)
+_TEXT_LINE = re.compile(r"\n[ \t]*[\[\"]?[^\W\d_]")
+_NO_TEXT = re.compile(r"(nan|inf|infinity|eof)\b", re.I)  # what a row of numbers may begin with
+_MARKS = (";", "\t", ",", " ", "|")
+_KEY = re.compile(r"^\s*([^=:;\t,]{1,40}?)\s*[=:;\t,]\s*(.+?)\s*$")
+_COUNTED = re.compile(r"\d+([.,]\d+)?")  # values that differ by chance: numbers of samples
+
+
+@dataclass(frozen=True)
+class Block:
+    """A block: the lines above it, its first row from 0, its rows, and the sign between fields."""
+
+    above: tuple[str, ...]
+    first: int
+    rows: tuple[str, ...]
+    mark: str
+
+    @property
+    def width(self) -> int:
+        return len(_fields(self.rows[0], self.mark))
+
+
+def blocks_of(text: str) -> list[Block]:
+    """The blocks of a text, none where it is one table or no table at all."""
+    if len(text) > MOST_LETTERS or not _may_have_blocks(text):
+        return []
+    lines = text.splitlines()
+    mark = _mark(lines)
+    found, above, rows, first = list[Block](), list[str](), list[str](), 0
+
+    def close() -> None:
+        nonlocal above, rows
+        if len(rows) >= SHORTEST_LOG:
+            found.append(Block(tuple(above), first, tuple(rows), mark))
+            above, rows = [], []
+        elif rows:
+            above, rows = [*above, *rows], []
+
+    for number, line in enumerate(lines):
+        if _is_row(line, mark):
+            first = first if rows else number
+            rows.append(line)
+        elif line.strip():
+            close()
+            above.append(line)
+    close()
+    return found if len(found) >= FEWEST_BLOCKS else []
+
+
+def block_table(path: Path, blocks: Sequence[Block], decimal: str) -> Table:
+    """The columns of the blocks, a group each: its clock, and its variables.
+
+    Raises BadLog where the blocks are of the same names: then they are runs, not variables.
+    """
+    called = [_own_names(blocks, k) for k in range(len(blocks))]
+    wide = any(one.width > PAIR for one in blocks)
+    if len(set(called)) < len(called) or (wide and len({tuple(_heads(x)) for x in blocks}) == 1):
+        raise BadLog(
+            f"{path}: holds {len(blocks)} tables one below the other, of the same columns (rows"
+            f" again from line {blocks[1].first + 1}): several runs, it seems; give each a file"
+        )
+    names, groups, clocks, places = (
+        list[str](),
+        list[str](),
+        dict[str, int](),
+        list[tuple[int, int]](),
+    )
+    for k, (block, own) in enumerate(zip(blocks, called, strict=True)):
+        group = own if own not in groups else f"{own} {k + 1}"
+        heads = _heads(block)
+        clocks[group] = len(names)
+        for column in range(block.width):
+            plain = own if block.width == PAIR else heads[column] if heads else f"{own} {column}"
+            plain += _unit(block) if block.width == PAIR else ""
+            names.append((heads[0] if heads else "time") if column == 0 else plain)
+            groups.append(group)
+            places.append((k, column))
+
+    def fetch(number: int) -> RawColumn:
+        k, column = places[number]
+        one = blocks[k]
+        cells = (_fields(row, one.mark)[column] for row in one.rows)
+        return np.array([float(cell.replace(decimal, ".")) if cell else np.nan for cell in cells])
+
+    return Table(tuple(names), fetch, blocks[0].first + 1, True, tuple(groups), clocks)
+
+
+def decimal_of(blocks: Sequence[Block]) -> str:
+    """The decimal sign of the rows."""
+    row = blocks[0].rows[len(blocks[0].rows) // 2]
+    return "," if "," in row and blocks[0].mark != "," else "."
+
+
+def _may_have_blocks(text: str) -> bool:
+    """Whether a line that is no row stands below rows of numbers; at little cost for long files."""
+    begin = re.search(r"^\s*[+-]?[\d.]+[^\n]*\n\s*[+-]?[\d.]+[^\n]*\n", text, re.M)
+    if begin is None:
+        return False
+    lines = islice(_TEXT_LINE.finditer(text, begin.end() - 1), MOST_WORDS)
+    return any(not _NO_TEXT.match(text, one.end() - 1) for one in lines)
+
+
+def _mark(lines: Sequence[str]) -> str:
+    """The sign between fields by which most lines are rows of two numbers or more."""
+    part = lines[: 40 * SHORTEST_LOG : max(1, len(lines) // 400)]
+    return max(_MARKS, key=lambda mark: sum(_is_row(line, mark) for line in part))
+
+
+def _fields(line: str, mark: str) -> list[str]:
+    parts = line.split() if mark == " " else line.rstrip("\r\n").split(mark)
+    return [one.strip() for one in parts]
+
+
+def _is_row(line: str, mark: str) -> bool:
+    fields = _fields(line, mark)
+    full = [one for one in fields if one]
+    return len(full) > 1 and all(map(_NUMBER.fullmatch, full))
+
+
+def _heads(block: Block) -> list[str]:
+    """The names in the row right above a block, none where it is no row of names."""
+    last = _fields(block.above[-1], block.mark) if block.above else []
+    return last if len(last) == block.width and all(last) else []
+
+
+def _own_names(blocks: Sequence[Block], k: int) -> str:
+    """What the lines above a block say that those above the others do not."""
+    own = _keyed(blocks[k])
+    others = [_keyed(one) for j, one in enumerate(blocks) if j != k]
+    for key, value in own.items():
+        if key.lower() in UNIT_KEYS:
+            continue
+        if not _COUNTED.fullmatch(value) and all(
+            other.get(key, value) != value for other in others
+        ):
+            return value
+    heads = _heads(blocks[k])
+    if heads and all(_heads(one) != heads for j, one in enumerate(blocks) if j != k):
+        return heads[-1]
+    plain = [line.strip().strip("[]#; ") for line in blocks[k].above]
+    elsewhere = {line.strip().strip("[]#; ") for j, one in enumerate(blocks) if j != k
+                 for line in one.above}  # fmt: skip
+    return next((line for line in plain[::-1] if line and line not in elsewhere), "")
+
+
+def _unit(block: Block) -> str:
+    """The unit that a line above a block gives, in brackets."""
+    found = next((value for key, value in _keyed(block).items() if key.lower() in UNIT_KEYS), "")
+    return f" [{found.strip('[]()')}]" if found else ""
+
+
+def _keyed(block: Block) -> dict[str, str]:
+    """The lines "key;value" or "key=value" above a block."""
+    found = (_KEY.match(line.strip().strip("#")) for line in block.above)
+    return {one[1]: one[2].strip("\"'") for one in found if one}

@@ -1,0 +1,130 @@
+"""Tables within tables, as JSON and MATLAB's structs hold them, as vectors by their path."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from workbench.logs.table import RawColumn
+
+LABELS = ("name", "label", "signalname", "title")  # keys of what a table within a list is called
+WIDEST_ARRAY = 32  # of an array of numbers that become columns; above, it is an image
+DEEPEST = 6  # tables in each other
+SINGLE_VALUES = (bool, int, float, str, type(None))
+
+
+def vectors_of(tree: Any) -> dict[str, RawColumn]:
+    """The vectors and single values of a tree of tables, lists and arrays, by their path.
+
+    An entry of a list of tables goes by its own name where it has one: "label" beside "values".
+    """
+    out: dict[str, RawColumn] = {}
+    for path, values in _leaves("", tree, 0):
+        name = path if path not in out else f"{path}_{len(out)}"
+        out[name] = values
+    return out
+
+
+def plain_tree(value: Any) -> Any:
+    """MATLAB's structs, as scipy reads them, as dicts and lists."""
+    if hasattr(value, "_fieldnames"):
+        return {name: plain_tree(getattr(value, name)) for name in value._fieldnames}
+    if isinstance(value, np.ndarray) and value.dtype == object:
+        return [plain_tree(one) for one in value.ravel()]
+    return value
+
+
+def entry(tree: Any, key: str) -> Any:
+    """What a table holds by that key, a list by that number; raises LookupError."""
+    if isinstance(tree, Mapping):
+        return tree[key]
+    if isinstance(tree, list) and key.isdigit():
+        return tree[int(key)]
+    raise LookupError(key)
+
+
+def records_of(rows: Sequence[Any]) -> dict[str, RawColumn]:
+    """A column for each number in tables of one kind, a row each, by its path in them."""
+    return dict(_records("", rows))
+
+
+def _leaves(path: str, value: Any, depth: int) -> Iterator[tuple[str, RawColumn]]:
+    if depth > DEEPEST:
+        return
+    if isinstance(value, Mapping):
+        own = [
+            leaf
+            for key, inner in value.items()
+            for leaf in _leaves(f"{path}.{key}" if path else str(key), inner, depth + 1)
+        ]
+        long = [x for _, x in own if x.size > 1]
+        if path and (name := _label(value)) and len(long) == 1:
+            own = [(name, long[0])]
+        yield from own
+    elif isinstance(value, list) and value and all(isinstance(one, Mapping) for one in value):
+        yield from _entries(path, value, depth)
+    elif isinstance(value, SINGLE_VALUES):
+        yield path, np.atleast_1d(np.asarray(value))
+    else:
+        yield from _array(path, value)
+
+
+def _entries(
+    path: str, entries: Sequence[Mapping[str, Any]], depth: int
+) -> Iterator[tuple[str, RawColumn]]:
+    """Tables of a list: rows, where each holds single values, else one after the other."""
+    if len(entries) > WIDEST_ARRAY:
+        yield from _records(path, entries)
+        return
+    for k, one in enumerate(entries):
+        own = list(_leaves("", one, depth + 1))
+        long = [(key, x) for key, x in own if x.size > 1]
+        name = _label(one) or f"{path}[{k}]"
+        for key, x in long if len(long) == 1 else own:
+            yield (name if len(long) == 1 else f"{name}.{key}"), x
+
+
+def _records(path: str, rows: Sequence[Any]) -> Iterator[tuple[str, RawColumn]]:
+    """A column for each number in the tables of a list, one row each."""
+    flat = [dict(_numbers("", row, 0)) if isinstance(row, Mapping) else {} for row in rows]
+    for key in flat[0]:
+        whole = f"{path}.{key}" if path else key
+        yield whole, np.asarray([row.get(key) for row in flat])
+
+
+def _numbers(path: str, value: Any, depth: int) -> Iterator[tuple[str, Any]]:
+    """The single values below one row, by their path."""
+    if isinstance(value, Mapping) and depth < DEEPEST:
+        for key, inner in value.items():
+            yield from _numbers(f"{path}.{key}" if path else str(key), inner, depth + 1)
+    elif isinstance(value, list) and len(value) <= WIDEST_ARRAY and depth < DEEPEST:
+        for k, inner in enumerate(value):
+            yield from _numbers(f"{path}[{k}]", inner, depth + 1)
+    elif isinstance(value, SINGLE_VALUES):
+        yield path, value
+
+
+def _label(one: Mapping[str, Any]) -> str:
+    """What a table calls itself, else nothing."""
+    found = (v for key, v in one.items() if key.lower() in LABELS and isinstance(v, str) and v)
+    return next(found, "")
+
+
+def _array(path: str, value: Any) -> Iterator[tuple[str, RawColumn]]:
+    """A vector, or the columns of an array that has few."""
+    if isinstance(value, list) and (ragged := _ragged(value)):
+        if ragged == "tables":
+            return
+        value = [one for one in value if not isinstance(one, list)]
+    x = np.atleast_1d(np.squeeze(np.asarray(value)))
+    if x.ndim == 1:
+        yield path, x
+    elif x.ndim == 2 and min(x.shape) <= WIDEST_ARRAY:
+        for k, one in enumerate(x if x.shape[0] < x.shape[1] else x.T):
+            yield f"{path}[{k}]", one
+
+
+def _ragged(value: list[Any]) -> str:
+    """Whether a list is no array: "tables" where its lists differ in length."""
+    lengths = {len(one) if isinstance(one, list) else -1 for one in value}
+    return "tables" if len(lengths) > 1 else ""

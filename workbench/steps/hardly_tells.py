@@ -1,0 +1,156 @@
+"""What the motion in a log will hardly let any fit tell, said before one is made.
+
+Quick, and of the motion and the work alone: `init` says it with the first card, doctor with the
+rest of what it sees.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.errors import BadLog
+from identification.estimation.fit import ONE_WAY_WHY
+from identification.estimation.imposed_motion import is_one_way
+from identification.log import Log, Rig
+from identification.signals.check import work_share
+from identification.signals.differentiate import Motion, differentiate, low_pass
+from identification.signals.relations import FEWEST_MOVING, derivative, moving
+
+TELLING_RATE = 50.0  # Hz, below which starts and stops lie between two samples
+NEARLY_ONE_WAY = 0.05  # of the motion, that goes the other way at most
+NO_WORK = 0.03  # of the work that a force exchanges with a body, that it does on the whole at least
+ALL_OF_PLACE = 0.97  # of a force, that place explains where it only bears a weight or a spring
+NO_FRICTION_IN_IT = 0.03  # of such a force's spread, that friction is at most
+ALL_FOLLOWED = 0.8  # of a command, that is the velocity
+KEPT_SPEED = 0.7  # of its speed at first, that a body which slows down keeps at most
+GOES_WITH_NEITHER = 0.3  # correlation with velocity and acceleration, of a drive that is idle
+ENDS = 0.1  # of the motion, over which its first and last speed are taken
+
+
+@dataclass(frozen=True, eq=False)
+class _Moved:
+    """A run: its motion, the samples in which it surely moves, and what is logged of its drive."""
+
+    motion: Motion
+    sure: BoolArray
+    y: Array
+    drive: Array | None
+    name: str
+
+
+def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
+    """A line for each thing that the runs will hardly tell; nothing where there is no run."""
+    if not runs:
+        return ()
+    log = max(runs, key=len)
+    return tuple([*_of_rate(log), *_of_motion(log, rig)])
+
+
+def _of_rate(log: Log) -> Iterator[str]:
+    rate = 1.0 / log.h
+    if rate < 0.999 * TELLING_RATE:
+        yield (
+            f"sampled at {rate:.3g} Hz, slower than {TELLING_RATE:g} Hz: starts and stops lie"
+            " between two samples, so bands and breakaway forces will hardly be told; log faster"
+        )
+
+
+def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
+    try:
+        found = _moved(log, rig)
+    except BadLog:
+        return
+    count = int(np.sum(found.sure))
+    if count < FEWEST_MOVING:
+        yield (
+            f"hardly anything moves: {count} of {len(log)} samples are surely in motion, which"
+            " tells no friction; log a run with strokes in both directions"
+        )
+        return
+    up = float(np.mean(found.motion.v[found.sure] > 0.0))
+    one_way = min(up, 1.0 - up) < NEARLY_ONE_WAY
+    if one_way:
+        yield _said_of_one_way(up)
+    if found.drive is None:
+        return
+    drive = low_pass(found.drive, log.h, found.motion.cutoff)[found.sure]
+    if one_way and _is_idle(found, drive):
+        yield _said_of_coasting(found)
+        return
+    work = None if one_way else work_share(found.y, found.drive)
+    if _bears_place_alone(found, drive, rotary=rig.motion == "rotary"):
+        yield (
+            f"the {found.name} goes with the place alone, as a weight's or a spring's, and takes no"
+            " part in the motion: something else moves the body, by hand it seems; then no friction"
+            " is told; log a run in which the machine moves itself"
+        )
+    elif work is not None and work < NO_WORK:
+        yield (
+            f"the {found.name} does hardly any work on the body in all ({work:.0%} of what the two"
+            " exchange): no friction takes it up, or something else moves the body, by hand or by a"
+            " load; friction will hardly be told"
+        )
+        return
+    if (
+        rig.kind == "motor"
+        and (share := derivative(found.motion, found.drive).share) > ALL_FOLLOWED
+    ):
+        yield (
+            f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
+            ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'
+        )
+
+
+def _said_of_one_way(up: float) -> str:
+    side = "+" if up > 0.5 else "-"
+    share = max(up, 1.0 - up)
+    if is_one_way(up):
+        return f"{ONE_WAY_WHY} ({share:.0%} of it goes towards {side}); log both ways"
+    return (
+        f"motion nearly one way ({share:.0%} of it goes towards {side}): the little that goes back"
+        " will hardly tell friction from a constant force; log both ways"
+    )
+
+
+def _said_of_coasting(found: _Moved) -> str:
+    speed = np.abs(found.motion.v[found.sure])
+    few = max(2, int(ENDS * len(speed)))
+    slower = speed[-few:].mean() < KEPT_SPEED * speed[:few].mean()
+    how = "coasts" if slower else "coasts or is carried on at one speed"
+    return (
+        f"the body {how}: the {found.name} goes with neither its speed nor the change of it, so"
+        " what force moves it is not told; log a run that is driven"
+    )
+
+
+def _moved(log: Log, rig: Rig) -> _Moved:
+    motion = differentiate(log["y"], log.h)
+    name = "u" if rig.kind in ("motor", "velocity") and "u" in log else "F"
+    drive = log.signals.get(name)
+    words = {"u": "command", "F": "force"}[name]
+    return _Moved(motion, moving(motion), log["y"], drive, words)
+
+
+def _is_idle(found: _Moved, drive: Array) -> bool:
+    """Whether the drive goes with neither the body's speed nor its change."""
+    if np.ptp(drive) == 0.0:
+        return True
+    v, a = found.motion.v[found.sure], found.motion.a[found.sure]
+    return all(abs(float(np.corrcoef(drive, x)[0, 1])) < GOES_WITH_NEITHER for x in (v, a))
+
+
+def _bears_place_alone(found: _Moved, drive: Array, *, rotary: bool) -> bool:
+    """Whether the drive is a weight's or a spring's force at each place, and none of friction."""
+    y, v, a = found.y[found.sure], found.motion.v[found.sure], found.motion.a[found.sure]
+    spread = float(np.std(drive))
+    if spread == 0.0:
+        return False
+    one = np.ones(len(y))
+    place = np.column_stack([one, np.sin(y), np.cos(y)] if rotary else [one, y])
+    left = drive - place @ np.linalg.lstsq(place, drive, rcond=None)[0]
+    X = np.column_stack([np.sign(v), v / np.std(v), a / np.std(a), place])
+    friction = float(np.linalg.lstsq(X, drive, rcond=None)[0][0])
+    of_place = 1.0 - float(np.var(left)) / spread**2
+    return of_place > ALL_OF_PLACE and friction < NO_FRICTION_IN_IT * spread
