@@ -34,6 +34,7 @@ COMMANDS = {
     "identify": "Find friction, plant and actuator of a machine from its logs.",
     "trace": "Find the physical effect that the model of a machine lacks.",
     "drift": "Test whether a machine has changed since its model.",
+    "response": "Show the machine over frequency: Bode, resonances, margins.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "experiment": "Find the run to make next: the reference that tells most.",

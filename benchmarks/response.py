@@ -1,0 +1,168 @@
+"""Frequency responses from logs in closed loop, of machines with friction, beside the truth.
+
+    python benchmarks/response.py [--first 100] [--machines 20] [--rigid 20] [--seconds 60]
+        [--friction identified|known|left]
+
+Every seed draws a machine with a load behind a spring and one without (`response_rig`, a simulator
+of its own), and 60 s at 2 kHz of moves, in two of three with a small multisine on the reference,
+noise on position and force, an encoder on some. `response` is asked for the plant, as its command
+does it; friction: by a model identified from the same log, by the true parameters, or left in.
+Told are: of the points whose coherence is above 0.8, how many lie within 1 dB and 5 degrees of the
+truth, and how many within the 95 % bands; resonances and anti-resonances that the points reach, how
+many are found within 2 %; those that are invented; seconds. Seeds below 100 served to choose.
+"""
+
+import argparse
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from benchmarks.response_rig import Machine, machine, record
+
+import workbench as wb
+from identification.frequency.estimate import SURE, Response
+from identification.frequency.modes import Peak
+from workbench.documents.model import Model
+from workbench.steps.response import Responded
+
+NEAR_DB, NEAR_DEG, NEAR_PEAK = 1.0, 5.0, 0.02
+RIG = {"kind": "motor", "force_per_command": "1 N/V"}
+SIGNALS = {"t": "t", "r": "r", "y": "y", "u": ("u", "V")}
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Points that count, those near the truth, those within the band; peaks within reach, found,
+    invented; seconds."""
+
+    points: int
+    near: int
+    inside: int
+    reached: int
+    found: int
+    invented: int
+    seconds: float
+    identified: float
+    top: float
+
+
+def judged(one: Machine, seed: int, seconds: float, friction: str) -> Judged:
+    """A machine's log, its response, and how far that is from the truth."""
+    rec = record(one, seed, seconds)
+    frame = pd.DataFrame({"t": rec.h * np.arange(len(rec.r)), "r": rec.r, "y": rec.y, "u": rec.u})
+    begun = time.perf_counter()
+    model = None if friction == "left" else wb.identify(frame, rig=RIG, signals=SIGNALS).model
+    if friction == "known":
+        assert model is not None
+        model = with_truth(model, one)
+    middle = time.perf_counter()
+    found = wb.response(
+        frame, rig=RIG, signals=SIGNALS, model=model, friction_left_in=friction == "left"
+    ).found
+    ended = time.perf_counter()
+    points, near, inside = of_points(found.found.position, one)
+    reached, hit, invented = of_peaks(found, one)
+    sure = found.found.body.seen & (found.found.body.coherence > SURE)
+    top = float(np.max(found.found.f[sure], initial=0.0))
+    return Judged(
+        points, near, inside, reached, hit, invented, ended - middle, middle - begun, top
+    )  # fmt: skip
+
+
+def with_truth(model: Model, one: Machine) -> Model:
+    """The model with the machine's own friction and mass, without a second mass."""
+    from dataclasses import replace
+
+    from identification.model.estimates import Estimate
+
+    own = {"m": one.mass, "F_cp": one.F_cp, "F_cn": one.F_cn, "F_vp": one.F_vp, "F_vn": one.F_vn}
+    friction = {
+        name: Estimate(own[name], e.unit) if name in own else e
+        for name, e in model.friction.items()
+    }
+    return replace(model, friction=friction, resonance=None, effects={}, lag=None)
+
+
+def of_points(plant: Response, one: Machine) -> tuple[int, int, int]:
+    """Points of a coherence above 0.8: all, near the truth, within the band."""
+    sure = plant.seen & (plant.coherence > SURE)
+    off = plant.H[sure] / one.truth(plant.f[sure])
+    near = (np.abs(20.0 * np.log10(np.abs(off))) < NEAR_DB) & (
+        np.abs(np.degrees(np.angle(off))) < NEAR_DEG
+    )
+    half = plant.half_band[sure]
+    inside = np.abs(np.abs(off) - 1.0) < half
+    return int(sure.sum()), int(near.sum()), int(inside.sum())
+
+
+def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int]:
+    """Peaks of the machine that the seen points have on both sides, found within 2 %, invented."""
+    body = found.found.body
+    seen = body.f[body.seen]
+    true = {"resonance": one.resonance, "anti-resonance": one.anti_resonance}
+    reached = hit = 0
+    left = list(found.peaks)
+    for kind, f in true.items():
+        if f is None:
+            continue
+        around = np.count_nonzero((seen > 0.9 * f) & (seen < f)), np.count_nonzero(
+            (seen > f) & (seen < 1.1 * f)
+        )
+        reached += min(around) >= 3
+        near = [p for p in left if p.kind == kind and abs(p.frequency.value / f - 1.0) < NEAR_PEAK]
+        hit += bool(near) and min(around) >= 3
+        for p in near[:1]:
+            left.remove(p)
+    return reached, hit, len([p for p in left if not _near_one(p, one)])
+
+
+def _near_one(peak: Peak, one: Machine) -> bool:
+    """Whether a peak is one of the machine's, if badly told (10 %)."""
+    true = {"resonance": one.resonance, "anti-resonance": one.anti_resonance}[peak.kind]
+    return true is not None and abs(peak.frequency.value / true - 1.0) < 0.1
+
+
+def told(name: str, every: Sequence[Judged]) -> str:
+    total = {key: sum(getattr(one, key) for one in every) for key in
+             ("points", "near", "inside", "reached", "found", "invented")}  # fmt: skip
+    shares = [one.near / one.points for one in every if one.points]
+    return (
+        f"{name}: {len(every)} machines, {total['points']} points above {SURE}:"
+        f" {total['near'] / max(total['points'], 1):.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
+        f" (worst machine {min(shares, default=0.0):.1%}),"
+        f" {total['inside'] / max(total['points'], 1):.1%} within the band; peaks in reach"
+        f" {total['reached']}, found within 2 % {total['found']}, invented {total['invented']};"
+        f" {np.median([one.seconds for one in every]):.2f} s each (at most"
+        f" {max(one.seconds for one in every):.2f})"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=100)
+    parser.add_argument("--machines", type=int, default=20)
+    parser.add_argument("--rigid", type=int, default=20)
+    parser.add_argument("--seconds", type=float, default=60.0)
+    parser.add_argument("--friction", choices=("identified", "known", "left"), default="identified")
+    asked = parser.parse_args()
+    for compliant, count in ((True, asked.machines), (False, asked.rigid)):
+        every = []
+        for seed in range(asked.first, asked.first + count):
+            one = machine(seed, compliant)
+            every.append(judged(one, seed, asked.seconds, asked.friction))
+            j = every[-1]
+            print(
+                f"{seed:5d} {'two masses' if compliant else 'one mass':10s} {j.points:5d} points to"
+                f" {j.top:5.0f} Hz, near {j.near / max(j.points, 1):6.1%}, inside"
+                f" {j.inside / max(j.points, 1):6.1%}, peaks {j.found}/{j.reached},"
+                f" invented {j.invented}, {j.identified:.1f} + {j.seconds:.2f} s",
+                flush=True,
+            )
+        if every:
+            print(told("two masses" if compliant else "one mass", every), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,177 @@
+"""Frequency responses from averaged spectra, by least squares in a few neighbouring frequencies.
+
+    out = sum_i H_i x_i + noise,    H_i(f + d) = H_i0 + H_i1 d + H_i2 d^2 for |d| up to `REACH`
+    theta = (X'^H X)^-1 X'^H out,   X' = Z (Z^H Z)^-1 Z^H X,
+
+x_i the inputs, X' what of them follows instruments Z, or X where there are none. With one input and
+the reference r as its instrument H_0 is S_ry / S_ru, which no noise biases that goes round a loop;
+one input alone gives S_uy / S_uu. All sums are of averaged cross spectra. The coherence of an input
+is
+
+    gamma^2 = |H|^2 S_x'x' / (|H|^2 S_x'x' + S_ee),
+
+S_x'x' what of the input follows the instruments and no other input, e what the responses leave. Of
+one input without instrument it is the usual one. Sources: Bendat, Piersol, Random Data, 4th ed.
+(2010), chapters 6, 7 and 9; local polynomials, Pintelon, Schoukens, System Identification, 2nd ed.
+(2012), section 7.2; instruments in closed loop, Soderstrom, Stoica, System Identification (1989),
+chapter 8, and Wellstead, Automatica 17 (1981) 87.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import t as student
+
+from identification.arrays import Array, BoolArray
+from identification.frequency.stretches import INDEPENDENT, REACH, ComplexArray
+
+SEEN = 0.5  # coherence from which a response is drawn
+SURE = 0.8  # coherence from which it is relied on
+FEWEST_AVERAGES = 4.0
+CHANCE = 0.01  # that so much coherence is luck, at most
+DEGREE = 2  # of a response over its neighbours
+WIDE = 1.5  # bins that Hann's window makes one of
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """Sums over stretches of conj(a) b of signals a, b: S (K, m, m) at f [Hz] and `REACH` bins to
+    either side, in the order of `names`; stretches: how many show each, (K,)."""
+
+    f: Array
+    names: tuple[str, ...]
+    S: ComplexArray
+    stretches: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Response:
+    """A frequency response H (k,) at f [Hz], its coherence, and independent averages, (k,) each."""
+
+    f: Array
+    H: ComplexArray
+    coherence: Array
+    averages: Array
+
+    @property
+    def sd(self) -> Array:
+        """Relative standard deviation of the magnitude, and that of the phase [rad], (k,).
+
+        sqrt((1 - gamma^2) / (2 n gamma^2)); Bendat & Piersol, eqs. (9.90) and (9.91).
+        """
+        g = np.clip(self.coherence, 1e-12, 1.0)
+        return np.sqrt((1.0 - g) / (2.0 * np.maximum(self.averages, 1.0) * g))
+
+    @property
+    def half_band(self) -> Array:
+        """Half of the 95 % band, relative to the magnitude, and of the phase [rad], (k,)."""
+        free = np.maximum(2.0 * self.averages - 2.0, 1.0)
+        return np.asarray(student.ppf(0.975, free) * self.sd, dtype=np.float64)
+
+    @property
+    def seen(self) -> BoolArray:
+        """Where the logs show it: enough averages, and more coherence than luck gives, (k,)."""
+        free = np.maximum(self.averages - 1.0, 1e-9)
+        luck = 1.0 - CHANCE ** (1.0 / free)
+        enough = self.averages >= FEWEST_AVERAGES
+        return np.asarray(enough & (self.coherence >= np.maximum(SEEN, luck)))
+
+    def times(self, factor: ComplexArray) -> "Response":
+        """The response in series with one that is known, (k,)."""
+        return replace(self, H=self.H * factor)
+
+
+def responses(
+    spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str] = ()
+) -> list[Response]:
+    """The response of `out` to each of the inputs, by name; see above.
+
+    instruments: at least as many as inputs, or none.
+    """
+    M = _moments(spectra.S)
+    inner = slice(REACH, len(spectra.f) - REACH)
+    at = {name: k for k, name in enumerate(spectra.names)}
+    x, z, y = [at[name] for name in inputs], [at[name] for name in instruments], at[out]
+    XX, Xy = _columns(M, x, x), _columns(M, x, [y])[:, :, :1]
+    yy = np.real(M[0][:, y, y])
+    follows, with_out = XX, Xy
+    if z:
+        ZX, Zy = _columns(M, z, x), _columns(M, z, [y])[:, :, :1]
+        onto = _adjoint(_inverse(_columns(M, z, z)) @ ZX)
+        follows, with_out = onto @ ZX, onto @ Zy
+    inverse = _inverse(follows)
+    theta = inverse @ with_out
+    left = yy - 2.0 * np.real(_inner(theta, Xy)) + np.real(_inner(theta, XX @ theta))
+    step = DEGREE + 1
+    bins = (2 * REACH + 1) / WIDE
+    rows = INDEPENDENT * bins * spectra.stretches[inner]
+    left = np.maximum(left, 0.0) * rows / np.maximum(rows - step * len(x), 1.0)
+    found = []
+    for j in range(len(x)):
+        own = slice(step * j, step * (j + 1))
+        power = np.real(follows[:, step * j, step * j])
+        # What of the input no other one makes, and what is left of its averages by the slopes.
+        alone = _power_alone(inverse, own)
+        value = theta[:, step * j, 0]
+        made = np.abs(value) ** 2 * alone
+        share = 1.0 / np.maximum(np.real(inverse[:, step * j, step * j]) * alone, 1e-300)
+        coherence = made / np.maximum(made + left, 1e-300)
+        shown = np.where(power > 0.0, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
+        found.append(Response(spectra.f[inner], value, coherence, shown))
+    return found
+
+
+def joined(parts: Sequence[Response]) -> Response:
+    """Responses of one band of frequencies after the other as one."""
+    names = ("f", "H", "coherence", "averages")
+    return Response(*(np.concatenate([getattr(one, name) for one in parts]) for name in names))
+
+
+def in_series(one: Response, other: Response) -> Response:
+    """Two responses in series, whose errors have nothing to do with each other."""
+    noise = sum((1.0 - r.coherence) / np.maximum(r.coherence, 1e-12) for r in (one, other))
+    averages = np.minimum(one.averages, other.averages)
+    return Response(one.f, one.H * other.H, 1.0 / (1.0 + noise), averages)
+
+
+def _moments(S: ComplexArray) -> list[ComplexArray]:
+    """Sums of S over the neighbours of each frequency, weighted by their distance to the p."""
+    view = np.lib.stride_tricks.sliding_window_view(S, 2 * REACH + 1, axis=0)
+    d = np.arange(-REACH, REACH + 1) / REACH
+    return [view @ d**p for p in range(2 * DEGREE + 1)]
+
+
+def _columns(M: Sequence[ComplexArray], a: Sequence[int], b: Sequence[int]) -> ComplexArray:
+    """A^H B (k, 3 len(a), 3 len(b)) of signals and their products with the distance and its
+    square."""
+    step = DEGREE + 1
+    out = np.zeros((len(M[0]), step * len(a), step * len(b)), dtype=np.complex128)
+    for i in range(step):
+        for j in range(step):
+            out[:, i::step, j::step] = M[i + j][:, a][:, :, b]
+    return out
+
+
+def _power_alone(inverse: ComplexArray, own: slice) -> Array:
+    """Power of an input that no other makes, (k,): of its whole block of columns."""
+    block = _inverse(inverse[:, own, own])
+    return np.maximum(np.real(block[:, 0, 0]), 0.0)
+
+
+def _inner(a: ComplexArray, b: ComplexArray) -> ComplexArray:
+    """a^H b of columns (k, n, 1), (k,)."""
+    return np.asarray((_adjoint(a) @ b)[:, 0, 0], dtype=np.complex128)
+
+
+def _adjoint(x: ComplexArray) -> ComplexArray:
+    return np.conj(np.swapaxes(x, 1, 2))
+
+
+def _inverse(a: ComplexArray) -> ComplexArray:
+    """Inverse of matrices (k, q, q), each scaled to its diagonal; what has no power gives zeros."""
+    size = np.sqrt(np.maximum(np.real(np.einsum("kii->ki", a)), 0.0))
+    known = size > 0.0
+    unit = np.where(known, 1.0 / np.where(known, size, 1.0), 0.0)
+    whole = np.linalg.pinv(a * unit[:, :, None] * unit[:, None, :], rcond=1e-12)
+    return np.asarray(whole * unit[:, :, None] * unit[:, None, :], dtype=np.complex128)

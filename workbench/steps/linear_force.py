@@ -1,0 +1,121 @@
+"""Log + model -> the force without friction, of which a linear body's motion would come."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.frequency.machine import Recording
+from identification.frequency.modes import Modes
+from identification.log import Log
+from identification.model.inverse_model import SURE_SLIDING
+from identification.model.plant import Plant
+from identification.model.resonance import load_acceleration
+from identification.signals.differentiate import Motion, differentiate
+from workbench.documents.model import Model, used
+from workbench.steps.linear_loop import dead_time
+from workbench.steps.predicted_force import (
+    of_body,
+    opposing_force,
+    refuse_missing,
+    with_motor_force,
+)
+
+LINEAR_EFFECTS = frozenset({"spring", "compliance", "input_delay"})  # they stay in the response
+RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest
+
+# Force that a linear body needs for a velocity (n,) whose acceleration is (n,), every h [s].
+BodyForce = Callable[[Array, Array, float], Array]
+
+
+def plain_recording(log: Log, held: bool) -> Recording:
+    """The log as it stands, its force with all friction in it."""
+    reference = log["r"] if "r" in log else None
+    return Recording(log.h, log["y"], log["F"], log["F"], reference, held)
+
+
+def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> Recording:
+    """The log with its force without friction and what else of the model is not linear.
+
+    Where the body slides, these are taken off. Where it rests friction is whatever holds it, and
+    the force is what the motion needs of a linear body, by default that of the model. Raises BadLog
+    where the log lacks a signal of an effect.
+    """
+    nonlinear = tuple(one for one in model.acting if one.key not in LINEAR_EFFECTS)
+    plant = replace(model.simulated, effects=nonlinear)
+    refuse_missing(log, plant.effects)
+    held = model.rig.kind == "motor"
+    moved = of_body(with_motor_force(log, plant), plant)
+    motion, late = differentiate(moved["y"], log.h), dead_time(model)
+    d = _direction(motion, plant)
+    opposed = opposing_force(moved, plant, motion, d)
+    v = np.where(d != 0, motion.v, 0.0)
+    resting = (body or _body_of(model))(v, _acceleration(v, log.h, held), log.h)
+    slides = d != 0
+    if held:
+        opposed, slides = _over_period(opposed), slides & _following(slides)
+    left = np.where(slides, np.asarray(moved["F"]) - _earlier(opposed, late, log), resting)
+    found = plain_recording(log, held)
+    return replace(found, y=np.asarray(moved["y"]), F=np.asarray(moved["F"]), linear=left)
+
+
+def of_modes(modes: Modes, highest: float) -> BodyForce:
+    """The force by the modes of a measured response, which is taken as it is up to so many Hz."""
+
+    def force(v: Array, _a: Array, h: float) -> Array:
+        n = len(v) + round(RUNG_OUT / h)
+        f = np.fft.rfftfreq(n, h)
+        known = np.clip(f, f[1], highest)
+        impedance = 2j * np.pi * f / modes.undelayed(known)
+        impedance[0] = impedance[1].real
+        return np.asarray(np.fft.irfft(np.fft.rfft(v, n) * impedance, n)[: len(v)])
+
+    return force
+
+
+def _body_of(model: Model) -> BodyForce:
+    """The force by the model's mass and viscous friction, and its second mass, where it has one."""
+    p = model.karnopp
+    viscous = 0.5 * (p.F_vp + p.F_vn)
+
+    def force(v: Array, a: Array, h: float) -> Array:
+        if model.resonance is None:
+            return np.asarray(p.m * a + viscous * v)
+        shape = {name: used(one) for name, one in model.resonance.items()}
+        load = load_acceleration(
+            a, h, shape["frequency"], shape["anti_resonance"], shape["damping"]
+        )
+        return np.asarray(shape["m_1"] * a + shape["m_2"] * load + viscous * v)
+
+    return force
+
+
+def _direction(motion: Motion, plant: Plant) -> Array:
+    """Direction of the motion, 0 where the body rests or its noise leaves it open, (n,)."""
+    least = SURE_SLIDING * motion.v_noise
+    up, down = max(plant.friction.dv_p, least), min(plant.friction.dv_n, -least)
+    return np.where(motion.v > up, 1.0, np.where(motion.v < down, -1.0, 0.0))
+
+
+def _acceleration(v: Array, h: float, held: bool) -> Array:
+    """Acceleration at every sample, or its mean over the period that follows, (n,)."""
+    if not held:
+        return np.asarray(np.gradient(v, h))
+    return np.diff(v, append=v[-1]) / h
+
+
+def _over_period(x: Array) -> Array:
+    """Mean of every sample and the next, (n,)."""
+    return np.asarray(0.5 * (x + np.append(x[1:], x[-1])))
+
+
+def _following(mask: BoolArray) -> BoolArray:
+    """Whether the next sample has it, (n,)."""
+    return np.append(mask[1:], mask[-1])
+
+
+def _earlier(x: Array, late: float, log: Log) -> Array:
+    """What acts on a body that the force reaches so much later, at the force's own times, (n,)."""
+    t = log["t"]
+    return np.interp(t + late, t, x) if late > 0.0 else x
