@@ -1,8 +1,9 @@
 """Frequency responses from averaged spectra, by least squares in a few neighbouring frequencies.
 
-    out = sum_i H_i x_i + noise,    H_i(f + d) = H_i0 + H_i1 d + H_i2 d^2 for |d| up to `REACH`
+    out = sum_i H_i x_i + noise,    H_i(f + d) = H_i0 + H_i1 d + H_i2 d^2 for |d| up to a reach
     theta = (X'^H X)^-1 X'^H out,   X' = Z (Z^H Z)^-1 Z^H X,
 
+The reach is the shortest of `REACHES` bins at which the 95 % band is narrow, else the longest.
 x_i the inputs, X' what of them follows instruments Z, or X where there are none. With one input and
 the reference r as its instrument H_0 is S_ry / S_ru, which no noise biases that goes round a loop;
 one input alone gives S_uy / S_uu. All sums are of averaged cross spectra. The coherence of an input
@@ -19,12 +20,14 @@ chapter 8, and Wellstead, Automatica 17 (1981) 87.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from identification.arrays import Array, BoolArray
-from identification.frequency.stretches import INDEPENDENT, REACH, ComplexArray
+from identification.frequency.stretches import INDEPENDENT, REACHES, ComplexArray
 
 SEEN = 0.5  # coherence from which a response is drawn
 SURE = 0.8  # coherence from which it is relied on
@@ -32,12 +35,13 @@ FEWEST_AVERAGES = 4.0
 CHANCE = 0.01  # that so much coherence is luck, at most
 DEGREE = 2  # of a response over its neighbours
 WIDE = 1.5  # bins that Hann's window makes one of
+NARROW = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
 
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Sums over stretches of conj(a) b of signals a, b: S (K, m, m) at f [Hz] and `REACH` bins to
-    either side, in the order of `names`; stretches: how many show each, (K,)."""
+    """Sums over stretches of conj(a) b of signals a, b: S (K, m, m) at f [Hz], with the longest reach
+    of neighbours to either side, in the order of `names`; stretches: how many show each, (K,)."""
 
     f: Array
     names: tuple[str, ...]
@@ -89,12 +93,30 @@ def responses(
 
     instruments: at least as many as inputs, or none.
     """
-    M = _moments(spectra.S)
-    inner = slice(REACH, len(spectra.f) - REACH)
+    found = _with_reach(spectra, out, inputs, instruments, REACHES[0])
+    for reach in REACHES[1:]:
+        wider = _with_reach(spectra, out, inputs, instruments, reach)
+        found = [_narrower(one, other) for one, other in zip(found, wider, strict=True)]
+    return found
+
+
+def _narrower(one: Response, wider: Response) -> Response:
+    """The response where its band is narrow, else that by more neighbours."""
+    keep = one.half_band <= NARROW
+    names = ("H", "coherence", "averages")
+    return Response(
+        one.f, *(np.where(keep, getattr(one, name), getattr(wider, name)) for name in names)
+    )
+
+
+def _with_reach(
+    spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str], reach: int
+) -> list[Response]:
+    M = _moments(spectra.S, reach)
+    inner = slice(REACHES[-1], len(spectra.f) - REACHES[-1])
     at = {name: k for k, name in enumerate(spectra.names)}
     x, z, y = [at[name] for name in inputs], [at[name] for name in instruments], at[out]
     XX, Xy = _columns(M, x, x), _columns(M, x, [y])[:, :, :1]
-    yy = np.real(M[0][:, y, y])
     follows, with_out = XX, Xy
     if z:
         ZX, Zy = _columns(M, z, x), _columns(M, z, [y])[:, :, :1]
@@ -102,23 +124,22 @@ def responses(
         follows, with_out = onto @ ZX, onto @ Zy
     inverse = _inverse(follows)
     theta = inverse @ with_out
+    yy = np.real(M[0][:, y, y])
     left = yy - 2.0 * np.real(_inner(theta, Xy)) + np.real(_inner(theta, XX @ theta))
     step = DEGREE + 1
-    bins = (2 * REACH + 1) / WIDE
-    rows = INDEPENDENT * bins * spectra.stretches[inner]
+    shown = np.sum(_neighbours(spectra.stretches, reach), axis=-1)
+    rows = INDEPENDENT / WIDE * shown
     left = np.maximum(left, 0.0) * rows / np.maximum(rows - step * len(x), 1.0)
     found = []
     for j in range(len(x)):
         own = slice(step * j, step * (j + 1))
-        power = np.real(follows[:, step * j, step * j])
-        # What of the input no other one makes, and what is left of its averages by the slopes.
-        alone = _power_alone(inverse, own)
-        value = theta[:, step * j, 0]
-        made = np.abs(value) ** 2 * alone
+        # What of the input no other one makes; of its averages the slopes take a share.
+        alone = np.maximum(np.real(_inverse(inverse[:, own, own])[:, 0, 0]), 0.0)
         share = 1.0 / np.maximum(np.real(inverse[:, step * j, step * j]) * alone, 1e-300)
+        made = np.abs(theta[:, step * j, 0]) ** 2 * alone
         coherence = made / np.maximum(made + left, 1e-300)
-        shown = np.where(power > 0.0, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
-        found.append(Response(spectra.f[inner], value, coherence, shown))
+        averages = np.where(alone > 0.0, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
+        found.append(Response(spectra.f[inner], theta[:, step * j, 0], coherence, averages))
     return found
 
 
@@ -135,11 +156,18 @@ def in_series(one: Response, other: Response) -> Response:
     return Response(one.f, one.H * other.H, 1.0 / (1.0 + noise), averages)
 
 
-def _moments(S: ComplexArray) -> list[ComplexArray]:
+def _neighbours(x: NDArray[Any], reach: int) -> NDArray[Any]:
+    """Every value of the first axis that is told, with so many neighbours along a last axis."""
+    cut = REACHES[-1] - reach
+    return np.lib.stride_tricks.sliding_window_view(
+        x[cut : len(x) - cut], 2 * reach + 1, axis=0
+    )  # fmt: skip
+
+
+def _moments(S: ComplexArray, reach: int) -> list[ComplexArray]:
     """Sums of S over the neighbours of each frequency, weighted by their distance to the p."""
-    view = np.lib.stride_tricks.sliding_window_view(S, 2 * REACH + 1, axis=0)
-    d = np.arange(-REACH, REACH + 1) / REACH
-    return [view @ d**p for p in range(2 * DEGREE + 1)]
+    view, d = _neighbours(S, reach), np.arange(-reach, reach + 1) / reach
+    return [np.asarray(view @ d**p) for p in range(2 * DEGREE + 1)]
 
 
 def _columns(M: Sequence[ComplexArray], a: Sequence[int], b: Sequence[int]) -> ComplexArray:
@@ -151,12 +179,6 @@ def _columns(M: Sequence[ComplexArray], a: Sequence[int], b: Sequence[int]) -> C
         for j in range(step):
             out[:, i::step, j::step] = M[i + j][:, a][:, :, b]
     return out
-
-
-def _power_alone(inverse: ComplexArray, own: slice) -> Array:
-    """Power of an input that no other makes, (k,): of its whole block of columns."""
-    block = _inverse(inverse[:, own, own])
-    return np.maximum(np.real(block[:, 0, 0]), 0.0)
 
 
 def _inner(a: ComplexArray, b: ComplexArray) -> ComplexArray:

@@ -103,7 +103,7 @@ def _in_band(runs: Sequence[Recording], band: Band, instrument: bool) -> list[Re
     S, stretches = np.zeros((len(band.f), m, m), dtype=np.complex128), np.zeros(len(band.f))
     for one in runs:
         each = [_coefficients(one, band, name) for name in names]
-        stretches += np.any(each[0] != 0.0, axis=0) * len(each[0])
+        stretches += np.count_nonzero(each[0], axis=0)
         x = np.stack(each, axis=2)
         S += np.einsum("ska,skb->kab", np.conj(x), x)
     spectra = Spectra(band.f, names, S, stretches)

@@ -4,8 +4,8 @@
 
 is acceleration by force: a rigid body with viscous friction, elastic modes, and what modes beyond
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
-projection). Modes are added one by one while each explains far more than luck and stands out. The
-zeros of the sum are the anti-resonances. Sources: modal form, Ewins, Modal Testing, 2nd ed. (2000),
+projection). Modes are added one by one while each explains far more than luck; told are those that
+stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal form, Ewins, Modal Testing, 2nd ed. (2000),
 section 4.4; variable projection, Golub, Pereyra, SIAM J. Numer. Anal. 10 (1973) 413.
 """
 
@@ -30,8 +30,10 @@ GAINS = 60.0  # chi-square that a mode explains at least, in units of what is le
 OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
 STANDS_OUT = 0.25  # of the response without it, that a mode adds at its frequency
 MOST_DAMPING = 0.3  # of what is called a resonance
-WITHIN = 1.05  # times the lowest frequency seen, from which (and the highest over it)
-SURE_OF_MODE = 4.0  # times its deviation, that a mode's frequency and damping are at least
+AROUND = 0.1  # of its frequency, within which points on either side show a peak
+POINTS_AROUND = 3  # that many, on either side
+MOSTLY_SEEN = 0.5  # of the frequencies there
+BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
 LONGEST_LAG = 0.05  # s
 
@@ -77,7 +79,7 @@ def fit_modes(response: Response) -> Modes | None:
         return None
     f, H = response.f[use], response.H[use]
     weight = 1.0 / (np.abs(H) * np.hypot(response.sd[use], STRUCTURE_ERROR))
-    data = _Data(f, H, weight)
+    data = _Data(response.f, f, H, weight)
     best = _best(data, [np.array([0.0, np.log(2.0 * np.pi * f[0])])])
     while (len(best) - 2) // 2 < MOST_MODES:
         more = _one_more(data, best)
@@ -89,6 +91,9 @@ def fit_modes(response: Response) -> Modes | None:
 
 @dataclass(frozen=True, eq=False)
 class _Data:
+    """Points at f (k,) of all that might be seen, and one over their deviations."""
+
+    every: Array
     f: Array
     H: ComplexArray
     weight: Array
@@ -127,7 +132,7 @@ def _best(data: _Data, starts: Sequence[Array]) -> Array:
     for p in starts:
         modes = (len(p) - 2) // 2
         low = [-LONGEST_LAG, np.log(1e-4 * w[0]), *([np.log(0.5 * w[0]), np.log(1e-4)] * modes)]
-        high = [LONGEST_LAG, np.log(10.0 * w[1]), *([np.log(2.0 * w[1]), np.log(1.5)] * modes)]
+        high = [LONGEST_LAG, np.log(10.0 * w[1]), *([np.log(3.0 * w[1]), np.log(1.5)] * modes)]
         scale = [1e-4, 1.0, *([0.05, 0.5] * modes)]
         fit = least_squares(
             data.left, np.clip(p, low, high), bounds=(low, high), x_scale=scale, max_nfev=60
@@ -138,9 +143,7 @@ def _best(data: _Data, starts: Sequence[Array]) -> Array:
 
 def _one_more(data: _Data, p: Array) -> Array | None:
     """The fit with another mode."""
-    low, high = data.f[0] * WITHIN, data.f[-1] / WITHIN
-    if not low < high:
-        return None
+    low, high = data.f[0], BEYOND * data.f[-1]
     tried = [
         np.append(p, [np.log(2.0 * np.pi * f), np.log(z)])
         for f in np.geomspace(low, high, HERTZ_BEGUN)
@@ -151,26 +154,35 @@ def _one_more(data: _Data, p: Array) -> Array | None:
 
 
 def _earns(data: _Data, before: Array, after: Array) -> bool:
-    """Whether the last mode explains more than luck, and stands out within what is seen."""
+    """Whether the last mode explains more than luck."""
     was, now = data.chi(before), data.chi(after)
     free = 2 * len(data.f) - 3 - 3 * ((len(after) - 2) // 2)
     gained = (was - now) / max(now / max(free, 1), 1.0)
-    if gained < GAINS or was - now < OF_WHAT_IS_LEFT * was:
-        return False
-    return all(_is_seen(data, after, k) for k in range((len(after) - 2) // 2))
+    apart = all(_apart(after[-2:], after[k : k + 2]) for k in range(2, len(before), 2))
+    return bool(apart and gained > GAINS and was - now > OF_WHAT_IS_LEFT * was)
 
 
-def _is_seen(data: _Data, p: Array, k: int) -> bool:
-    """Whether a mode is one that the points show: lightly damped, inside, and large enough."""
+def _apart(one: Array, other: Array) -> bool:
+    """Whether two modes, ln w and ln z each, are more than one that is told twice."""
+    return bool(abs(one[0] - other[0]) > max(np.exp(one[1]), np.exp(other[1])))
+
+
+def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
+    """Whether a mode is a resonance that the points show: lightly damped and large enough."""
     w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
-    f = w / (2.0 * np.pi)
-    if z > MOST_DAMPING or not data.f[0] * WITHIN < f < data.f[-1] / WITHIN:
-        return False
-    theta = data.solved(p)[1]
-    parts = (_columns(p, np.array([f])) * theta)[0]
+    parts = (_columns(p, np.array([w / (2.0 * np.pi)])) * theta)[0]
     own, rest = abs(parts[1 + k]), abs(np.sum(np.delete(parts, 1 + k)))
-    half_power = np.abs(data.f - f) < max(z * f, 0.01 * f)
-    return bool(own > STANDS_OUT * rest and np.count_nonzero(half_power) >= 2)
+    return bool(z < MOST_DAMPING and own > STANDS_OUT * rest and _shown(data, w / (2.0 * np.pi)))
+
+
+def _shown(data: _Data, f: float) -> bool:
+    """Whether points lie close to a frequency on either side."""
+    for low, high in (((1.0 - AROUND) * f, f), (f, (1.0 + AROUND) * f)):
+        there = np.count_nonzero((data.f >= low) & (data.f <= high))
+        might = np.count_nonzero((data.every >= low) & (data.every <= high))
+        if there < max(POINTS_AROUND, MOSTLY_SEEN * might):
+            return False
+    return True
 
 
 def _told(data: _Data, p: Array) -> Modes:
@@ -181,6 +193,8 @@ def _told(data: _Data, p: Array) -> Modes:
     modes = (len(p) - 2) // 2
     peaks = []
     for k in range(modes):
+        if not _stands_out(data, p, theta, k):
+            continue
         w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
         at = slice(2 + 2 * k, 4 + 2 * k)
         spread = np.exp(p[at]) * sd[at]
@@ -228,11 +242,10 @@ def _product(factors: Sequence[Array]) -> Array:
 
 def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list[Peak]:
     """The zeros that the points show, with deviations by those of the parameters."""
-    low, high = data.f[0] * WITHIN, data.f[-1] / WITHIN
     out = []
     for zero in _zeros(p, theta):
         f, damping = abs(zero) / (2.0 * np.pi), -zero.real / abs(zero)
-        if not (low < f < high and abs(damping) < MOST_DAMPING):
+        if not (abs(damping) < MOST_DAMPING and _shown(data, f)):
             continue
         near = _zero_spread(data, p, zero, misfit)
         out.append(

@@ -19,10 +19,10 @@ from identification.errors import BadSpecification, NotIdentifiable
 
 ComplexArray = NDArray[np.complex128]
 
-REACH = 4  # neighbouring frequencies to either side by which one is told
+REACHES = (4, 8, 16)  # neighbouring frequencies to either side by which one is told
 LOWEST_BIN = 2  # of a stretch that is read: the first has what is left of its mean
 CYCLES = 320.0  # of a frequency in its stretch, at least, where the logs are long enough
-LEAST_CYCLES_SEEN = float(LOWEST_BIN + REACH)  # of a frequency in its stretch
+LEAST_CYCLES_SEEN = float(LOWEST_BIN + REACHES[0])  # of a frequency in its stretch
 STRETCHES_LONG = 8.0  # the longest stretch in all logs, so often
 LONGEST_STRETCH = 20.0  # s
 FEWEST_SAMPLES = 64  # in a stretch
@@ -36,7 +36,8 @@ FEWEST_STRETCHES = 4  # in all logs, below which no spectrum is an average
 @dataclass(frozen=True, eq=False)
 class Band:
     """Stretches of one length [s] and the frequencies f [Hz], (k,), that are read from them: those
-    wanted and `REACH` neighbours to either side."""
+    wanted and the longest reach of neighbours to either side, of which some
+    are none."""
 
     length: float
     f: Array
@@ -73,7 +74,7 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
         end = most if shortest else min(max(2.0 * CYCLES / length, begin), most)
         k = np.arange(np.ceil(begin * length - 1e-9), np.ceil(end * length - 1e-9))
         if len(k):
-            with_neighbours = np.arange(k[0] - REACH, k[-1] + REACH + 1)
+            with_neighbours = np.arange(k[0] - REACHES[-1], k[-1] + REACHES[-1] + 1)
             out.append(Band(length, with_neighbours / length))
         begin, length = end, 0.5 * length
     return out
@@ -94,7 +95,7 @@ def coefficients(x: Array, h: float, band: Band) -> ComplexArray:
     turn = 2j * np.pi * h
     transform = CZT(n, len(band.f), np.exp(-turn * step), np.exp(turn * band.f[0]))
     out = h * np.asarray(transform(frames), dtype=np.complex128)
-    out[:, band.f > HIGHEST_SHARE_SEEN / h] = 0.0
+    out[:, (band.f > HIGHEST_SHARE_SEEN / h) | (band.f * band.length < LOWEST_BIN - 0.5)] = 0.0
     return out
 
 
@@ -104,12 +105,9 @@ def second_derivative(x: Array, h: float, band: Band) -> ComplexArray:
     The difference whitens a motion's steep spectrum before the window, whose leakage would bury
     what is fast in it; its own frequency response is divided out, so nothing is approximated.
     """
-    w = 2.0 * np.pi * band.f
-    difference = (2.0 - 2.0 * np.cos(w * h)) / h**2
-    return coefficients(np.diff(x, 2) / h**2, h, band) * (w**2 / difference)
+    return coefficients(np.diff(x, 2) / h**2, h, band) / np.sinc(band.f * h) ** 2
 
 
 def hold(f: Array, h: float) -> ComplexArray:
     """What holding every sample over its period h [s] does to a signal at f [Hz]."""
-    turn = 2j * np.pi * f * h
-    return np.asarray(-np.expm1(-turn) / turn, dtype=np.complex128)
+    return np.asarray(np.exp(-1j * np.pi * f * h) * np.sinc(f * h), dtype=np.complex128)

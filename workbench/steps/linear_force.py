@@ -38,8 +38,8 @@ def plain_recording(log: Log, held: bool) -> Recording:
 def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> Recording:
     """The log with its force without friction and what else of the model is not linear.
 
-    Where the body slides, these are taken off. Where it rests friction is whatever holds it, and
-    the force is what the motion needs of a linear body, by default that of the model. Raises BadLog
+    Where the body surely slides, these are taken off. Where it rests or is slow friction is whatever
+    holds it, and the force is what the motion needs of a linear body, by default the model's. Raises BadLog
     where the log lacks a signal of an effect.
     """
     nonlinear = tuple(one for one in model.acting if one.key not in LINEAR_EFFECTS)
@@ -50,8 +50,8 @@ def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> R
     motion, late = differentiate(moved["y"], log.h), dead_time(model)
     d = _direction(motion, plant)
     opposed = opposing_force(moved, plant, motion, d)
-    v = np.where(d != 0, motion.v, 0.0)
-    resting = (body or _body_of(model))(v, _acceleration(v, log.h, held), log.h)
+    # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
+    resting = (body or _body_of(model))(motion.v, _acceleration(motion.v, log.h, held), log.h)
     slides = d != 0
     if held:
         opposed, slides = _over_period(opposed), slides & _following(slides)
@@ -92,7 +92,7 @@ def _body_of(model: Model) -> BodyForce:
 
 
 def _direction(motion: Motion, plant: Plant) -> Array:
-    """Direction of the motion, 0 where the body rests or its noise leaves it open, (n,)."""
+    """Direction of the motion, 0 within the stick band or where its noise leaves it open, (n,)."""
     least = SURE_SLIDING * motion.v_noise
     up, down = max(plant.friction.dv_p, least), min(plant.friction.dv_n, -least)
     return np.where(motion.v > up, 1.0, np.where(motion.v < down, -1.0, 0.0))

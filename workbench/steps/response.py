@@ -133,7 +133,7 @@ def _measured(
     found = machine_responses([linear_recording(log, model) for log in logs], lowest)
     modes = fit_modes(found.body)
     for _ in range(PASSES - 1):
-        if modes is None or not modes.peaks:
+        if modes is None:
             break
         body = of_modes(modes, float(found.f[found.body.seen][-1]))
         found = machine_responses([linear_recording(log, model, body) for log in logs], lowest)
