@@ -1,7 +1,7 @@
 """Frequency responses from logs in closed loop, of machines with friction, beside the truth.
 
     python benchmarks/response.py [--first 100] [--machines 20] [--rigid 20] [--seconds 60]
-        [--friction identified|known|left]
+        [--friction identified|known|left] [--models FOLDER]
 
 Every seed draws a machine with a load behind a spring and one without (`response_rig`, a simulator
 of its own), and 60 s at 2 kHz of moves, in two of three with a small multisine on the reference,
@@ -10,13 +10,15 @@ does it; friction: by a model identified from the first 6 s of the log, by the t
 parameters, or left in.
 Told are: of the points whose coherence is above 0.8, how many lie within 1 dB and 5 degrees of the
 truth, and how many within the 95 % bands; resonances and anti-resonances that the points reach, how
-many are found within 2 %; those that are invented; seconds. Seeds below 100 served to choose.
+many are found within 2 %; those that are invented; seconds. --models: where the
+identified models are kept from run to run. Seeds below 100 served to choose.
 """
 
 import argparse
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -25,6 +27,7 @@ from benchmarks.response_rig import Machine, machine, record
 import workbench as wb
 from identification.frequency.estimate import SURE, Response
 from identification.frequency.modes import Peak
+from identification.model.estimates import Estimate
 from workbench.documents.model import Model
 from workbench.steps.response import Responded
 
@@ -50,13 +53,25 @@ class Judged:
     top: float
 
 
-def judged(one: Machine, seed: int, seconds: float, friction: str) -> Judged:
+def identified(frame: pd.DataFrame, file: Path | None) -> Model:
+    """The model of the log's first seconds, from its file where there is one."""
+    if file is not None and file.exists():
+        return wb.load_model(file)
+    found = wb.identify(frame[frame["t"] < IDENTIFIED_FROM], rig=RIG, signals=SIGNALS)
+    if file is not None:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        file.write_text(found.to_json(), encoding="utf-8")
+    return found.model
+
+
+def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path | None) -> Judged:
     """A machine's log, its response, and how far that is from the truth."""
     rec = record(one, seed, seconds)
     frame = pd.DataFrame({"t": rec.h * np.arange(len(rec.r)), "r": rec.r, "y": rec.y, "u": rec.u})
     begun = time.perf_counter()
-    first = frame[frame["t"] < IDENTIFIED_FROM]
-    model = None if friction == "left" else wb.identify(first, rig=RIG, signals=SIGNALS).model
+    kind = "one" if one.m_2 == 0.0 else "two"
+    file = None if folder is None else folder / f"{kind}-{seed}.json"
+    model = None if friction == "left" else identified(frame, file)
     if friction == "known":
         assert model is not None
         model = with_truth(model, one)
@@ -76,10 +91,6 @@ def judged(one: Machine, seed: int, seconds: float, friction: str) -> Judged:
 
 def with_truth(model: Model, one: Machine) -> Model:
     """The model with the machine's own friction and mass, without a second mass."""
-    from dataclasses import replace
-
-    from identification.model.estimates import Estimate
-
     own = {"m": one.mass, "F_cp": one.F_cp, "F_cn": one.F_cn, "F_vp": one.F_vp, "F_vn": one.F_vn}
     friction = {
         name: Estimate(own[name], e.unit) if name in own else e
@@ -110,8 +121,9 @@ def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int]:
     for kind, f in true.items():
         if f is None:
             continue
-        around = np.count_nonzero((seen > 0.9 * f) & (seen < f)), np.count_nonzero(
-            (seen > f) & (seen < 1.1 * f)
+        around = (
+            np.count_nonzero((seen > 0.9 * f) & (seen < f)),
+            np.count_nonzero((seen > f) & (seen < 1.1 * f)),
         )
         reached += min(around) >= 3
         near = [p for p in left if p.kind == kind and abs(p.frequency.value / f - 1.0) < NEAR_PEAK]
@@ -149,12 +161,13 @@ def main() -> None:
     parser.add_argument("--rigid", type=int, default=20)
     parser.add_argument("--seconds", type=float, default=60.0)
     parser.add_argument("--friction", choices=("identified", "known", "left"), default="identified")
+    parser.add_argument("--models", type=Path)
     asked = parser.parse_args()
     for compliant, count in ((True, asked.machines), (False, asked.rigid)):
         every = []
         for seed in range(asked.first, asked.first + count):
             one = machine(seed, compliant)
-            every.append(judged(one, seed, asked.seconds, asked.friction))
+            every.append(judged(one, seed, asked.seconds, asked.friction, asked.models))
             j = every[-1]
             print(
                 f"{seed:5d} {'two masses' if compliant else 'one mass':10s} {j.points:5d} points to"

@@ -35,6 +35,7 @@ FEWEST_AVERAGES = 4.0
 CHANCE = 0.01  # that so much coherence is luck, at most
 DEGREE = 2  # of a response over its neighbours
 WIDE = 1.5  # bins that Hann's window makes one of
+APART = 0.01  # of an input's power, that no other input makes; less is lost in what windows leak
 NARROW = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
 
 
@@ -138,7 +139,8 @@ def _with_reach(
         share = 1.0 / np.maximum(np.real(inverse[:, step * j, step * j]) * alone, 1e-300)
         made = np.abs(theta[:, step * j, 0]) ** 2 * alone
         coherence = made / np.maximum(made + left, 1e-300)
-        averages = np.where(alone > 0.0, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
+        apart = alone > APART * np.real(follows[:, step * j, step * j])
+        averages = np.where(apart, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
         found.append(Response(spectra.f[inner], theta[:, step * j, 0], coherence, averages))
     return found
 

@@ -22,9 +22,6 @@ from identification.frequency.stretches import (
 )
 
 
-SIGNALS = ("a", "linear", "F", "r", "F_2")
-
-
 @dataclass(frozen=True, eq=False)
 class Recording:
     """One run every h [s], (n,) each: position y [m], applied force F [N], what is left of it
@@ -77,42 +74,56 @@ class MachineResponses:
         return self.body.times(1.0 / (2j * np.pi * self.f))
 
 
-def machine_responses(
-    runs: Sequence[Recording], lowest: float | None = None
-) -> MachineResponses:
+def machine_responses(runs: Sequence[Recording], lowest: float | None = None) -> MachineResponses:
     """The responses by the spectra of all runs together; see `stretches.bands` for the frequencies.
 
     lowest [Hz]: that is asked for. Raises BadSpecification, NotIdentifiable where the runs are too
     short.
     """
-    cut = bands([one.duration for one in runs], [one.h for one in runs], lowest)
-    instrument = all(one.r is not None and np.ptp(one.r) > 0.0 for one in runs)
-    each = [_in_band(runs, band, instrument) for band in cut]
-    body, with_friction = (joined([found[j] for found in each]) for j in (0, 1))
-    controller = joined([found[2] for found in each]) if instrument else None
-    if controller is not None and not np.any(controller.seen):
-        controller = None
+    cut = _bands(runs, lowest)
+    instruments = _instruments(runs)
+    names = ("a", "linear", "F", "r", "F_2") if instruments else ("a", "linear", "F")
+    every = [_spectra(runs, band, names) for band in cut]
+    body, with_friction = (
+        joined([responses(one, "a", [force], instruments)[0] for one in every])
+        for force in ("linear", "F")
+    )
+    controller = None
+    if instruments:
+        # F = T r - R y: all have a motion's steep spectrum, so second derivatives are taken.
+        found = joined([responses(one, "F_2", ["r", "a"])[1] for one in every])
+        controller = found.times(-np.ones(1)) if np.any(found.seen) else None
     lengths = tuple(band.length for band in cut)
-    return MachineResponses(body, with_friction, controller, instrument, lengths)
+    return MachineResponses(body, with_friction, controller, bool(instruments), lengths)
 
 
-def _in_band(runs: Sequence[Recording], band: Band, instrument: bool) -> list[Response]:
-    """Acceleration by force without friction, with it, and the controller, in one band."""
-    names = SIGNALS if instrument else SIGNALS[:3]
+def body_by_force(runs: Sequence[Recording], lowest: float | None = None) -> Response:
+    """Acceleration by force without friction alone, as `machine_responses` has it."""
+    instruments = _instruments(runs)
+    names = ("a", "linear", "r") if instruments else ("a", "linear")
+    each = [_spectra(runs, band, names) for band in _bands(runs, lowest)]
+    return joined([responses(one, "a", ["linear"], instruments)[0] for one in each])
+
+
+def _bands(runs: Sequence[Recording], lowest: float | None) -> list[Band]:
+    return bands([one.duration for one in runs], [one.h for one in runs], lowest)
+
+
+def _instruments(runs: Sequence[Recording]) -> tuple[str, ...]:
+    """The reference, where every run has one that moves."""
+    return ("r",) if all(one.r is not None and np.ptp(one.r) > 0.0 for one in runs) else ()
+
+
+def _spectra(runs: Sequence[Recording], band: Band, names: tuple[str, ...]) -> Spectra:
+    """Cross spectra of the signals over the stretches of all runs."""
     m = len(names)
     S, stretches = np.zeros((len(band.f), m, m), dtype=np.complex128), np.zeros(len(band.f))
     for one in runs:
-        each = [_coefficients(one, band, name) for name in names]
-        stretches += np.count_nonzero(each[0], axis=0)
-        x = np.stack(each, axis=2)
-        S += np.einsum("ska,skb->kab", np.conj(x), x)
-    spectra = Spectra(band.f, names, S, stretches)
-    Z = ["r"] if instrument else []
-    out = [responses(spectra, "a", [one], Z)[0] for one in ("linear", "F")]
-    if instrument:
-        # F = T r - R y: all have a motion's steep spectrum, so second derivatives are taken.
-        out.append(responses(spectra, "F_2", ["r", "a"])[1].times(-np.ones(1)))
-    return out
+        x = np.stack([_coefficients(one, band, name) for name in names])
+        stretches += np.count_nonzero(x[0], axis=0)
+        by_frequency = np.moveaxis(x, 2, 0)  # (K, m, s)
+        S += np.conj(by_frequency) @ np.swapaxes(by_frequency, 1, 2)
+    return Spectra(band.f, names, S, stretches)
 
 
 def _coefficients(one: Recording, band: Band, name: str) -> ComplexArray:

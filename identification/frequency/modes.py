@@ -35,15 +35,19 @@ POINTS_AROUND = 3  # that many, on either side
 MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
+SHARED = 8.0  # points that are of the same stretches and neighbours, and count as one
+OF_A_BIN = 0.1  # by which windows may draw a peak aside
 LONGEST_LAG = 0.05  # s
+
+
+Kind = Literal["resonance", "anti-resonance"]
 
 
 @dataclass(frozen=True)
 class Peak:
-    """A resonance or an anti-resonance: frequency [Hz] (undamped) and damping ratio, with one
-    standard deviation; the magnitude there [unit of the response]."""
+    """A resonance or an anti-resonance: frequency [Hz] (undamped) and damping ratio."""
 
-    kind: Literal["resonance", "anti-resonance"]
+    kind: Kind
     frequency: Size
     damping: Size
 
@@ -197,12 +201,9 @@ def _told(data: _Data, p: Array) -> Modes:
             continue
         w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
         at = slice(2 + 2 * k, 4 + 2 * k)
-        spread = np.exp(p[at]) * sd[at]
-        f = w / (2.0 * np.pi)
-        peaks.append(
-            Peak("resonance", Size(float(f), float(spread[0] / (2.0 * np.pi))),
-                 Size(float(z), float(spread[1])))
-        )  # fmt: skip
+        spread = np.exp(p[at]) * sd[at] / np.array([2.0 * np.pi, 1.0])
+        where = float(w / (2.0 * np.pi)), float(z)
+        peaks.append(_peak(data, "resonance", where, (float(spread[0]), float(spread[1]))))
     peaks += _anti_resonances(data, p, theta, misfit)
     return Modes(tuple(sorted(peaks, key=lambda one: one.frequency.value)), p, theta, misfit)
 
@@ -215,7 +216,17 @@ def _deviations(data: _Data, p: Array, misfit: float) -> Array:
     )
     size = np.maximum(np.linalg.norm(J, axis=0), 1e-300)
     inverse = np.linalg.pinv((J / size).T @ (J / size), rcond=1e-10)
-    return np.asarray(np.sqrt(np.diag(inverse) * max(misfit, 1.0)) / size)
+    return np.asarray(np.sqrt(np.diag(inverse) * SHARED * max(misfit, 1.0)) / size)
+
+
+def _peak(
+    data: _Data, kind: Kind, where: tuple[float, float], sd: tuple[float, float]
+) -> Peak:  # fmt: skip
+    """A peak at a frequency [Hz] and of a damping, with their deviations by the fit."""
+    k = int(np.clip(np.searchsorted(data.every, where[0]), 1, len(data.every) - 1))
+    blur = OF_A_BIN * float(data.every[k] - data.every[k - 1])
+    frequency = Size(where[0], float(np.hypot(sd[0], blur)))
+    return Peak(kind, frequency, Size(where[1], float(np.hypot(sd[1], blur / where[0]))))
 
 
 def _zeros(p: Array, theta: Array) -> ComplexArray:
@@ -248,9 +259,7 @@ def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list
         if not (abs(damping) < MOST_DAMPING and _shown(data, f)):
             continue
         near = _zero_spread(data, p, zero, misfit)
-        out.append(
-            Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1]))
-        )
+        out.append(Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1])))
     return out
 
 

@@ -250,9 +250,7 @@ def _bode(
     ]  # fmt: skip
 
 
-def _line(
-    name: str, x: Array, y: Array, colour: Colour = "measured", look: Look = "line"
-) -> Line:
+def _line(name: str, x: Array, y: Array, colour: Colour = "measured", look: Look = "line") -> Line:
     return Line(name, x, y, colour, look)
 
 

@@ -38,9 +38,9 @@ def plain_recording(log: Log, held: bool) -> Recording:
 def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> Recording:
     """The log with its force without friction and what else of the model is not linear.
 
-    Where the body surely slides, these are taken off. Where it rests or is slow friction is whatever
-    holds it, and the force is what the motion needs of a linear body, by default the model's. Raises BadLog
-    where the log lacks a signal of an effect.
+    Where the body surely slides, these are taken off. Where it rests or is slow friction is
+    whatever holds it, and the force is what the motion needs of a linear body, by default the
+    model's. Raises BadLog where the log lacks a signal of an effect.
     """
     nonlinear = tuple(one for one in model.acting if one.key not in LINEAR_EFFECTS)
     plant = replace(model.simulated, effects=nonlinear)

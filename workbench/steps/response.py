@@ -14,7 +14,7 @@ from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.estimates import told_estimate
 from identification.frequency.body import body_response
 from identification.frequency.estimate import SURE, Response, in_series
-from identification.frequency.machine import MachineResponses, Recording, machine_responses
+from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
 from identification.frequency.modes import Modes, Peak, fit_modes
 from identification.frequency.stretches import ComplexArray, hold
 from identification.log import Log
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Curve = Literal["plant", "velocity", "plant_with_friction", "controller", "open_loop"]
-PASSES = 2  # in which what a body at rest is held by follows from its own response
+PASSES = 1  # in which what a body at rest is held by follows from its own response
 RESPONSE_SCHEMA = "response/1"
 GAP_FORGIVEN = 3  # points in a row that are missing, within a range of frequencies
 FEWEST_IN_RANGE = 3  # points of a range
@@ -113,9 +113,7 @@ def identified_or_not(
 ) -> tuple[Model | None, str | None]:  # fmt: skip
     """The model that the logs themselves give, or None and why they give none."""
     try:
-        found = identify_sources(
-            sources, seed=seed, on_progress=on_progress, keep_going=keep_going
-        )
+        found = identify_sources(sources, seed=seed, on_progress=on_progress, keep_going=keep_going)
     except NotIdentifiable as error:
         return None, f"the logs do not tell it ({error})"
     return found.model, None
@@ -130,15 +128,16 @@ def _measured(
     if model is None:
         found = machine_responses([plain_recording(log, held) for log in logs], lowest)
         return found, fit_modes(found.body)
-    found = machine_responses([linear_recording(log, model) for log in logs], lowest)
-    modes = fit_modes(found.body)
-    for _ in range(PASSES - 1):
+    runs = [linear_recording(log, model) for log in logs]
+    for _ in range(PASSES):
+        body = body_by_force(runs, lowest)
+        modes = fit_modes(body)
         if modes is None:
             break
-        body = of_modes(modes, float(found.f[found.body.seen][-1]))
-        found = machine_responses([linear_recording(log, model, body) for log in logs], lowest)
-        modes = fit_modes(found.body)
-    return found, modes
+        rests = of_modes(modes, float(body.f[body.seen][-1]))
+        runs = [linear_recording(log, model, rests) for log in logs]
+    found = machine_responses(runs, lowest)
+    return found, fit_modes(found.body)
 
 
 def curves_of(model: Model, f: Array) -> Curves:
@@ -213,9 +212,7 @@ def _nothing(sources: Sources, found: MachineResponses) -> str:
     )
 
 
-def _remarks(
-    sources: Sources, found: MachineResponses, model: Model | None
-) -> list[str]:
+def _remarks(sources: Sources, found: MachineResponses, model: Model | None) -> list[str]:
     """What to know of the curves."""
     out = []
     if not found.instrument:
