@@ -41,8 +41,8 @@ NARROW = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolutio
 
 @dataclass(frozen=True, eq=False)
 class Spectra:
-    """Sums over stretches of conj(a) b of signals a, b: S (K, m, m) at f [Hz], with the longest reach
-    of neighbours to either side, in the order of `names`; stretches: how many show each, (K,)."""
+    """Sums over stretches of conj(a) b of signals a, b: S (K, m, m) at f [Hz], with the longest
+    reach of neighbours to either side, in the order of `names`; stretches: how many show each."""
 
     f: Array
     names: tuple[str, ...]

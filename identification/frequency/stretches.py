@@ -59,9 +59,9 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
                     if d >= length)  # fmt: skip
         if there < FEWEST_STRETCHES:
             raise BadSpecification(
-                f"lowest frequency {lowest:g} Hz: stretches of {length:.3g} s needed, {there:.0f} in"
-                f" {whole:.3g} s of logs, at least {FEWEST_STRETCHES} needed; log longer, or ask for"
-                f" at least {LEAST_CYCLES_SEEN * FEWEST_STRETCHES / whole:.2g} Hz"
+                f"lowest frequency {lowest:g} Hz: stretches of {length:.3g} s needed, {there:.0f}"
+                f" in {whole:.3g} s of logs, at least {FEWEST_STRETCHES} needed; log longer, or ask"
+                f" for at least {LEAST_CYCLES_SEEN * FEWEST_STRETCHES / whole:.2g} Hz"
             )
     if length < FEWEST_SAMPLES * fastest:
         raise NotIdentifiable(

@@ -23,8 +23,8 @@ from workbench.steps.response import Responded, decibels, degrees, ranges, sure_
 PEAK_HEAD = ("", "frequency", "95 % interval", "damping", "95 % interval")
 FREQUENCY = "frequency [Hz]"
 COHERENCE_SAID = (
-    "The band holds 95 % of what the noise could make of it. Where the coherence is too low, nothing"
-    " is drawn."
+    "The band holds 95 % of what the noise could make of it. Where the coherence is too low,"
+    " nothing is drawn."
 )
 
 

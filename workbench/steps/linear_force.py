@@ -31,8 +31,7 @@ BodyForce = Callable[[Array, Array, float], Array]
 
 def plain_recording(log: Log, held: bool) -> Recording:
     """The log as it stands, its force with all friction in it."""
-    reference = log["r"] if "r" in log else None
-    return Recording(log.h, log["y"], log["F"], log["F"], reference, held)
+    return Recording(log.h, log["y"], log["F"], log["F"], log.signals.get("r"), held)
 
 
 def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> Recording:

@@ -1,4 +1,4 @@
-"""Stretches: their length by the logs, exact derivatives, and nothing where a log does not reach."""
+"""Stretches: length by the logs, exact derivatives, nothing where a log does not reach."""
 
 import numpy as np
 import pytest
