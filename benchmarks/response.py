@@ -10,7 +10,8 @@ does it; friction: by a model identified from the first 10 s of the log, by the 
 parameters, or left in.
 Told are: of the points whose coherence is above 0.8, how many lie within 1 dB and 5 degrees of the
 truth, and how many within the 95 % bands; resonances and anti-resonances that the points reach, how
-many are found within 2 %; those that are invented; seconds. --models: where the
+many are found within 2 %, and within their 95 % interval;
+those that are invented; processor seconds. --models: where the
 identified models are kept from run to run. Seeds below 100 served to choose.
 """
 
@@ -40,13 +41,14 @@ SIGNALS = {"t": "t", "r": "r", "y": "y", "u": ("u", "V")}
 @dataclass(frozen=True)
 class Judged:
     """Points that count, those near the truth, those within the band; peaks within reach, found,
-    invented; seconds."""
+    those within their interval, invented; processor seconds."""
 
     points: int
     near: int
     inside: int
     reached: int
     found: int
+    told: int
     invented: int
     seconds: float
     identified: float
@@ -73,24 +75,24 @@ def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path 
     """A machine's log, its response, and how far that is from the truth."""
     rec = record(one, seed, seconds)
     frame = pd.DataFrame({"t": rec.h * np.arange(len(rec.r)), "r": rec.r, "y": rec.y, "u": rec.u})
-    begun = time.perf_counter()
+    begun = time.process_time()
     kind = "one" if one.m_2 == 0.0 else "two"
     file = None if folder is None else folder / f"{kind}-{seed}.json"
     model = None if friction == "left" else identified(frame, file)
     if friction == "known":
         assert model is not None
         model = with_truth(model, one)
-    middle = time.perf_counter()
+    middle = time.process_time()
     found = wb.response(
         frame, rig=RIG, signals=SIGNALS, model=model, friction_left_in=model is None
     ).found
-    ended = time.perf_counter()
+    ended = time.process_time()
     points, near, inside = of_points(found.found.position, one)
-    reached, hit, invented = of_peaks(found, one)
+    reached, hit, told_right, invented = of_peaks(found, one)
     sure = found.found.body.seen & (found.found.body.coherence > SURE)
     top = float(np.max(found.found.f[sure], initial=0.0))
     return Judged(
-        points, near, inside, reached, hit, invented, ended - middle, middle - begun, top
+        points, near, inside, reached, hit, told_right, invented, ended - middle, middle - begun, top
     )  # fmt: skip
 
 
@@ -116,12 +118,13 @@ def of_points(plant: Response, one: Machine) -> tuple[int, int, int]:
     return int(sure.sum()), int(near.sum()), int(inside.sum())
 
 
-def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int]:
-    """Peaks of the machine that the seen points have on both sides, found within 2 %, invented."""
+def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int, int]:
+    """Peaks of the machine that the seen points have on both sides, found within 2 %, within their
+    interval, invented."""
     body = found.found.body
     seen = body.f[body.seen]
     true = {"resonance": one.resonance, "anti-resonance": one.anti_resonance}
-    reached = hit = 0
+    reached = hit = inside = 0
     left = list(found.peaks)
     for kind, f in true.items():
         if f is None:
@@ -133,9 +136,12 @@ def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int]:
         reached += min(around) >= 3
         near = [p for p in left if p.kind == kind and abs(p.frequency.value / f - 1.0) < NEAR_PEAK]
         hit += bool(near) and min(around) >= 3
+        inside += any(
+            abs(p.frequency.value - f) < 1.96 * p.frequency.sd for p in near if min(around) >= 3
+        )
         for p in near[:1]:
             left.remove(p)
-    return reached, hit, len([p for p in left if not _near_one(p, one)])
+    return reached, hit, inside, len([p for p in left if not _near_one(p, one)])
 
 
 def _near_one(peak: Peak, one: Machine) -> bool:
@@ -146,14 +152,14 @@ def _near_one(peak: Peak, one: Machine) -> bool:
 
 def told(name: str, every: Sequence[Judged]) -> str:
     total = {key: sum(getattr(one, key) for one in every) for key in
-             ("points", "near", "inside", "reached", "found", "invented")}  # fmt: skip
+             ("points", "near", "inside", "reached", "found", "told", "invented")}  # fmt: skip
     shares = [one.near / one.points for one in every if one.points]
     return (
         f"{name}: {len(every)} machines, {total['points']} points above {SURE}:"
         f" {total['near'] / max(total['points'], 1):.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
         f" (worst machine {min(shares, default=0.0):.1%}),"
         f" {total['inside'] / max(total['points'], 1):.1%} within the band; peaks in reach"
-        f" {total['reached']}, found within 2 % {total['found']}, invented {total['invented']};"
+        f" {total['reached']}, found within 2 % {total['found']} (within their interval {total['told']}), invented {total['invented']};"
         f" {np.median([one.seconds for one in every]):.2f} s each (at most"
         f" {max(one.seconds for one in every):.2f})"
     )

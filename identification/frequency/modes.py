@@ -31,13 +31,14 @@ GAINS = 60.0  # chi-square that a mode explains at least, in units of what is le
 OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
 STANDS_OUT = 0.25  # of the response without it, that a mode adds at its frequency
 MOST_DAMPING = 0.3  # of what is called a resonance
+UNSURE = 0.02  # of its frequency, deviation from which a peak is not told
 AROUND = 0.1  # of its frequency, within which points on either side show a peak
 POINTS_AROUND = 3  # that many, on either side
 MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
 SHARED = 8.0  # points that are of the same stretches and neighbours, and count as one
-OF_A_BIN = 0.1  # by which windows may draw a peak aside
+OF_A_BIN = 0.3  # by which windows may draw a peak aside
 LONGEST_LAG = 0.05  # s
 
 
@@ -206,7 +207,8 @@ def _told(data: _Data, p: Array) -> Modes:
         where = float(w / (2.0 * np.pi)), float(z)
         peaks.append(_peak(data, "resonance", where, (float(spread[0]), float(spread[1]))))
     peaks += _anti_resonances(data, p, theta, misfit)
-    return Modes(tuple(sorted(peaks, key=lambda one: one.frequency.value)), p, theta, misfit)
+    sure = [one for one in peaks if one.frequency.sd < UNSURE * one.frequency.value]
+    return Modes(tuple(sorted(sure, key=lambda one: one.frequency.value)), p, theta, misfit)
 
 
 def _deviations(data: _Data, p: Array, misfit: float) -> Array:

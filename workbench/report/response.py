@@ -32,7 +32,7 @@ def response_sentence(found: Responded) -> str:
     """What the logs show of the machine, in a sentence or two."""
     body = found.found.body
     spans = ranges(body.f, body.seen)
-    said = f"The plant shows {_spans(spans)}"
+    said = f"The plant is seen {_spans(spans)}"
     peaks = found.peaks
     if not peaks:
         return f"{said}; no resonance stands out there."
@@ -229,8 +229,8 @@ def _bode(
     magnitude, turn = [_line("measured", x, size)], [_line("measured", x, phase)]
     if beside is not None:
         left_in = np.where(beside.seen, beside.H, np.nan)[use]
-        magnitude.insert(0, _line("friction left in", x, decibels(np.abs(left_in)), "quiet"))
-        turn.insert(0, _line("friction left in", x, _near(degrees(left_in), phase), "quiet"))
+        magnitude.insert(0, _line("friction left in", x, decibels(np.abs(left_in)), "before"))
+        turn.insert(0, _line("friction left in", x, _near(degrees(left_in), phase), "before"))
     for name, curve in others:
         if curve is not None:
             own = curve[use]
@@ -238,7 +238,7 @@ def _bode(
             turn.append(_line(name, x, _near(degrees(own), phase), "model", "dashed"))
     coherence = [_line("measured", x, one.coherence[use])]
     if beside is not None:
-        coherence.insert(0, _line("friction left in", x, beside.coherence[use], "quiet"))
+        coherence.insert(0, _line("friction left in", x, beside.coherence[use], "before"))
     level = [[], []] if levels is None else [[Mark(one)] for one in levels]
     return [
         Panel(FREQUENCY, "magnitude [dB]", magnitude, title, areas[:1],

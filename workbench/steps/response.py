@@ -223,8 +223,6 @@ def _remarks(sources: Sources, found: MachineResponses, model: Model | None) -> 
         )
     if model is not None and model.card != sources.card.name:
         out.append(f"the model is of {model.card}, the logs of {sources.card.name}")
-    if model is not None and model.imposed:
-        out.append("the logged motion was imposed on the body: the response is the body's alone")
     return out
 
 
@@ -368,12 +366,12 @@ def decibels(size: Array) -> Array:
 
 
 def degrees(H: ComplexArray) -> Array:
-    """Phase without jumps [deg], its middle between -360 and 0; NaN stays."""
+    """Phase without jumps [deg], its middle between -270 and 90; NaN stays."""
     known = np.isfinite(H)
     out = np.full(len(H), np.nan)
     if np.any(known):
         phase = np.degrees(np.unwrap(np.angle(H[known])))
-        out[known] = phase - 360.0 * math.ceil(float(np.median(phase)) / 360.0)
+        out[known] = phase - 360.0 * math.ceil((float(np.median(phase)) - 90.0) / 360.0)
     return out
 
 
