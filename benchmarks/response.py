@@ -92,7 +92,8 @@ def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path 
     sure = found.found.body.seen & (found.found.body.coherence > SURE)
     top = float(np.max(found.found.f[sure], initial=0.0))
     return Judged(
-        points, near, inside, reached, hit, told_right, invented, ended - middle, middle - begun, top
+        points, near, inside, reached, hit, told_right, invented,
+        ended - middle, middle - begun, top,
     )  # fmt: skip
 
 
@@ -133,9 +134,9 @@ def of_peaks(found: Responded, one: Machine) -> tuple[int, int, int, int]:
             np.count_nonzero((seen > 0.9 * f) & (seen < f)),
             np.count_nonzero((seen > f) & (seen < 1.1 * f)),
         )
-        reached += min(around) >= 3
+        reached += int(min(around) >= 3)
         near = [p for p in left if p.kind == kind and abs(p.frequency.value / f - 1.0) < NEAR_PEAK]
-        hit += bool(near) and min(around) >= 3
+        hit += int(bool(near) and min(around) >= 3)
         inside += any(
             abs(p.frequency.value - f) < 1.96 * p.frequency.sd for p in near if min(around) >= 3
         )
@@ -151,17 +152,19 @@ def _near_one(peak: Peak, one: Machine) -> bool:
 
 
 def told(name: str, every: Sequence[Judged]) -> str:
-    total = {key: sum(getattr(one, key) for one in every) for key in
-             ("points", "near", "inside", "reached", "found", "told", "invented")}  # fmt: skip
+    """What all machines add up to, in a line."""
+    keys = ("points", "near", "inside", "reached", "found", "told", "invented")
+    total = {key: sum(getattr(one, key) for one in every) for key in keys}
     shares = [one.near / one.points for one in every if one.points]
+    points = max(total["points"], 1)
+    seconds = [one.seconds for one in every]
     return (
-        f"{name}: {len(every)} machines, {total['points']} points above {SURE}:"
-        f" {total['near'] / max(total['points'], 1):.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
-        f" (worst machine {min(shares, default=0.0):.1%}),"
-        f" {total['inside'] / max(total['points'], 1):.1%} within the band; peaks in reach"
-        f" {total['reached']}, found within 2 % {total['found']} (within their interval {total['told']}), invented {total['invented']};"
-        f" {np.median([one.seconds for one in every]):.2f} s each (at most"
-        f" {max(one.seconds for one in every):.2f})"
+        f"{name}: {len(every)} machines, {points} points above {SURE}:"
+        f" {total['near'] / points:.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
+        f" (worst machine {min(shares, default=0.0):.1%}), {total['inside'] / points:.1%} within"
+        f" the band; peaks in reach {total['reached']}, found within 2 % {total['found']}, within"
+        f" their interval {total['told']}, invented {total['invented']}; {np.median(seconds):.2f} s each"
+        f" (at most {max(seconds):.2f})"
     )
 
 

@@ -58,11 +58,11 @@ class Machine:
         """Position of the motor by force at f [Hz], its friction viscous alone."""
         s = 2j * np.pi * f
         viscous = 0.5 * (self.F_vp + self.F_vn)
-        load = 0.0
+        own = self.m_1 * s**2 + viscous * s
         if self.m_2 > 0.0:
             link = self.c * s + self.k
-            load = link * self.m_2 * s**2 / (self.m_2 * s**2 + link)
-        return np.asarray(1.0 / (self.m_1 * s**2 + viscous * s + load))
+            own = own + link * self.m_2 * s**2 / (self.m_2 * s**2 + link)
+        return np.asarray(1.0 / own)
 
 
 def machine(seed: int, compliant: bool) -> Machine:
@@ -135,7 +135,7 @@ def gains(one: Machine, h: float) -> Array:
     return np.array([0.4 * M * w**2, M * w, 0.06 * M * w**3, 1.0 / (6.0 * w), h, one.counts])
 
 
-@njit(cache=True)  # type: ignore[untyped-decorator]
+@njit(cache=True)
 def _run(p: Array, g: Array, r: Array, noise: Array, substeps: int) -> Any:
     m_1, m_2, k, c, F_cp, F_cn, F_s, F_vp, F_vn = p
     k_p, k_d, k_i, tau, h, counts = g

@@ -82,9 +82,9 @@ class Response:
         enough = self.averages >= FEWEST_AVERAGES
         return np.asarray(enough & (self.coherence >= np.maximum(SEEN, luck)))
 
-    def times(self, factor: ComplexArray) -> "Response":
+    def times(self, factor: NDArray[Any]) -> "Response":
         """The response in series with one that is known, (k,)."""
-        return replace(self, H=self.H * factor)
+        return replace(self, H=np.asarray(self.H * factor, dtype=np.complex128))
 
 
 def responses(
@@ -153,9 +153,9 @@ def joined(parts: Sequence[Response]) -> Response:
 
 def in_series(one: Response, other: Response) -> Response:
     """Two responses in series, whose errors have nothing to do with each other."""
-    noise = sum((1.0 - r.coherence) / np.maximum(r.coherence, 1e-12) for r in (one, other))
+    own, others = ((1.0 - r.coherence) / np.maximum(r.coherence, 1e-12) for r in (one, other))
     averages = np.minimum(one.averages, other.averages)
-    return Response(one.f, one.H * other.H, 1.0 / (1.0 + noise), averages)
+    return Response(one.f, one.H * other.H, 1.0 / (1.0 + own + others), averages)
 
 
 def _neighbours(x: NDArray[Any], reach: int) -> NDArray[Any]:

@@ -75,7 +75,8 @@ class Modes:
 
     def undelayed(self, f: Array) -> ComplexArray:
         """The same without the lag."""
-        return self.response(f) * np.exp(2j * np.pi * f * self.lag)
+        ahead = np.exp(2j * np.pi * f * self.lag)
+        return np.asarray(self.response(f) * ahead, dtype=np.complex128)
 
 
 def fit_modes(response: Response) -> Modes | None:

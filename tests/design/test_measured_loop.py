@@ -5,7 +5,7 @@ import pytest
 
 from design.margins import margins
 from design.measured_loop import measured_margins
-from design.polynomial import evaluate
+from design.polynomial import ComplexArray, evaluate
 from design.rst import RST
 
 H = 1e-2
@@ -14,9 +14,10 @@ LOOP = RST(np.array([8.0, -7.0]), np.array([1.0, -0.2]), np.array([1.0]), H)
 F = np.geomspace(0.05, 49.0, 4000)
 
 
-def points() -> np.ndarray:
+def points() -> ComplexArray:
     z = np.exp(2j * np.pi * F * H)
-    return (evaluate(B, z) * evaluate(LOOP.R, z)) / (evaluate(A, z) * evaluate(LOOP.S, z))
+    forward, back = evaluate(B, z) * evaluate(LOOP.R, z), evaluate(A, z) * evaluate(LOOP.S, z)
+    return np.asarray(forward / back)
 
 
 def test_margins_are_those_of_the_polynomials() -> None:
@@ -43,6 +44,6 @@ def test_a_crossing_that_is_not_seen_is_not_told() -> None:
 
 
 def test_a_loop_that_is_not_stable_has_a_negative_phase_margin() -> None:
-    found = measured_margins(F, 40.0 * points(), np.ones(len(F), dtype=bool))
+    found = measured_margins(F, np.asarray(40.0 * points()), np.ones(len(F), dtype=bool))
     assert found.phase_deg is not None and found.phase_deg < 0.0
     assert found.delay_s is None

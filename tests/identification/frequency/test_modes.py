@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.arrays import Array
 from identification.frequency.body import body_response
 from identification.frequency.estimate import Response
 from identification.frequency.machine import body_by_force
 from identification.frequency.modes import fit_modes
+from identification.frequency.stretches import ComplexArray
 from tests.identification.frequency.linear_loop import (
     DAMPING,
     HERTZ,
@@ -21,18 +23,18 @@ from tests.identification.frequency.linear_loop import (
 F = np.arange(1.0, 150.0, 0.2)
 
 
-def exact(H: np.ndarray, f: np.ndarray = F, seed: int = 1, noise: float = 0.01) -> Response:
+def exact(H: ComplexArray, f: Array = F, seed: int = 1, noise: float = 0.01) -> Response:
     """A response with noise as its coherence says."""
     rng = np.random.default_rng(seed)
     n = 30.0
     g = 1.0 / (1.0 + 2.0 * n * noise**2)
     off = noise * (rng.standard_normal(len(f)) + 1j * rng.standard_normal(len(f)))
-    return Response(f, H * (1.0 + off), np.full(len(f), g), np.full(len(f), n))
+    return Response(f, np.asarray(H * (1.0 + off)), np.full(len(f), g), np.full(len(f), n))
 
 
-def accelerations(f: np.ndarray = F) -> np.ndarray:
+def accelerations(f: Array = F) -> ComplexArray:
     """Of two masses."""
-    return -((2 * np.pi * f) ** 2) * true_position(f)
+    return np.asarray(-((2 * np.pi * f) ** 2) * true_position(f))
 
 
 def test_both_peaks_of_two_masses_are_found_in_a_log() -> None:
@@ -56,7 +58,7 @@ def test_deviations_are_those_of_repeated_noise() -> None:
 
 
 def test_one_mass_has_no_peak_and_its_lag_is_told() -> None:
-    one = -((2 * np.pi * F) ** 2) * body_response(F, 3.5, VISCOUS, lag=2e-3)
+    one = np.asarray(-((2 * np.pi * F) ** 2) * body_response(F, 3.5, VISCOUS, lag=2e-3))
     found = fit_modes(exact(one))
     assert found is not None and found.peaks == ()
     assert found.lag == pytest.approx(2e-3, rel=0.03)
