@@ -163,8 +163,8 @@ def told(name: str, every: Sequence[Judged]) -> str:
         f" {total['near'] / points:.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
         f" (worst machine {min(shares, default=0.0):.1%}), {total['inside'] / points:.1%} within"
         f" the band; peaks in reach {total['reached']}, found within 2 % {total['found']}, within"
-        f" their interval {total['told']}, invented {total['invented']}; {np.median(seconds):.2f} s each"
-        f" (at most {max(seconds):.2f})"
+        f" their interval {total['told']}, invented {total['invented']}; {np.median(seconds):.2f} s"
+        f" each (at most {max(seconds):.2f})"
     )
 
 
