@@ -26,7 +26,7 @@ import pandas as pd
 
 import workbench as wb
 from benchmarks.response_rig import Machine, machine, record
-from identification.frequency.estimate import SURE, Response
+from identification.frequency.estimate import COHERENCE_SURE, Response
 from identification.frequency.modes import Peak
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
@@ -89,7 +89,7 @@ def judged(one: Machine, seed: int, seconds: float, friction: str, folder: Path 
     ended = time.process_time()
     points, near, inside = of_points(found.found.position, one)
     reached, hit, told_right, invented = of_peaks(found, one)
-    sure = found.found.body.seen & (found.found.body.coherence > SURE)
+    sure = found.found.body.seen & (found.found.body.coherence > COHERENCE_SURE)
     top = float(np.max(found.found.f[sure], initial=0.0))
     return Judged(
         points, near, inside, reached, hit, told_right, invented,
@@ -109,7 +109,7 @@ def with_truth(model: Model, one: Machine) -> Model:
 
 def of_points(plant: Response, one: Machine) -> tuple[int, int, int]:
     """Points of a coherence above 0.8: all, near the truth, within the band."""
-    sure = plant.seen & (plant.coherence > SURE)
+    sure = plant.seen & (plant.coherence > COHERENCE_SURE)
     off = plant.H[sure] / one.truth(plant.f[sure])
     near = (np.abs(20.0 * np.log10(np.abs(off))) < NEAR_DB) & (
         np.abs(np.degrees(np.angle(off))) < NEAR_DEG
@@ -159,7 +159,7 @@ def told(name: str, every: Sequence[Judged]) -> str:
     points = max(total["points"], 1)
     seconds = [one.seconds for one in every]
     return (
-        f"{name}: {len(every)} machines, {points} points above {SURE}:"
+        f"{name}: {len(every)} machines, {points} points above {COHERENCE_SURE}:"
         f" {total['near'] / points:.1%} within {NEAR_DB:g} dB and {NEAR_DEG:g} deg"
         f" (worst machine {min(shares, default=0.0):.1%}), {total['inside'] / points:.1%} within"
         f" the band; peaks in reach {total['reached']}, found within 2 % {total['found']}, within"

@@ -29,14 +29,16 @@ from scipy.stats import t as student
 from identification.arrays import Array, BoolArray
 from identification.frequency.stretches import INDEPENDENT, REACHES, ComplexArray
 
-SEEN = 0.5  # coherence from which a response is drawn
-SURE = 0.8  # coherence from which it is relied on
+COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
+COHERENCE_SURE = 0.8  # coherence from which it is relied on
 FEWEST_AVERAGES = 4.0
-CHANCE = 0.01  # that so much coherence is luck, at most
+LUCKY_COHERENCE = 0.01  # that so much coherence is luck, at most
 DEGREE = 2  # of a response over its neighbours
-WIDE = 1.5  # bins that Hann's window makes one of
-APART = 0.01  # of an input's power, that no other input makes; less is lost in what windows leak
-NARROW = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
+BINS_OF_ONE = 1.5  # bins that Hann's window makes one of
+APART_SHARE = (
+    0.01  # of an input's power, that no other input makes; less is lost in what windows leak
+)
+NARROW_BAND = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,9 +80,9 @@ class Response:
     def seen(self) -> BoolArray:
         """Where the logs show it: enough averages, and more coherence than luck gives, (k,)."""
         free = np.maximum(self.averages - 1.0, 1e-9)
-        luck = 1.0 - CHANCE ** (1.0 / free)
+        luck = 1.0 - LUCKY_COHERENCE ** (1.0 / free)
         enough = self.averages >= FEWEST_AVERAGES
-        return np.asarray(enough & (self.coherence >= np.maximum(SEEN, luck)))
+        return np.asarray(enough & (self.coherence >= np.maximum(COHERENCE_SEEN, luck)))
 
     def times(self, factor: NDArray[Any]) -> "Response":
         """The response in series with one that is known, (k,)."""
@@ -103,7 +105,7 @@ def responses(
 
 def _narrower(one: Response, wider: Response) -> Response:
     """The response where its band is narrow, else that by more neighbours."""
-    keep = one.half_band <= NARROW
+    keep = one.half_band <= NARROW_BAND
     names = ("H", "coherence", "averages")
     return Response(
         one.f, *(np.where(keep, getattr(one, name), getattr(wider, name)) for name in names)
@@ -129,7 +131,7 @@ def _with_reach(
     left = yy - 2.0 * np.real(_inner(theta, Xy)) + np.real(_inner(theta, XX @ theta))
     step = DEGREE + 1
     shown = np.sum(_neighbours(spectra.stretches, reach), axis=-1)
-    rows = INDEPENDENT / WIDE * shown
+    rows = INDEPENDENT / BINS_OF_ONE * shown
     left = np.maximum(left, 0.0) * rows / np.maximum(rows - step * len(x), 1.0)
     found = []
     for j in range(len(x)):
@@ -139,7 +141,7 @@ def _with_reach(
         share = 1.0 / np.maximum(np.real(inverse[:, step * j, step * j]) * alone, 1e-300)
         made = np.abs(theta[:, step * j, 0]) ** 2 * alone
         coherence = made / np.maximum(made + left, 1e-300)
-        apart = alone > APART * np.real(follows[:, step * j, step * j])
+        apart = alone > APART_SHARE * np.real(follows[:, step * j, step * j])
         averages = np.where(apart, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
         found.append(Response(spectra.f[inner], theta[:, step * j, 0], coherence, averages))
     return found

@@ -27,19 +27,19 @@ HERTZ_BEGUN = 48  # frequencies with which a mode's search begins
 DAMPING_BEGUN = (0.01, 0.05)
 SEARCHED_FROM = 3  # of these, the best
 STRUCTURE_ERROR = 0.02  # of the magnitude, that the form itself may be off
-GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
+MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
 OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
-STANDS_OUT = 0.25  # of the response without it, that a mode adds at its frequency
+STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
 MOST_DAMPING = 0.3  # of what is called a resonance
-UNSURE = 0.02  # of its frequency, deviation from which a peak is not told
-AROUND = 0.1  # of its frequency, within which points on either side show a peak
+UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not told
+AROUND_PEAK = 0.1  # of its frequency, within which points on either side show a peak
 POINTS_AROUND = 3  # that many, on either side
 MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
 SHARED = 8.0  # points that are of the same stretches and neighbours, and count as one
 OF_A_BIN = 0.3  # by which windows may draw a peak aside
-LONGEST_LAG = 0.05  # s
+LONGEST_MODE_LAG = 0.05  # s
 
 
 Kind = Literal["resonance", "anti-resonance"]
@@ -138,8 +138,12 @@ def _best(data: _Data, starts: Sequence[Array]) -> Array:
     found = []
     for p in starts:
         modes = (len(p) - 2) // 2
-        low = [-LONGEST_LAG, np.log(1e-4 * w[0]), *([np.log(0.5 * w[0]), np.log(1e-4)] * modes)]
-        high = [LONGEST_LAG, np.log(10.0 * w[1]), *([np.log(3.0 * w[1]), np.log(1.5)] * modes)]
+        low = [
+            -LONGEST_MODE_LAG,
+            np.log(1e-4 * w[0]),
+            *([np.log(0.5 * w[0]), np.log(1e-4)] * modes),
+        ]
+        high = [LONGEST_MODE_LAG, np.log(10.0 * w[1]), *([np.log(3.0 * w[1]), np.log(1.5)] * modes)]
         scale = [1e-4, 1.0, *([0.05, 0.5] * modes)]
         fit = least_squares(
             data.left, np.clip(p, low, high), bounds=(low, high), x_scale=scale, max_nfev=60
@@ -166,7 +170,7 @@ def _earns(data: _Data, before: Array, after: Array) -> bool:
     free = 2 * len(data.f) - 3 - 3 * ((len(after) - 2) // 2)
     gained = (was - now) / max(now / max(free, 1), 1.0)
     apart = all(_apart(after[-2:], after[k : k + 2]) for k in range(2, len(before), 2))
-    return bool(apart and gained > GAINS and was - now > OF_WHAT_IS_LEFT * was)
+    return bool(apart and gained > MODE_GAINS and was - now > OF_WHAT_IS_LEFT * was)
 
 
 def _apart(one: Array, other: Array) -> bool:
@@ -179,12 +183,12 @@ def _stands_out(data: _Data, p: Array, theta: Array, k: int) -> bool:
     w, z = np.exp(p[2 + 2 * k : 4 + 2 * k])
     parts = (_columns(p, np.array([w / (2.0 * np.pi)])) * theta)[0]
     own, rest = abs(parts[1 + k]), abs(np.sum(np.delete(parts, 1 + k)))
-    return bool(z < MOST_DAMPING and own > STANDS_OUT * rest and _shown(data, w / (2.0 * np.pi)))
+    return bool(z < MOST_DAMPING and own > STANDING_OUT * rest and _shown(data, w / (2.0 * np.pi)))
 
 
 def _shown(data: _Data, f: float) -> bool:
     """Whether points lie close to a frequency on either side."""
-    for low, high in (((1.0 - AROUND) * f, f), (f, (1.0 + AROUND) * f)):
+    for low, high in (((1.0 - AROUND_PEAK) * f, f), (f, (1.0 + AROUND_PEAK) * f)):
         there = np.count_nonzero((data.f >= low) & (data.f <= high))
         might = np.count_nonzero((data.every >= low) & (data.every <= high))
         if there < max(POINTS_AROUND, MOSTLY_SEEN * might):
@@ -208,7 +212,7 @@ def _told(data: _Data, p: Array) -> Modes:
         where = float(w / (2.0 * np.pi)), float(z)
         peaks.append(_peak(data, "resonance", where, (float(spread[0]), float(spread[1]))))
     peaks += _anti_resonances(data, p, theta, misfit)
-    sure = [one for one in peaks if one.frequency.sd < UNSURE * one.frequency.value]
+    sure = [one for one in peaks if one.frequency.sd < UNSURE_PEAK * one.frequency.value]
     return Modes(tuple(sorted(sure, key=lambda one: one.frequency.value)), p, theta, misfit)
 
 

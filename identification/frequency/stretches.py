@@ -21,13 +21,13 @@ ComplexArray = NDArray[np.complex128]
 
 REACHES = (4, 8, 16)  # neighbouring frequencies to either side by which one is told
 LOWEST_BIN = 2  # of a stretch that is read: the first has what is left of its mean
-CYCLES = 320.0  # of a frequency in its stretch, at least, where the logs are long enough
+CYCLES_IN_STRETCH = 320.0  # of a frequency in its stretch, at least, where the logs are long enough
 LEAST_CYCLES_SEEN = float(LOWEST_BIN + REACHES[0])  # of a frequency in its stretch
 STRETCHES_LONG = 8.0  # the longest stretch in all logs, so often
 LONGEST_STRETCH = 20.0  # s
-FEWEST_SAMPLES = 64  # in a stretch
+FEWEST_IN_STRETCH = 64  # in a stretch
 HIGHEST_SHARE_SEEN = 0.4  # of the sampling rate
-OVERLAP = 0.5
+STRETCH_OVERLAP = 0.5
 # Share of the stretches that count as independent: neighbours under Hann's window share 1/6.
 INDEPENDENT = 1.0 / (1.0 + 2.0 / 36.0)
 FEWEST_STRETCHES = 4  # in all logs, below which no spectrum is an average
@@ -55,7 +55,7 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
     length = min(whole / STRETCHES_LONG, longest_run / 2.0, LONGEST_STRETCH)
     if lowest is not None:
         length = LEAST_CYCLES_SEEN / lowest
-        there = sum(max(0.0, d / length - 1.0) / (1.0 - OVERLAP) + 1.0 for d in durations
+        there = sum(max(0.0, d / length - 1.0) / (1.0 - STRETCH_OVERLAP) + 1.0 for d in durations
                     if d >= length)  # fmt: skip
         if there < FEWEST_STRETCHES:
             raise BadSpecification(
@@ -63,15 +63,15 @@ def bands(durations: Sequence[float], periods: Sequence[float], lowest: float | 
                 f" in {whole:.3g} s of logs, at least {FEWEST_STRETCHES} needed; log longer, or ask"
                 f" for at least {LEAST_CYCLES_SEEN * FEWEST_STRETCHES / whole:.2g} Hz"
             )
-    if length < FEWEST_SAMPLES * fastest:
+    if length < FEWEST_IN_STRETCH * fastest:
         raise NotIdentifiable(
             f"{whole:.3g} s of logs every {1e3 * fastest:.3g} ms: stretches of"
-            f" {FEWEST_SAMPLES} samples needed, {STRETCHES_LONG:.0f} of them; log longer"
+            f" {FEWEST_IN_STRETCH} samples needed, {STRETCHES_LONG:.0f} of them; log longer"
         )
     out, begin = list[Band](), LEAST_CYCLES_SEEN / length
     while begin < most:
-        shortest = 0.5 * length < FEWEST_SAMPLES * fastest
-        end = most if shortest else min(max(2.0 * CYCLES / length, begin), most)
+        shortest = 0.5 * length < FEWEST_IN_STRETCH * fastest
+        end = most if shortest else min(max(2.0 * CYCLES_IN_STRETCH / length, begin), most)
         k = np.arange(np.ceil(begin * length - 1e-9), np.ceil(end * length - 1e-9))
         if len(k):
             with_neighbours = np.arange(k[0] - REACHES[-1], k[-1] + REACHES[-1] + 1)
@@ -85,11 +85,13 @@ def coefficients(x: Array, h: float, band: Band) -> ComplexArray:
 
     Zero beyond the frequencies that the log can show; no row where it is shorter than a stretch.
     """
-    n = max(FEWEST_SAMPLES // 2, round(band.length / h))
+    n = max(FEWEST_IN_STRETCH // 2, round(band.length / h))
     out = np.zeros((0, len(band.f)), dtype=np.complex128)
     if len(x) < n or not len(band.f):
         return out
-    frames = np.lib.stride_tricks.sliding_window_view(x, n)[:: max(1, round((1.0 - OVERLAP) * n))]
+    frames = np.lib.stride_tricks.sliding_window_view(x, n)[
+        :: max(1, round((1.0 - STRETCH_OVERLAP) * n))
+    ]
     frames = (frames - frames.mean(axis=1, keepdims=True)) * hann(n, sym=False)
     step = band.f[1] - band.f[0] if len(band.f) > 1 else 1.0
     turn = 2j * np.pi * h

@@ -29,7 +29,6 @@ from workbench.commands.fleet import fleet_view
 from workbench.commands.reidentify import pass_view
 from workbench.documents.design import Recommendation
 from workbench.documents.model import Model
-from workbench.logs.sources import Sources
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
 from workbench.report.demo_tables import demo_view
@@ -209,7 +208,7 @@ def predict() -> Iterator[Screen]:
 def response() -> Iterator[Screen]:
     source = replace(identified().sources[0], file=LOGS[0])
     card, _ = short_recipe()
-    found = respond(Sources(card, card.rig(), (source,), REMARKS), identified().model)
+    found = respond([source], card.rig(), card.name, identified().model, read=REMARKS)
     size = Size(123.456, 0.5)
     peaks = tuple(Peak("anti-resonance", size, Size(0.0123, 0.1 / n)) for n in range(1, 40))
     modes = Modes(peaks, np.zeros(2), np.zeros(2), 1.0)

@@ -82,7 +82,10 @@ def command(
             left = budget - (time.monotonic() - begun)
             known, left_in = _identified(sources, seed, left, as_json)
         with progress("averaging spectra", as_json=as_json):
-            found = respond(sources, known, lowest, left_in=left_in)
+            found = respond(
+                sources.runs, sources.rig, sources.card.name, known, lowest, left_in=left_in,
+                read=sources.remarks,
+            )  # fmt: skip
         document = response_document(found)
         folder.write_json("response.json", document)
         folder.write_text("response.csv", response_csv(found))

@@ -259,7 +259,11 @@ def response(
             with moving(course):
                 known, left_in = identified_or_not(found, seed, course.report)
     with _bar("averaging spectra"):
-        return ResponseResult(respond(found, known, lowest, left_in=left_in))
+        made = respond(
+            found.runs, found.rig, found.card.name, known, lowest, left_in=left_in,
+            read=found.remarks,
+        )  # fmt: skip
+    return ResponseResult(made)
 
 
 def drift(

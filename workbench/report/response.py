@@ -6,19 +6,29 @@ from pathlib import Path
 import numpy as np
 
 from identification.arrays import Array
+from identification.errors import UserError
 from identification.estimation.estimates import told_estimate
-from identification.frequency.estimate import SURE, Response
+from identification.frequency.estimate import COHERENCE_SURE, Response
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
+from workbench.documents.model import Model
+from workbench.logs.sources import Source
 from workbench.output import Row, written
 from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
 from workbench.report.page import Section, page
 from workbench.report.templating import render
 from workbench.screen import Part, Screen, listed, screen, tabled
-from workbench.steps.response import Responded, decibels, degrees, ranges, sure_share
+from workbench.steps.response import (
+    Responded,
+    decibels,
+    degrees,
+    ranges,
+    respond,
+    sure_share,
+)
 
 PEAK_HEAD = ("", "frequency", "95 % interval", "damping", "95 % interval")
 FREQUENCY = "frequency [Hz]"
@@ -89,7 +99,7 @@ def friction_line(found: Responded) -> str:
     upto = float(every.f[every.body.seen][-1])
     with_, without = (sure_share(one, upto) for one in (every.with_friction, every.body))
     return (
-        f"friction: taken off the force; that leaves a coherence above {SURE:g} on"
+        f"friction: taken off the force; that leaves a coherence above {COHERENCE_SURE:g} on"
         f" {100 * without:.0f} % of the octaves up to {number(upto)} Hz,"
         f" {100 * with_:.0f} % with friction left in"
     )
@@ -109,11 +119,11 @@ def spectra_line(found: Responded) -> str:
 def response_lines(found: Responded) -> list[str]:
     """All that is said of the curves, a line each."""
     body = found.found.body
-    sure = ranges(body.f, body.seen & (body.coherence > SURE))
+    sure = ranges(body.f, body.seen & (body.coherence > COHERENCE_SURE))
     return [
         loop_line(found),
         friction_line(found),
-        f"coherence above {SURE:g}: {_spans(sure)}",
+        f"coherence above {COHERENCE_SURE:g}: {_spans(sure)}",
         spectra_line(found),
     ]
 
@@ -146,6 +156,20 @@ def response_report(found: Responded) -> str:
         sections.append(Section("Notes", render("lines", lines=told)))
     title = f"Frequency response of {found.card}"
     return page(title, response_sentence(found), sections)
+
+
+def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
+    """The section of other reports: the plant over frequency of the model's own logs, with its
+    resonances; none where they show it nowhere."""
+    try:
+        found = respond(runs, model.rig, model.card, model)
+    except UserError:
+        return []
+    lines = [response_sentence(found), friction_line(found)]
+    said = render("lines", lines=lines)
+    if found.peaks:
+        said = render("table", head=PEAK_HEAD, rows=peak_rows(found), lines=lines)
+    return [Section("Over frequency", plant_html(found) + said)]
 
 
 def plant_html(found: Responded) -> str:
@@ -239,15 +263,24 @@ def _bode(
     coherence = [_line("measured", x, one.coherence[use])]
     if beside is not None:
         coherence.insert(0, _line("friction left in", x, beside.coherence[use], "before"))
+    shown_range = _round_range(x)
     level = [[], []] if levels is None else [[Mark(one)] for one in levels]
     return [
         Panel(FREQUENCY, "magnitude [dB]", magnitude, title, areas[:1],
-              marks=[*marks, *level[0]], log_x=True),
+              marks=[*marks, *level[0]], log_x=True, x_range=shown_range),
         Panel(FREQUENCY, "phase [deg]", turn, "", areas[1:], marks=[*marks, *level[1]],
-              log_x=True),
-        Panel(FREQUENCY, "coherence [-]", coherence, marks=[Mark(SURE)], y_range=(0.0, 1.02),
-              log_x=True, height=150),
+              log_x=True, x_range=shown_range),
+        Panel(FREQUENCY, "coherence [-]", coherence, marks=[Mark(COHERENCE_SURE)],
+              y_range=(0.0, 1.02), log_x=True, height=150, x_range=shown_range),
     ]  # fmt: skip
+
+
+def _round_range(f: Array) -> tuple[float, float]:
+    """The least range with ends of 1, 2 or 5 that holds the frequencies."""
+    ends = np.sort(np.outer(10.0 ** np.arange(-4, 6), [1.0, 2.0, 5.0]).ravel())
+    low = ends[max(int(np.searchsorted(ends, f[0], side="right")) - 1, 0)]
+    high = ends[min(int(np.searchsorted(ends, f[-1])), len(ends) - 1)]
+    return float(low), float(high)
 
 
 def _line(name: str, x: Array, y: Array, colour: Colour = "measured", look: Look = "line") -> Line:

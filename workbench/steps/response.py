@@ -13,11 +13,11 @@ from identification.arrays import Array, BoolArray
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.estimates import told_estimate
 from identification.frequency.body import body_response
-from identification.frequency.estimate import SURE, Response, in_series
+from identification.frequency.estimate import COHERENCE_SURE, Response, in_series
 from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
 from identification.frequency.modes import Modes, Peak, fit_modes
 from identification.frequency.stretches import ComplexArray, hold
-from identification.log import Log
+from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import Motor
 from identification.model.size import Size
@@ -26,7 +26,7 @@ from identification.signals.clean import applied_force
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
 from workbench.documents.plain import as_number
-from workbench.logs.sources import Sources, fingerprints
+from workbench.logs.sources import Source, Sources, fingerprints
 from workbench.steps.identify import Progress
 from workbench.steps.identify_sources import identify_sources
 from workbench.steps.linear_force import linear_recording, of_modes, plain_recording
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Curve = Literal["plant", "velocity", "plant_with_friction", "controller", "open_loop"]
-PASSES = 1  # in which what a body at rest is held by follows from its own response
+PASSES_AT_REST = 1  # in which what a body at rest is held by follows from its own response
 RESPONSE_SCHEMA = "response/1"
 GAP_FORGIVEN = 3  # points in a row that are missing, within a range of frequencies
 FEWEST_IN_RANGE = 3  # points of a range
@@ -76,26 +76,31 @@ class Responded:
 
 
 def respond(
-    sources: Sources, model: Model | None, lowest: float | None = None, *,
-    left_in: str | None = None, read: Sequence[str] = (),
+    runs: Sequence[Source], rig: Rig, card: str, model: Model | None, lowest: float | None = None,
+    *, left_in: str | None = None, read: Sequence[str] = (),
 ) -> Responded:  # fmt: skip
-    """The frequency responses of the runs together.
+    """The frequency responses of the runs together; card: its name.
 
     model: whose friction is taken off the force; left_in: why not, where there is none, or where it
     is not to be; lowest [Hz]: the frequency to reach down to. read: more remarks. Raises BadLog
     without an applied force, NotIdentifiable where the runs show nothing.
     """
-    _same_machine(model, sources)
+    if model is not None and rig.motion != model.rig.motion:
+        raise BadModel(
+            f"the model is of a {model.rig.motion} machine, but the card {card} says"
+            f' motion = "{rig.motion}"; give the model and the card of one machine'
+        )
+    logs = [_with_force(one.log, rig) for one in runs]
     taken = model if left_in is None else None
-    found, modes = _measured(sources, taken, lowest)
+    found, modes = _measured(logs, rig.kind == "motor", taken, lowest)
     if not np.any(found.body.seen):
-        raise NotIdentifiable(_nothing(sources, found))
+        raise NotIdentifiable(_nothing(runs, found))
     curves = None if model is None else curves_of(model, found.f)
     loop = _open_loop(found, curves)
     return Responded(
-        card=sources.card.name,
-        rotary=sources.rig.motion == "rotary",
-        logs=tuple(fingerprints(sources.runs)),
+        card=card,
+        rotary=rig.motion == "rotary",
+        logs=tuple(fingerprints(runs)),
         found=found,
         modes=modes,
         open_loop=loop,
@@ -103,7 +108,7 @@ def respond(
         curves=curves,
         model=taken,
         left_in=left_in,
-        remarks=(*read, *sources.remarks, *_remarks(sources, found, taken)),
+        remarks=(*read, *_remarks(logs, card, found, taken)),
     )
 
 
@@ -120,16 +125,14 @@ def identified_or_not(
 
 
 def _measured(
-    sources: Sources, model: Model | None, lowest: float | None
+    logs: Sequence[Log], held: bool, model: Model | None, lowest: float | None
 ) -> tuple[MachineResponses, Modes | None]:
     """The responses and their modes; a body at rest is held by what its own modes make of it."""
-    held = sources.rig.kind == "motor"
-    logs = [_with_force(one.log, sources) for one in sources.runs]
     if model is None:
         found = machine_responses([plain_recording(log, held) for log in logs], lowest)
         return found, fit_modes(found.body)
     runs = [linear_recording(log, model) for log in logs]
-    for _ in range(PASSES):
+    for _ in range(PASSES_AT_REST):
         body = body_by_force(runs, lowest)
         modes = fit_modes(body)
         if modes is None:
@@ -181,10 +184,10 @@ def _open_loop(found: MachineResponses, curves: Curves | None) -> Response | Non
     return found.position.times(curves.controller)
 
 
-def _with_force(log: Log, sources: Sources) -> Log:
+def _with_force(log: Log, rig: Rig) -> Log:
     if "F" in log:
         return log
-    F = applied_force(log, sources.rig)
+    F = applied_force(log, rig)
     if F is None:
         raise BadLog(
             f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
@@ -192,17 +195,9 @@ def _with_force(log: Log, sources: Sources) -> Log:
     return log.with_signals(F=F)
 
 
-def _same_machine(model: Model | None, sources: Sources) -> None:
-    if model is not None and sources.rig.motion != model.rig.motion:
-        raise BadModel(
-            f"the model is of a {model.rig.motion} machine, but {sources.card.path} says"
-            f' motion = "{sources.rig.motion}"; give the model and the card of one machine'
-        )
-
-
-def _nothing(sources: Sources, found: MachineResponses) -> str:
+def _nothing(runs: Sequence[Source], found: MachineResponses) -> str:
     """Why no frequency is drawn, in words."""
-    names = ", ".join(dict.fromkeys(one.file for one in sources.runs))
+    names = ", ".join(dict.fromkeys(one.file for one in runs))
     best = float(np.max(found.body.coherence, initial=0.0))
     follows = "the reference" if found.instrument else "the force"
     return (
@@ -212,17 +207,19 @@ def _nothing(sources: Sources, found: MachineResponses) -> str:
     )
 
 
-def _remarks(sources: Sources, found: MachineResponses, model: Model | None) -> list[str]:
+def _remarks(
+    logs: Sequence[Log], card: str, found: MachineResponses, model: Model | None
+) -> list[str]:
     """What to know of the curves."""
     out = []
     if not found.instrument:
-        why = "no reference is logged" if "r" not in sources.runs[0].log else "the reference rests"
+        why = "the reference rests" if "r" in logs[0] else "no reference is logged"
         out.append(
             f"{why}: the response is that from force to position directly; where noise goes round"
             " a loop it shows the controller's inverse instead"
         )
-    if model is not None and model.card != sources.card.name:
-        out.append(f"the model is of {model.card}, the logs of {sources.card.name}")
+    if model is not None and model.card != card:
+        out.append(f"the model is of {model.card}, the logs of {card}")
     return out
 
 
@@ -236,10 +233,10 @@ def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
 
 
 def sure_share(response: Response, upto: float) -> float:
-    """Share of the octaves up to a frequency [Hz] at which the coherence is above `SURE`."""
+    """Share of the octaves up to a frequency [Hz] at which the response is to be relied on."""
     inside = response.f <= upto
     weight = np.gradient(np.log(response.f))
-    sure = response.seen & (response.coherence > SURE)
+    sure = response.seen & (response.coherence > COHERENCE_SURE)
     return float(np.sum(weight[inside & sure]) / np.sum(weight[inside]))
 
 
@@ -278,7 +275,7 @@ def response_document(found: Responded) -> dict[str, Any]:
 
 
 def _seen(response: Response, unit: str) -> dict[str, Any]:
-    sure = response.seen & (response.coherence > SURE)
+    sure = response.seen & (response.coherence > COHERENCE_SURE)
     return {
         "unit": unit,
         "seen_hz": ranges(response.f, response.seen),

@@ -5,7 +5,7 @@ import pytest
 
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.frequency.stretches import (
-    CYCLES,
+    CYCLES_IN_STRETCH,
     LONGEST_STRETCH,
     REACHES,
     Band,
@@ -22,7 +22,7 @@ def test_stretches_follow_the_logs_length_and_halve_with_frequency() -> None:
     inner = [one.f[REACHES[-1] : -REACHES[-1]] for one in found]
     assert inner[0][0] == pytest.approx(6 / 7.5)
     for one, f, after in zip(found, inner, inner[1:], strict=False):
-        assert f[-1] * one.length < 2.0 * CYCLES <= after[0] * one.length + 1.0
+        assert f[-1] * one.length < 2.0 * CYCLES_IN_STRETCH <= after[0] * one.length + 1.0
     every = np.concatenate(inner)
     assert np.all(np.diff(every) > 0) and every[-1] <= 400.0
     assert bands([1e4], [1e-3], None)[0].length == LONGEST_STRETCH
