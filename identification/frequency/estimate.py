@@ -14,8 +14,8 @@ is
 S_x'x' what of the input follows the instruments and no other input, e what the responses leave. Of
 one input without instrument it is the usual one. Sources: Bendat, Piersol, Random Data, 4th ed.
 (2010), chapters 6, 7 and 9; local polynomials, Pintelon, Schoukens, System Identification, 2nd ed.
-(2012), section 7.2; instruments in closed loop, Soderstrom, Stoica, System Identification (1989),
-chapter 8, and Wellstead, Automatica 17 (1981) 87.
+(2012), chapter 7; instruments in closed loop, Soderstrom, Stoica, System Identification (1989),
+chapter 8, and Wellstead, Automatica 17 (1981) 55.
 """
 
 from collections.abc import Sequence
@@ -35,9 +35,7 @@ FEWEST_AVERAGES = 4.0
 LUCKY_COHERENCE = 0.01  # that so much coherence is luck, at most
 DEGREE = 2  # of a response over its neighbours
 BINS_OF_ONE = 1.5  # bins that Hann's window makes one of
-APART_SHARE = (
-    0.01  # of an input's power, that no other input makes; less is lost in what windows leak
-)
+APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
 NARROW_BAND = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
 
 
@@ -65,7 +63,7 @@ class Response:
     def sd(self) -> Array:
         """Relative standard deviation of the magnitude, and that of the phase [rad], (k,).
 
-        sqrt((1 - gamma^2) / (2 n gamma^2)); Bendat & Piersol, eqs. (9.90) and (9.91).
+        sqrt((1 - gamma^2) / (2 n gamma^2)); Bendat & Piersol, chapter 9.
         """
         g = np.clip(self.coherence, 1e-12, 1.0)
         return np.sqrt((1.0 - g) / (2.0 * np.maximum(self.averages, 1.0) * g))

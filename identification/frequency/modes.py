@@ -6,7 +6,7 @@ is acceleration by force: a rigid body with viscous friction, elastic modes, and
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
 projection). Modes are added one by one while each explains far more than luck; told are those that
 stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal form,
-Ewins, Modal Testing, 2nd ed. (2000), section 4.4; variable projection, Golub, Pereyra, SIAM J.
+Ewins, Modal Testing, 2nd ed. (2000), chapter 4; variable projection, Golub, Pereyra, SIAM J.
 Numer. Anal. 10 (1973) 413.
 """
 

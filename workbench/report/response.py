@@ -80,7 +80,7 @@ def loop_line(found: Responded) -> str:
     m = found.margins
     by = "the logs" if found.found.controller is not None else "the card's controller"
     if m.crossover is None:
-        return f"open loop (by {by}): its crossing of 0 dB is not within what the logs show"
+        return f"open loop (by {by}): {_where_it_crosses(found.open_loop)}"
     said = [f"crosses 0 dB at {number(m.crossover)} Hz"]
     if m.phase_deg is not None:
         said.append(f"phase margin {number(m.phase_deg)} deg")
@@ -89,6 +89,19 @@ def loop_line(found: Responded) -> str:
     if m.delay_s is not None:
         said.append(f"delay margin {number(1e3 * m.delay_s)} ms")
     return f"open loop (by {by}): {', '.join(said)}"
+
+
+def _where_it_crosses(loop: Response) -> str:
+    """On which side of what is seen an open loop crosses 0 dB, in words."""
+    f, size = loop.f[loop.seen], np.abs(loop.H[loop.seen])
+    if len(f) and np.all(size < 1.0):
+        return (
+            f"crosses 0 dB below {number(float(f[0]))} Hz, the lowest frequency at which the logs"
+            " show it (--lowest reaches further down)"
+        )
+    if len(f) and np.all(size > 1.0):
+        return f"crosses 0 dB above {number(float(f[-1]))} Hz, the highest at which it is seen"
+    return "its crossing of 0 dB is not within what the logs show"
 
 
 def friction_line(found: Responded) -> str:

@@ -64,8 +64,8 @@ def checked(html: str, figures: int) -> str:
 def test_identification_report() -> None:
     html = checked(identification_report(identified()), 4)
     for text in ("position [mm]", "applied force [N]", "velocity [mm/s]", "friction force [N]",
-                 "time [s]", "moving mass", "95 % interval", "short.csv", "a remark", "Over frequency",
-                 "from force to position [m/N]"):  # fmt: skip
+                 "time [s]", "moving mass", "95 % interval", "short.csv", "a remark",
+                 "Over frequency", "from force to position [m/N]"):  # fmt: skip
         assert text in html
 
 

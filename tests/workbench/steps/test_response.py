@@ -120,6 +120,13 @@ def test_crossover_and_phase_margin_are_those_of_the_loop() -> None:
     L = true_controller(f, TWO) * TWO.truth(f)
     assert abs(L[0]) == pytest.approx(1.0, abs=0.05)
     assert m.phase_deg == pytest.approx(180 + np.degrees(np.angle(L[0])), abs=4.0)
+    open_loop = found.open_loop
+    assert open_loop is not None
+    for part, said in ((open_loop.f > 20.0, "below 2"), (open_loop.f < 5.0, "above 4.")):
+        unseen = np.where(part, open_loop.coherence, 0.0)
+        cut = replace(found, open_loop=replace(open_loop, coherence=unseen),
+                      margins=replace(m, crossover=None))  # fmt: skip
+        assert f"crosses 0 dB {said}" in loop_line(cut)
     assert f"crosses 0 dB at {m.crossover:.3g} Hz" in loop_line(found)
 
 
