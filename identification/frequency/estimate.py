@@ -27,13 +27,14 @@ from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from identification.arrays import Array, BoolArray
-from identification.frequency.stretches import INDEPENDENT, REACHES, ComplexArray
+from identification.frequency.stretches import INDEPENDENT, REACHES, Band, ComplexArray
 
 COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
 COHERENCE_SURE = 0.8  # coherence from which it is relied on
 FEWEST_AVERAGES = 4.0
 LUCKY_COHERENCE = 0.01  # that so much coherence is luck, at most
 DEGREE = 2  # of a response over its neighbours
+RIDGE = 1e-12  # of the diagonal, that keeps what is all but singular from being so
 BINS_OF_ONE = 1.5  # bins that Hann's window makes one of
 APART_SHARE = 0.01  # of an input's power, that no other makes; less is lost in what windows leak
 NARROW_BAND = 0.06  # half of a 95 % band (0.5 dB, 3.4 degrees), from which resolution counts more
@@ -87,6 +88,19 @@ class Response:
         return replace(self, H=np.asarray(self.H * factor, dtype=np.complex128))
 
 
+def cross_spectra(
+    band: Band, names: tuple[str, ...], each: Sequence[Sequence[ComplexArray]]
+) -> Spectra:
+    """Spectra of the coefficients (s, K) of each signal of each run, summed over the stretches."""
+    m = len(names)
+    S, stretches = np.zeros((len(band.f), m, m), dtype=np.complex128), np.zeros(len(band.f))
+    for signals in each:
+        x = np.moveaxis(np.stack(signals), 2, 0)  # (K, m, s)
+        stretches += np.count_nonzero(signals[0], axis=0)
+        S += np.conj(x) @ np.swapaxes(x, 1, 2)
+    return Spectra(band.f, names, S, stretches)
+
+
 def responses(
     spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str] = ()
 ) -> list[Response]:
@@ -94,9 +108,9 @@ def responses(
 
     instruments: at least as many as inputs, or none.
     """
-    found = _with_reach(spectra, out, inputs, instruments, REACHES[0])
+    found = responses_with_reach(spectra, out, inputs, instruments, REACHES[0])
     for reach in REACHES[1:]:
-        wider = _with_reach(spectra, out, inputs, instruments, reach)
+        wider = responses_with_reach(spectra, out, inputs, instruments, reach)
         found = [_narrower(one, other) for one, other in zip(found, wider, strict=True)]
     return found
 
@@ -110,11 +124,32 @@ def _narrower(one: Response, wider: Response) -> Response:
     )
 
 
-def _with_reach(
+@dataclass(frozen=True, eq=False)
+class _Solution:
+    """Of the normal equations: X'^H X' and its inverse (k, 3q, 3q), theta (k, 3q, 1), what is left
+    of the output and the output itself (k,), independent rows (k,)."""
+
+    follows: ComplexArray
+    inverse: ComplexArray
+    theta: ComplexArray
+    left: Array
+    whole: Array
+    rows: Array
+
+
+def left_over(
+    spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str] = ()
+) -> Array:
+    """Share of the power of `out` that the responses to the inputs leave, (k,)."""
+    found = _solution(spectra, out, inputs, instruments, REACHES[1])
+    share = found.left / np.maximum(found.whole, 1e-300)
+    return np.where(found.whole > 0.0, np.maximum(share, 1e-12), 1.0)
+
+
+def _solution(
     spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str], reach: int
-) -> list[Response]:
+) -> _Solution:
     M = _moments(spectra.S, reach)
-    inner = slice(REACHES[-1], len(spectra.f) - REACHES[-1])
     at = {name: k for k, name in enumerate(spectra.names)}
     x, z, y = [at[name] for name in inputs], [at[name] for name in instruments], at[out]
     XX, Xy = _columns(M, x, x), _columns(M, x, [y])[:, :, :1]
@@ -127,21 +162,28 @@ def _with_reach(
     theta = inverse @ with_out
     yy = np.real(M[0][:, y, y])
     left = yy - 2.0 * np.real(_inner(theta, Xy)) + np.real(_inner(theta, XX @ theta))
-    step = DEGREE + 1
-    shown = np.sum(_neighbours(spectra.stretches, reach), axis=-1)
-    rows = INDEPENDENT / BINS_OF_ONE * shown
-    left = np.maximum(left, 0.0) * rows / np.maximum(rows - step * len(x), 1.0)
+    rows = INDEPENDENT / BINS_OF_ONE * np.sum(_neighbours(spectra.stretches, reach), axis=-1)
+    free = np.maximum(rows - (DEGREE + 1) * len(x), 1.0)
+    return _Solution(follows, inverse, theta, np.maximum(left, 0.0) * rows / free, yy, rows)
+
+
+def responses_with_reach(
+    spectra: Spectra, out: str, inputs: Sequence[str], instruments: Sequence[str], reach: int
+) -> list[Response]:
+    """As `responses`, with so many neighbours to either side, one of `REACHES`."""
+    s = _solution(spectra, out, inputs, instruments, reach)
+    f, step = spectra.f[REACHES[-1] : len(spectra.f) - REACHES[-1]], DEGREE + 1
     found = []
-    for j in range(len(x)):
+    for j in range(len(inputs)):
         own = slice(step * j, step * (j + 1))
         # What of the input no other one makes; of its averages the slopes take a share.
-        alone = np.maximum(np.real(_inverse(inverse[:, own, own])[:, 0, 0]), 0.0)
-        share = 1.0 / np.maximum(np.real(inverse[:, step * j, step * j]) * alone, 1e-300)
-        made = np.abs(theta[:, step * j, 0]) ** 2 * alone
-        coherence = made / np.maximum(made + left, 1e-300)
-        apart = alone > APART_SHARE * np.real(follows[:, step * j, step * j])
-        averages = np.where(apart, np.maximum(rows * share - len(x) + 1.0, 0.0), 0.0)
-        found.append(Response(spectra.f[inner], theta[:, step * j, 0], coherence, averages))
+        alone = np.maximum(np.real(_inverse(s.inverse[:, own, own])[:, 0, 0]), 0.0)
+        share = 1.0 / np.maximum(np.real(s.inverse[:, step * j, step * j]) * alone, 1e-300)
+        made = np.abs(s.theta[:, step * j, 0]) ** 2 * alone
+        coherence = made / np.maximum(made + s.left, 1e-300)
+        apart = alone > APART_SHARE * np.real(s.follows[:, step * j, step * j])
+        averages = np.where(apart, np.maximum(s.rows * share - len(inputs) + 1.0, 0.0), 0.0)
+        found.append(Response(f, s.theta[:, step * j, 0], coherence, averages))
     return found
 
 
@@ -197,5 +239,6 @@ def _inverse(a: ComplexArray) -> ComplexArray:
     size = np.sqrt(np.maximum(np.real(np.einsum("kii->ki", a)), 0.0))
     known = size > 0.0
     unit = np.where(known, 1.0 / np.where(known, size, 1.0), 0.0)
-    whole = np.linalg.pinv(a * unit[:, :, None] * unit[:, None, :], rcond=1e-12)
+    slack = np.eye(a.shape[1]) * RIDGE + (~known)[:, :, None] * np.eye(a.shape[1])
+    whole = np.linalg.inv(a * unit[:, :, None] * unit[:, None, :] + slack)
     return np.asarray(whole * unit[:, :, None] * unit[:, None, :], dtype=np.complex128)

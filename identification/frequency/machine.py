@@ -11,7 +11,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array
-from identification.frequency.estimate import Response, Spectra, joined, responses
+from identification.frequency.estimate import (
+    Response,
+    Spectra,
+    cross_spectra,
+    joined,
+    responses,
+)
 from identification.frequency.stretches import (
     Band,
     ComplexArray,
@@ -80,10 +86,10 @@ def machine_responses(runs: Sequence[Recording], lowest: float | None = None) ->
     lowest [Hz]: that is asked for. Raises BadSpecification, NotIdentifiable where the runs are too
     short.
     """
-    cut = _bands(runs, lowest)
-    instruments = _instruments(runs)
+    every_band = cut(runs, lowest)
+    instruments = instruments_of(runs)
     names = ("a", "linear", "F", "r", "F_2") if instruments else ("a", "linear", "F")
-    every = [_spectra(runs, band, names) for band in cut]
+    every = [spectra_of(runs, band, names) for band in every_band]
     body, with_friction = (
         joined([responses(one, "a", [force], instruments)[0] for one in every])
         for force in ("linear", "F")
@@ -93,40 +99,35 @@ def machine_responses(runs: Sequence[Recording], lowest: float | None = None) ->
         # F = T r - R y: all have a motion's steep spectrum, so second derivatives are taken.
         found = joined([responses(one, "F_2", ["r", "a"])[1] for one in every])
         controller = found.times(-np.ones(1)) if np.any(found.seen) else None
-    lengths = tuple(band.length for band in cut)
+    lengths = tuple(band.length for band in every_band)
     return MachineResponses(body, with_friction, controller, bool(instruments), lengths)
 
 
 def body_by_force(runs: Sequence[Recording], lowest: float | None = None) -> Response:
     """Acceleration by force without friction alone, as `machine_responses` has it."""
-    instruments = _instruments(runs)
+    instruments = instruments_of(runs)
     names = ("a", "linear", "r") if instruments else ("a", "linear")
-    each = [_spectra(runs, band, names) for band in _bands(runs, lowest)]
+    each = [spectra_of(runs, band, names) for band in cut(runs, lowest)]
     return joined([responses(one, "a", ["linear"], instruments)[0] for one in each])
 
 
-def _bands(runs: Sequence[Recording], lowest: float | None) -> list[Band]:
+def cut(runs: Sequence[Recording], lowest: float | None) -> list[Band]:
+    """The bands of frequencies and their stretches, as `stretches.bands` has them."""
     return bands([one.duration for one in runs], [one.h for one in runs], lowest)
 
 
-def _instruments(runs: Sequence[Recording]) -> tuple[str, ...]:
+def instruments_of(runs: Sequence[Recording]) -> tuple[str, ...]:
     """The reference, where every run has one that moves."""
     return ("r",) if all(one.r is not None and np.ptp(one.r) > 0.0 for one in runs) else ()
 
 
-def _spectra(runs: Sequence[Recording], band: Band, names: tuple[str, ...]) -> Spectra:
+def spectra_of(runs: Sequence[Recording], band: Band, names: tuple[str, ...]) -> Spectra:
     """Cross spectra of the signals over the stretches of all runs."""
-    m = len(names)
-    S, stretches = np.zeros((len(band.f), m, m), dtype=np.complex128), np.zeros(len(band.f))
-    for one in runs:
-        x = np.stack([_coefficients(one, band, name) for name in names])
-        stretches += np.count_nonzero(x[0], axis=0)
-        by_frequency = np.moveaxis(x, 2, 0)  # (K, m, s)
-        S += np.conj(by_frequency) @ np.swapaxes(by_frequency, 1, 2)
-    return Spectra(band.f, names, S, stretches)
+    each = [[coefficients_of(one, band, name) for name in names] for one in runs]
+    return cross_spectra(band, names, each)
 
 
-def _coefficients(one: Recording, band: Band, name: str) -> ComplexArray:
+def coefficients_of(one: Recording, band: Band, name: str) -> ComplexArray:
     """Of a run's stretches, (s, k): the forces, the accelerations of position and reference, and
     the second derivative of the force."""
     held = hold(band.f, one.h) if one.held else 1.0

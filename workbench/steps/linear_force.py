@@ -1,17 +1,17 @@
 """Log + model -> the force without friction, of which a linear body's motion would come."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.frequency.machine import Recording
 from identification.frequency.modes import Modes
+from identification.frequency.swinging_load import Load, Rests
 from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING
 from identification.model.plant import Plant
-from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import Motion, differentiate
 from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import dead_time
@@ -34,12 +34,36 @@ def plain_recording(log: Log, held: bool) -> Recording:
     return Recording(log.h, log["y"], log["F"], log["F"], log.signals.get("r"), held)
 
 
-def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> Recording:
-    """The log with its force without friction and what else of the model is not linear.
+@dataclass(frozen=True, eq=False)
+class Freed:
+    """A log whose force is freed of friction where the body surely slides.
 
-    Where the body surely slides, these are taken off. Where it rests or is slow friction is
-    whatever holds it, and the force is what the motion needs of a linear body, by default the
-    model's. Raises BadLog where the log lacks a signal of an effect.
+    plain: as it stands, but for what its transducer shows of the body; v, a: the motion, over each
+    sample [m/s, m/s^2]; slides: where `left` [N] is what friction leaves of the force, (n,) each.
+    """
+
+    plain: Recording
+    v: Array
+    a: Array
+    slides: BoolArray
+    left: Array
+
+    def held_by(self, body: BodyForce) -> Recording:
+        """The log with its force without friction: where the body rests or is slow friction is
+        whatever holds it, and the force is what the motion needs of a linear body."""
+        resting = body(self.v, self.a, self.plain.h)
+        return replace(self.plain, linear=np.where(self.slides, self.left, resting))
+
+    @property
+    def rests(self) -> Rests:
+        """Where the body rests or is slow, and its acceleration, for `swinging_load`."""
+        return Rests(~self.slides, self.a)
+
+
+def freed(log: Log, model: Model) -> Freed:
+    """The log without friction and what else of the model is not linear, where the body slides.
+
+    Raises BadLog where the log lacks a signal of an effect.
     """
     nonlinear = tuple(one for one in model.acting if one.key not in LINEAR_EFFECTS)
     plant = replace(model.simulated, effects=nonlinear)
@@ -48,15 +72,36 @@ def linear_recording(log: Log, model: Model, body: BodyForce | None = None) -> R
     moved = of_body(with_motor_force(log, plant), plant)
     motion, late = differentiate(moved["y"], log.h), dead_time(model)
     d = _direction(motion, plant)
-    opposed = opposing_force(moved, plant, motion, d)
-    # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
-    resting = (body or _body_of(model))(motion.v, _acceleration(motion.v, log.h, held), log.h)
-    slides = d != 0
+    opposed, slides = opposing_force(moved, plant, motion, d), d != 0
     if held:
         opposed, slides = _over_period(opposed), slides & _following(slides)
-    left = np.where(slides, np.asarray(moved["F"]) - _earlier(opposed, late, log), resting)
-    found = plain_recording(log, held)
-    return replace(found, y=np.asarray(moved["y"]), F=np.asarray(moved["F"]), linear=left)
+    y, F = np.asarray(moved["y"]), np.asarray(moved["F"])
+    plain = replace(plain_recording(log, held), y=y, F=F)
+    # What is slow is not at rest: an encoder's steps hide motion that a multisine makes.
+    a = _acceleration(motion.v, log.h, held)
+    return Freed(plain, motion.v, a, slides, F - _earlier(opposed, late, log))
+
+
+def of_model(model: Model) -> BodyForce:
+    """The force by the model's mass and viscous friction, and its second mass, where it has one."""
+    if model.resonance is None:
+        return of_load(model, None)
+    shape = {name: used(one) for name, one in model.resonance.items()}
+    share = shape["m_2"] / (shape["m_1"] + shape["m_2"])
+    anti = shape["anti_resonance"]
+    return of_load(model, Load(anti, shape["damping"] * anti / shape["frequency"], share))
+
+
+def of_load(model: Model, load: Load | None) -> BodyForce:
+    """The force by the model's mass and viscous friction, a share of the mass behind a spring."""
+    p = model.karnopp
+    viscous = 0.5 * (p.F_vp + p.F_vn)
+
+    def force(v: Array, a: Array, h: float) -> Array:
+        moved = a if load is None else a + load.share * load.beyond(a, h)
+        return np.asarray(p.m * moved + viscous * v)
+
+    return force
 
 
 def of_modes(modes: Modes, highest: float) -> BodyForce:
@@ -69,23 +114,6 @@ def of_modes(modes: Modes, highest: float) -> BodyForce:
         impedance = 2j * np.pi * f / modes.undelayed(known)
         impedance[0] = impedance[1].real
         return np.asarray(np.fft.irfft(np.fft.rfft(v, n) * impedance, n)[: len(v)])
-
-    return force
-
-
-def _body_of(model: Model) -> BodyForce:
-    """The force by the model's mass and viscous friction, and its second mass, where it has one."""
-    p = model.karnopp
-    viscous = 0.5 * (p.F_vp + p.F_vn)
-
-    def force(v: Array, a: Array, h: float) -> Array:
-        if model.resonance is None:
-            return np.asarray(p.m * a + viscous * v)
-        shape = {name: used(one) for name, one in model.resonance.items()}
-        load = load_acceleration(
-            a, h, shape["frequency"], shape["anti_resonance"], shape["damping"]
-        )
-        return np.asarray(shape["m_1"] * a + shape["m_2"] * load + viscous * v)
 
     return force
 

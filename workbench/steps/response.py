@@ -17,6 +17,7 @@ from identification.frequency.estimate import COHERENCE_SURE, Response, in_serie
 from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
 from identification.frequency.modes import Modes, Peak, fit_modes
 from identification.frequency.stretches import ComplexArray, hold
+from identification.frequency.swinging_load import swinging_load
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.model.plant import Motor
@@ -29,7 +30,7 @@ from workbench.documents.plain import as_number
 from workbench.logs.sources import Source, Sources, fingerprints
 from workbench.steps.identify import Progress
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.linear_force import linear_recording, of_modes, plain_recording
+from workbench.steps.linear_force import freed, of_load, of_model, of_modes, plain_recording
 from workbench.steps.linear_loop import dead_time
 
 if TYPE_CHECKING:
@@ -131,14 +132,18 @@ def _measured(
     if model is None:
         found = machine_responses([plain_recording(log, held) for log in logs], lowest)
         return found, fit_modes(found.body)
-    runs = [linear_recording(log, model) for log in logs]
+    every = [freed(log, model) for log in logs]
+    runs = [one.held_by(of_model(model)) for one in every]
+    if model.resonance is None:
+        load = swinging_load(runs, [one.rests for one in every], model.karnopp.m, lowest)
+        runs = [one.held_by(of_load(model, load)) for one in every]
     for _ in range(PASSES_AT_REST):
         body = body_by_force(runs, lowest)
         modes = fit_modes(body)
         if modes is None:
             break
         rests = of_modes(modes, float(body.f[body.seen][-1]))
-        runs = [linear_recording(log, model, rests) for log in logs]
+        runs = [one.held_by(rests) for one in every]
     found = machine_responses(runs, lowest)
     return found, fit_modes(found.body)
 

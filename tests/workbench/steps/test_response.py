@@ -13,6 +13,7 @@ from benchmarks.response_rig import Machine, gains, machine, record
 from identification.arrays import Array
 from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.swinging_load import Rests, swinging_load
 from identification.log import Log
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
@@ -30,6 +31,7 @@ from workbench.report.response import (
     response_sentence,
     response_view,
 )
+from workbench.steps.linear_force import freed, of_load, of_model
 from workbench.steps.predicted_force import force_needed, opposing_force
 from workbench.steps.response import (
     Responded,
@@ -103,6 +105,30 @@ def test_the_load_that_swings_behind_a_motor_at_rest_is_seen() -> None:
     assert anti.frequency.value == pytest.approx(TWO.anti_resonance, rel=0.02)
     assert resonance.frequency.value == pytest.approx(TWO.resonance, rel=0.02)
     assert responded(ONE).peaks == ()
+
+
+def test_the_hidden_load_is_found_where_friction_hides_the_force() -> None:
+    for one in (TWO, ONE):
+        known = model(one)
+        free = freed(log_of(one), known)
+        runs = [free.held_by(of_model(known))]
+        load = swinging_load(runs, [free.rests], one.mass)
+        if one is ONE:
+            assert load is None
+            continue
+        assert load is not None
+        assert load.anti_resonance == pytest.approx(TWO.anti_resonance, rel=0.04)
+        assert load.share == pytest.approx(TWO.m_2 / TWO.mass, abs=0.08)
+        told = free.held_by(of_load(known, load))
+        assert np.any(told.linear != runs[0].linear)
+        np.testing.assert_array_equal(told.linear[free.slides], runs[0].linear[free.slides])
+
+
+def test_a_body_that_hardly_rests_hides_no_load() -> None:
+    known = model(TWO)
+    free = freed(log_of(TWO), known)
+    sliding = Rests(np.zeros(len(free.a), dtype=bool), free.a)
+    assert swinging_load([free.plain], [sliding], TWO.mass) is None
 
 
 def true_controller(f: Array, one: Machine) -> Array:
