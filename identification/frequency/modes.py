@@ -30,6 +30,7 @@ STRUCTURE_ERROR = 0.02  # of the magnitude, that the form itself may be off
 MODE_GAINS = 60.0  # chi-square that a mode explains at least, in units of what is left a point
 OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
 STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
+DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
 MOST_DAMPING = 0.3  # of what is called a resonance
 UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not told
 AROUND_PEAK = 0.1  # of its frequency, within which points on either side show a peak
@@ -37,8 +38,8 @@ POINTS_AROUND = 3  # that many, on either side
 MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
-SHARED = 8.0  # points that are of the same stretches and neighbours, and count as one
-OF_A_BIN = 0.3  # by which windows may draw a peak aside
+SHARED = 16.0  # points that are of the same stretches and neighbours, and count as one
+OF_A_BIN = 0.5  # by which windows may draw a peak aside
 LONGEST_MODE_LAG = 0.05  # s
 
 
@@ -264,7 +265,9 @@ def _anti_resonances(data: _Data, p: Array, theta: Array, misfit: float) -> list
     out = []
     for zero in _zeros(p, theta):
         f, damping = abs(zero) / (2.0 * np.pi), -zero.real / abs(zero)
-        if not (abs(damping) < MOST_DAMPING and _shown(data, f)):
+        parts = (_columns(p, np.array([f])) * theta)[0]
+        deep = abs(np.sum(parts)) < DEEP * abs(parts[0])
+        if not (deep and abs(damping) < MOST_DAMPING and _shown(data, f)):
             continue
         near = _zero_spread(data, p, zero, misfit)
         out.append(Peak("anti-resonance", Size(float(f), near[0]), Size(float(damping), near[1])))

@@ -46,7 +46,7 @@ FROM_LOWEST = 4.0  # times the lowest frequency, from which on
 BANDS_LOOKED_AT = 2  # of the longest stretches
 RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides
 LEAVES_LESS = 0.25  # mean logarithm of what is left, by which a load has to leave less
-SHARES = (0.02, 0.98)  # of the mass, that is a load
+SHARE_BOUNDS = (0.02, 0.98)  # of the mass, that is a load
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ def swinging_load(
         f = best[1].anti_resonance
         best = min(best, _tried(looked_at, f, damping, mass), key=lambda one: one[0])
     left, load = best
-    inside = SHARES[0] < load.share < SHARES[1]
+    inside = SHARE_BOUNDS[0] < load.share < SHARE_BOUNDS[1]
     return load if inside and none - left > LEAVES_LESS else None
 
 
