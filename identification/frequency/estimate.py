@@ -18,7 +18,7 @@ one input without instrument it is the usual one. Sources: Bendat, Piersol, Rand
 chapter 8, and Wellstead, Automatica 17 (1981) 55.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -89,7 +89,7 @@ class Response:
 
 
 def cross_spectra(
-    band: Band, names: tuple[str, ...], each: Sequence[Sequence[ComplexArray]]
+    band: Band, names: tuple[str, ...], each: Iterable[Sequence[ComplexArray]]
 ) -> Spectra:
     """Spectra of the coefficients (s, K) of each signal of each run, summed over the stretches."""
     m = len(names)

@@ -123,7 +123,7 @@ def instruments_of(runs: Sequence[Recording]) -> tuple[str, ...]:
 
 def spectra_of(runs: Sequence[Recording], band: Band, names: tuple[str, ...]) -> Spectra:
     """Cross spectra of the signals over the stretches of all runs."""
-    each = [[coefficients_of(one, band, name) for name in names] for one in runs]
+    each = ([coefficients_of(one, band, name) for name in names] for one in runs)
     return cross_spectra(band, names, each)
 
 

@@ -44,6 +44,7 @@ FINER, FINER_STEPS = (0.5, 0.25, 0.12), (-1.0, 1.0)  # of their distance, around
 DAMPINGS_TRIED = (0.005, 0.01, 0.04, 0.08)
 FROM_LOWEST = 4.0  # times the lowest frequency, from which on
 BANDS_LOOKED_AT = 2  # of the longest stretches
+SAMPLES_LOOKED_AT = 150_000  # of the longest runs, after which no further one is
 RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides
 LEAVES_LESS = 0.25  # mean logarithm of what is left, by which a load has to leave less
 SHARE_BOUNDS = (0.02, 0.98)  # of the mass, that is a load
@@ -82,7 +83,8 @@ def swinging_load(
     if resting < RESTS_AT_LEAST:
         return None
     names = ("a", "linear", *instruments_of(runs))
-    both = list(zip(runs, rests, strict=True))
+    both = _longest(list(zip(runs, rests, strict=True)))
+    runs = [one for one, _ in both]
     looked_at = [
         _Looked(band, names, [[coefficients_of(one, band, k) for k in names] for one in runs], both)
         for band in cut(runs, lowest)[:BANDS_LOOKED_AT]
@@ -106,6 +108,13 @@ def swinging_load(
     left, load = best
     inside = SHARE_BOUNDS[0] < load.share < SHARE_BOUNDS[1]
     return load if inside and none - left > LEAVES_LESS else None
+
+
+def _longest(both: list[tuple[Recording, Rests]]) -> list[tuple[Recording, Rests]]:
+    """The longest runs, up to so many samples together."""
+    ordered = sorted(both, key=lambda one: -len(one[0].y))
+    before = np.cumsum([0, *(len(one.y) for one, _ in ordered[:-1])])
+    return [one for one, n in zip(ordered, before, strict=True) if n < SAMPLES_LOOKED_AT]
 
 
 @dataclass(frozen=True, eq=False)

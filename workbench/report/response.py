@@ -32,6 +32,7 @@ from workbench.steps.response import (
 
 PEAK_HEAD = ("", "frequency", "95 % interval", "damping", "95 % interval")
 FREQUENCY = "frequency [Hz]"
+SAMPLES_IN_A_REPORT = 100_000  # after which no further log is taken
 COHERENCE_SAID = (
     "The band holds 95 % of what the noise could make of it. Where the coherence is too low,"
     " nothing is drawn."
@@ -172,10 +173,13 @@ def response_report(found: Responded) -> str:
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
-    """The section of other reports: the plant over frequency of the model's own logs, with its
-    resonances; none where they show it nowhere."""
+    """The section of other reports: the plant over frequency of the model's own logs (of many the
+    longest), with its resonances; none where they show it nowhere."""
+    ordered = sorted(runs, key=lambda one: -len(one.log))
+    before = np.cumsum([0, *(len(one.log) for one in ordered[:-1])])
+    taken = [one for one, n in zip(ordered, before, strict=True) if n < SAMPLES_IN_A_REPORT]
     try:
-        found = respond(runs, model.rig, model.card, model)
+        found = respond(taken, model.rig, model.card, model)
     except UserError:
         return []
     lines = [response_sentence(found), friction_line(found)]

@@ -26,6 +26,7 @@ from workbench.interface.logs import ResponseResult
 from workbench.logs.sources import Source
 from workbench.report.response import (
     loop_line,
+    over_frequency,
     plant_chart,
     response_report,
     response_sentence,
@@ -58,7 +59,7 @@ def friction_of(one: Machine) -> Karnopp:
 @made_once
 def log_of(one: Machine, seconds: float = 20.0) -> Log:
     rec = record(one, 5, seconds)
-    t = rec.h * np.arange(len(rec.r))
+    t = np.asarray(rec.h * np.arange(len(rec.r)), dtype=np.float64)
     return Log("run.csv", {"t": t, "r": rec.r, "y": rec.y, "u": rec.u, "F": rec.u})
 
 
@@ -131,6 +132,19 @@ def test_a_body_that_hardly_rests_hides_no_load() -> None:
     assert swinging_load([free.plain], [sliding], TWO.mass) is None
 
 
+def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = log_of(ONE, 6.0)
+    monkeypatch.setattr("workbench.report.response.SAMPLES_IN_A_REPORT", len(log) + 1)
+    brief = log.part(0, len(log) // 2)
+    runs = [Source(one, "a.csv", "0" * 64, len(one)) for one in (brief, log, log, brief)]
+    (section,) = over_frequency(model(ONE), runs)
+    (of_longest,) = over_frequency(model(ONE), runs[1:3])
+    assert section.html == of_longest.html
+    assert "Over frequency" == section.title and "friction: taken off the force" in section.html
+    still = log.with_signals(y=np.zeros(len(log)))
+    assert over_frequency(model(ONE), [replace(runs[1], log=still)]) == []
+
+
 def true_controller(f: Array, one: Machine) -> Array:
     k_p, k_d, k_i, tau, h, _ = gains(one, 5e-4)
     z = np.exp(-2j * np.pi * f * h)
@@ -194,7 +208,7 @@ def test_python_control_takes_every_curve() -> None:
     at = np.abs(plant(1j * plant.omega))
     np.testing.assert_allclose(at, np.abs(found.found.found.position.H[body.seen]))
     for what in ("velocity", "plant_with_friction", "controller", "open_loop"):
-        assert len(found.to_control(what).omega) > 50  # type: ignore[arg-type]
+        assert len(found.to_control(what).omega) > 50
     with pytest.raises(BadModel, match="no curve 'plnt'"):
         found.to_control("plnt")  # type: ignore[arg-type]
 
