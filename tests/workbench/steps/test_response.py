@@ -140,7 +140,7 @@ def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch
     (section,) = over_frequency(model(ONE), runs)
     (of_longest,) = over_frequency(model(ONE), runs[1:3])
     assert section.html == of_longest.html
-    assert "Over frequency" == section.title and "friction: taken off the force" in section.html
+    assert section.title == "Over frequency" and "friction: taken off the force" in section.html
     still = log.with_signals(y=np.zeros(len(log)))
     assert over_frequency(model(ONE), [replace(runs[1], log=still)]) == []
 
