@@ -111,7 +111,7 @@ def body_by_force(runs: Sequence[Recording], lowest: float | None = None) -> Res
     return joined([responses(one, "a", ["linear"], instruments)[0] for one in each])
 
 
-def cut(runs: Sequence[Recording], lowest: float | None) -> list[Band]:
+def cut(runs: Sequence[Recording], lowest: float | None = None) -> list[Band]:
     """The bands of frequencies and their stretches, as `stretches.bands` has them."""
     return bands([one.duration for one in runs], [one.h for one in runs], lowest)
 

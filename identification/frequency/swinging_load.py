@@ -72,9 +72,7 @@ class Rests:
     a: Array
 
 
-def swinging_load(
-    runs: Sequence[Recording], rests: Sequence[Rests], mass: float, lowest: float | None = None
-) -> Load | None:
+def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float) -> Load | None:
     """The load that the runs show behind their motor at rest, None where they show none.
 
     runs: their `linear` force that of one mass [kg] where they rest.
@@ -87,7 +85,7 @@ def swinging_load(
     runs = [one for one, _ in both]
     looked_at = [
         _Looked(band, names, [[coefficients_of(one, band, k) for k in names] for one in runs], both)
-        for band in cut(runs, lowest)[:BANDS_LOOKED_AT]
+        for band in cut(runs)[:BANDS_LOOKED_AT]
     ]
     first, last = looked_at[0].band.f, looked_at[-1].band.f
     low, high = FROM_LOWEST * float(first[first > 0.0][0]), float(last[-1]) / 2.0

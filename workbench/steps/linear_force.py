@@ -1,11 +1,12 @@
 """Log + model -> the force without friction, of which a linear body's motion would come."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.arrays import Array, BoolArray
+from identification.effects._base import Acting
 from identification.frequency.machine import Recording
 from identification.frequency.modes import Modes
 from identification.frequency.swinging_load import Load, Rests
@@ -22,7 +23,7 @@ from workbench.steps.predicted_force import (
     with_motor_force,
 )
 
-LINEAR_EFFECTS = frozenset({"spring", "compliance", "input_delay"})  # they stay in the response
+LINEAR_EFFECTS = frozenset({"compliance", "input_delay"})  # they stay in the response
 RUNG_OUT = 4.0  # s, in which a load behind a spring has come to rest
 
 # Force that a linear body needs for a velocity (n,) whose acceleration is (n,), every h [s].
@@ -52,6 +53,8 @@ class Freed:
         """The log with its force without friction: where the body rests or is slow friction is
         whatever holds it, and the force is what the motion needs of a linear body."""
         resting = body(self.v, self.a, self.plain.h)
+        if np.any(self.slides):  # a motion tells a spring's force but for a constant
+            resting = resting + np.mean((self.left - resting)[self.slides])
         return replace(self.plain, linear=np.where(self.slides, self.left, resting))
 
     @property
@@ -65,8 +68,7 @@ def freed(log: Log, model: Model) -> Freed:
 
     Raises BadLog where the log lacks a signal of an effect.
     """
-    nonlinear = tuple(one for one in model.acting if one.key not in LINEAR_EFFECTS)
-    plant = replace(model.simulated, effects=nonlinear)
+    plant = replace(model.simulated, effects=tuple(_nonlinear(model)))
     refuse_missing(log, plant.effects)
     held = model.rig.kind == "motor"
     moved = of_body(with_motor_force(log, plant), plant)
@@ -82,6 +84,15 @@ def freed(log: Log, model: Model) -> Freed:
     return Freed(plain, motion.v, a, slides, F - _earlier(opposed, late, log))
 
 
+def _nonlinear(model: Model) -> Iterator[Acting]:
+    """The model's effects that are not linear, a spring by its cube alone."""
+    for one in model.acting:
+        if one.key == "spring":
+            yield one.effect.acting({**one.values, "k": 0.0})
+        elif one.key not in LINEAR_EFFECTS:
+            yield one
+
+
 def of_model(model: Model) -> BodyForce:
     """The force by the model's mass and viscous friction, and its second mass, where it has one."""
     if model.resonance is None:
@@ -92,14 +103,20 @@ def of_model(model: Model) -> BodyForce:
     return of_load(model, Load(anti, shape["damping"] * anti / shape["frequency"], share))
 
 
+def stiffness_of(model: Model) -> float:
+    """Of the model's spring to the ground [N/m], 0 where it has none."""
+    return sum(one.values["k"] for one in model.acting if one.key == "spring")
+
+
 def of_load(model: Model, load: Load | None) -> BodyForce:
-    """The force by the model's mass and viscous friction, a share of the mass behind a spring."""
-    p = model.karnopp
+    """The force by the model's mass, viscous friction and spring to the ground (but for a
+    constant), a share of the mass behind a spring."""
+    p, stiffness = model.karnopp, stiffness_of(model)
     viscous = 0.5 * (p.F_vp + p.F_vn)
 
     def force(v: Array, a: Array, h: float) -> Array:
         moved = a if load is None else a + load.share * load.beyond(a, h)
-        return np.asarray(p.m * moved + viscous * v)
+        return np.asarray(p.m * moved + viscous * v + stiffness * h * np.cumsum(v))
 
     return force
 

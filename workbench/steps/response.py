@@ -30,7 +30,14 @@ from workbench.documents.plain import as_number
 from workbench.logs.sources import Source, Sources, fingerprints
 from workbench.steps.identify import Progress
 from workbench.steps.identify_sources import identify_sources
-from workbench.steps.linear_force import freed, of_load, of_model, of_modes, plain_recording
+from workbench.steps.linear_force import (
+    freed,
+    of_load,
+    of_model,
+    of_modes,
+    plain_recording,
+    stiffness_of,
+)
 from workbench.steps.linear_loop import dead_time
 
 if TYPE_CHECKING:
@@ -135,7 +142,7 @@ def _measured(
     every = [freed(log, model) for log in logs]
     runs = [one.held_by(of_model(model)) for one in every]
     if model.resonance is None:
-        load = swinging_load(runs, [one.rests for one in every], model.karnopp.m, lowest)
+        load = swinging_load(runs, [one.rests for one in every], model.karnopp.m)
         runs = [one.held_by(of_load(model, load)) for one in every]
     for _ in range(PASSES_AT_REST):
         body = body_by_force(runs, lowest)
@@ -152,12 +159,11 @@ def curves_of(model: Model, f: Array) -> Curves:
     """What the model's mass, friction, second mass and lag make of the plant, and the controller of
     its card, at f [Hz]."""
     p, two = model.karnopp, model.resonance
-    spring = next((one.values for one in model.acting if one.key == "spring"), {})
     second = None
     if two is not None:
         second = (used(two["frequency"]), used(two["anti_resonance"]), used(two["damping"]))
     plant = body_response(
-        f, p.m, 0.5 * (p.F_vp + p.F_vn), stiffness=spring.get("stiffness", 0.0),
+        f, p.m, 0.5 * (p.F_vp + p.F_vn), stiffness=stiffness_of(model),
         lag=dead_time(model), second_mass=second,
     )  # fmt: skip
     return Curves(plant, _law_of_card(model, f))

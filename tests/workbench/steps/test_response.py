@@ -15,6 +15,7 @@ from identification.errors import BadModel, BadSpecification, NotIdentifiable
 from identification.frequency.estimate import COHERENCE_SURE, Response
 from identification.frequency.swinging_load import Rests, swinging_load
 from identification.log import Log
+from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from identification.signals.differentiate import differentiate
@@ -36,6 +37,7 @@ from workbench.steps.linear_force import freed, of_load, of_model
 from workbench.steps.predicted_force import force_needed, opposing_force
 from workbench.steps.response import (
     Responded,
+    curves_of,
     degrees,
     ranges,
     respond,
@@ -130,6 +132,22 @@ def test_a_body_that_hardly_rests_hides_no_load() -> None:
     free = freed(log_of(TWO), known)
     sliding = Rests(np.zeros(len(free.a), dtype=bool), free.a)
     assert swinging_load([free.plain], [sliding], TWO.mass) is None
+
+
+def test_a_spring_stays_in_the_plant_but_for_its_cube() -> None:
+    sizes = {"k": Estimate(500.0, "N/m"), "k_3": Estimate(2e4, "N/m**3")}
+    plain, sprung = model(ONE), replace(model(ONE), effects={"spring": sizes})
+    log = log_of(ONE, 6.0)
+    without, found = freed(log, plain), freed(log, sprung)
+    cube = 2e4 * differentiate(log["y"], log.h).y ** 3
+    apart = (without.left - found.left)[found.slides]
+    held = 0.5 * (cube + np.append(cube[1:], cube[-1]))
+    np.testing.assert_allclose(apart, held[found.slides], rtol=1e-6, atol=1e-12)
+    v = np.sin(np.arange(1000) * 1e-2)
+    force = of_model(sprung)(v, np.zeros(1000), 1e-3) - of_model(plain)(v, np.zeros(1000), 1e-3)
+    np.testing.assert_allclose(force, 500.0 * 1e-3 * np.cumsum(v))
+    curves = curves_of(sprung, np.array([1e-4]))
+    assert abs(curves.plant[0]) == pytest.approx(1 / 500.0, rel=1e-3)
 
 
 def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch) -> None:
