@@ -6,7 +6,8 @@ Every file of `WORKBENCH_DATA`, and every small case that lies beside it (by def
 `cases` next to it), as it was recorded. What is right of each is written below by hand: kind,
 motion, column and unit of each signal, or the words of a refusal. Right with the other: as many
 lines put right by the answer "+". Units of a file that has no names are asked for only where
-something in the file tells them. Nothing here served to fit a weight by: the kinds did.
+something in the file tells them. Weights were chosen with these files in sight, so this guards what
+is right of them; it judges nothing.
 """
 
 import argparse

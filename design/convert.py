@@ -83,3 +83,10 @@ def controller_to_control(controller: RST) -> tuple[Any, Any]:
         to_control(controller.S, controller.R, controller.h),
         to_control(np.convolve(controller.S, controller.A_m), trim(forward), controller.h),
     )
+
+
+def frd(H: ArrayLike, w: ArrayLike) -> Any:
+    """A frequency response H (k,) at w [rad/s] as control.FRD."""
+    import control
+
+    return control.FRD(np.asarray(H), np.asarray(w, dtype=np.float64))

@@ -20,6 +20,7 @@ class Rig:
 
     `command_unit` is that of u (V, A, 1, %, N): `control_limit` is in it, and `force_per_command`
     [N per such unit] is the motor's k_a. `motion` "rotary" reads rad, N m and kg m^2.
+    `motor_inertia` [kg] is that of the motor alone, without its load.
     """
 
     kind: RigKind
@@ -31,6 +32,7 @@ class Rig:
     stroke: tuple[float, float] | None = None
     motion: Literal["linear", "rotary"] = "linear"
     command_unit: str = "V"
+    motor_inertia: float | None = None
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from workbench.interface.calls import load_model as load_model
     from workbench.interface.calls import predict as predict
     from workbench.interface.calls import read_logs as read_logs
+    from workbench.interface.calls import response as response
     from workbench.interface.calls import robust_design as robust_design
     from workbench.interface.calls import simulate as simulate
     from workbench.interface.calls import trace as trace
@@ -37,8 +38,7 @@ _CALLS = "workbench.interface.calls"
 _HOMES = {
     **{name: _CALLS for name in ("identify", "trace", "design", "validate", "predict", "drift")},
     **{name: _CALLS for name in ("simulate", "experiment", "load_model", "read_logs")},
-    "robust_design": _CALLS,
-    "axis_test": _CALLS,
+    **{name: _CALLS for name in ("response", "robust_design", "axis_test")},
     **{name: "workbench.interface.effects" for name in ("effects", "check_effects")},
     "Goals": "design.tune",
     "DriftSettings": "identification.drift.drift_test",

@@ -35,6 +35,7 @@ COMMANDS = {
     "trace": "Find the physical effect that the model of a machine lacks.",
     "drift": "Test whether a machine has changed since its model.",
     "axis-test": "Test an axis by one log: green, yellow or red, on one page.",
+    "response": "Show the machine over frequency: Bode, resonances, margins.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID and RST controllers for a model.",
     "experiment": "Find the run to make next: the reference that tells most.",

@@ -95,6 +95,7 @@ def _reading(rng: np.random.Generator, shop: Shop, log: str, card: str) -> list[
         0: ["identify", log, "--card", card],
         1: ["trace", log, "--card", card],
         2: ["drift", model, log, "--card", card],
+        3: ["response", log, "--card", card, "--model", model],
     }.get(int(rng.integers(0, 10)), ["predict", model, log, "--card", card])
 
 

@@ -126,6 +126,55 @@ def test_predict_writes_the_columns_of_the_contract(
     assert as_json(capsys, [*by_force, "--out", out])["drive"] == "force"
 
 
+def test_response_writes_curves_and_margins(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card, log, out = str(shop / "card.toml"), str(shop / "log/short.csv"), str(tmp_path / "r")
+    command = ["response", log, "--card", card, "--out", out]
+    found = as_json(capsys, [*command, "--model", str(shop / "id/model.json")])
+    assert files(tmp_path / "r") == {"response.json", "response.csv", "report.html"}
+    assert found["friction"] == {"taken_out": True, "reason": None}
+    assert found["instrument"] == "r" and found["plant"]["unit"] == "m/N"
+    with (tmp_path / "r/response.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == found["frequencies"]
+    seen = [float(row["plant_coherence"]) for row in rows if row["plant_magnitude_db"]]
+    assert seen and min(seen) >= 0.5
+    left = as_json(capsys, [*command, "--friction-left-in"])
+    assert left["friction"] == {"taken_out": False, "reason": "asked for"}
+    assert "Plant" in (tmp_path / "r/report.html").read_text(encoding="utf-8")
+
+
+def test_response_identifies_where_no_model_is_given(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card, log, out = str(shop / "card.toml"), str(shop / "log/short.csv"), str(tmp_path / "r")
+    given = ["response", log, "--card", card, "--out", out]
+    alone = as_json(capsys, given)
+    with_model = as_json(capsys, [*given, "--model", str(shop / "id/model.json")])
+    assert alone["friction"]["taken_out"]
+    assert alone["plant"]["seen_hz"] == with_model["plant"]["seen_hz"]
+
+
+def test_response_refuses_what_shows_nothing_and_bad_options(
+    shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    card, log, out = str(shop / "card.toml"), str(shop / "log/short.csv"), str(tmp_path / "r")
+    model = str(shop / "id/model.json")
+    rows = (shop / "log/short.csv").read_text("utf-8").splitlines()
+    (tmp_path / "brief.csv").write_text("\n".join(rows[:200]), "utf-8")
+    for name, more, status, said in (
+        (log, ("--lowest", "0.01"), 2, "stretches of 600 s needed"),
+        (str(tmp_path / "brief.csv"), (), 1, "log longer"),
+        (str(tmp_path / "none.csv"), (), 2, "none.csv"),
+    ):
+        given = ["response", name, "--card", card, "--model", model, "--out", out, *more]
+        assert said in refusal(capsys, given, status)
+        assert not (tmp_path / "r").exists()
+    assert "--lowest" in refusal(capsys, ["response", log, "--card", card, "--lowest", "0"], 2)
+    assert "turned" in refusal(capsys, ["response", log, "--card", card, "--model", "turned"], 2)
+
+
 def test_predict_by_a_model_without_a_mass_gives_the_force_and_refuses_the_run(
     shop: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

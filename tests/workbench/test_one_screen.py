@@ -15,11 +15,13 @@ from click.testing import CliRunner
 
 from design.tune import Asked
 from identification.drift.drift_result import DriftTest, Shift, Statistic
+from identification.frequency.modes import Modes, Peak
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
+from identification.model.size import Size
 from identification.remarks import Aside
 from identification.tracing.result import Change
-from tests.chain import designed, identified
+from tests.chain import designed, identified, short_recipe
 from tests.screens import one_screen, words_of
 from tests.workbench.trace_values import trace_of, traced
 from workbench import cli
@@ -37,6 +39,7 @@ from workbench.report.first_card import proposal_view
 from workbench.report.installation import installation_view
 from workbench.report.model_tables import model_view
 from workbench.report.prediction import prediction_view
+from workbench.report.response import response_view
 from workbench.report.robust import robust_view
 from workbench.report.trace_tables import trace_view
 from workbench.report.trace_words import words
@@ -51,6 +54,7 @@ from workbench.steps.installation import look_over
 from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures
 from workbench.steps.predict import Predicted
+from workbench.steps.response import respond
 from workbench.steps.robust.outcomes import MEASURES, Outcomes
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, RobustAsked, Spread
 from workbench.steps.validate import Validation
@@ -201,6 +205,18 @@ def predict() -> Iterator[Screen]:
     yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml", OUT)
 
 
+def response() -> Iterator[Screen]:
+    source = replace(identified().sources[0], file=LOGS[0])
+    card, _ = short_recipe()
+    found = respond([source], card.rig(), card.name, identified().model, read=REMARKS)
+    size = Size(123.456, 0.5)
+    peaks = tuple(Peak("anti-resonance", size, Size(0.0123, 0.1 / n)) for n in range(1, 40))
+    modes = Modes(peaks, np.zeros(2), np.zeros(2), 1.0)
+    logs = tuple({"file": log} for log in LOGS)
+    for left_in in (None, WHY):
+        yield response_view(replace(found, modes=modes, logs=logs, left_in=left_in), OUT)
+
+
 def reidentify() -> Iterator[Screen]:
     outcomes = tuple(
         LogOutcome(f"machine-{n}", SeenLog("0" * 64, log, 1, 1), "set_aside", WHY, 1, {}, NOW)
@@ -243,8 +259,8 @@ def axis_test() -> Iterator[Screen]:
 
 
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
-    identify, trace, validate, design, demo, drift, experiment, predict, reidentify, fleet, doctor,
-    axis_test,
+    identify, trace, validate, design, demo, drift, experiment, predict, response, reidentify,
+    fleet, doctor, axis_test,
 )  # fmt: skip
 BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # run below
 ELSEWHERE = {"paper": "tests/workbench/paper/test_study.py"}  # as it takes long to make

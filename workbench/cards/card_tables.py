@@ -124,6 +124,9 @@ class RigSection(CardTable):
     """of the size of u, in `command_unit`, or a text (`"8 A"`)"""
     control_limit_v: Positive | None = None
     """the older name of `control_limit`"""
+    motor_inertia: Positive | str | None = None
+    """of the motor alone, kg (kg m² of a rotary machine), or a text (`"0.3 kg cm^2"`); what is
+    identified is told as a multiple of it"""
     stroke_m: tuple[float, float] | None = None
     """low and high end of the motion, m (rad)"""
     motion: Literal["linear", "rotary"] = "linear"
@@ -153,6 +156,7 @@ class RigSection(CardTable):
         command = self.command_unit or self._command_unit(signals)
         limit = self.control_limit_v if self.control_limit is None else self.control_limit
         per = over(force_unit(self.motion), command)
+        mass = "kg m^2" if self.motion == "rotary" else "kg"
         return Rig(
             kind=self.kind,
             area_p=self.area_p_m2,
@@ -163,6 +167,9 @@ class RigSection(CardTable):
             stroke=self.stroke_m,
             motion=self.motion,
             command_unit=command,
+            motor_inertia=_positive(
+                in_unit_of(self.motor_inertia, mass, "rig.motor_inertia"), "motor_inertia"
+            ),
         )
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
@@ -174,10 +181,10 @@ class RigSection(CardTable):
         return "V" if self.control_limit is None else force_unit(self.motion)
 
 
-def _positive(limit: float | None) -> float | None:
-    if limit is not None and not limit > 0:
-        raise BadCard(f"rig.control_limit = {limit:g}, must be > 0")
-    return limit
+def _positive(value: float | None, key: str = "control_limit") -> float | None:
+    if value is not None and not value > 0:
+        raise BadCard(f"rig.{key} = {value:g}, must be > 0")
+    return value
 
 
 class FileEntry(CardTable):

@@ -4,6 +4,7 @@ Here values are plain SI numbers; in design.json (workbench/documents/design_fil
 parameter has its unit.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
@@ -13,6 +14,7 @@ import numpy as np
 from design.compensator import Compensator
 from design.drive_law import DriveLaw, drive_law
 from design.filters import CompensatorFilters
+from design.loop_frequencies import LoopFrequencies
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
@@ -48,6 +50,7 @@ class MarginValues:
     """Margins of a loop as results carry them; worst_modulus over the parameters' intervals.
 
     None: no limit of that kind; worst_modulus None: unstable for some parameters inside them.
+    crossover_hz, bandwidth_hz: as `design.loop_frequencies` has them, None also in older files.
     """
 
     modulus: float
@@ -59,6 +62,13 @@ class MarginValues:
     S_yp_max_db: float
     S_up_max_db: float | None
     worst_modulus: float | None
+    crossover_hz: float | None = None
+    bandwidth_hz: float | None = None
+
+    @property
+    def gain_db(self) -> float | None:
+        """By how much the gain may grow [dB]; None: by any."""
+        return None if self.gain_up is None else 20.0 * math.log10(self.gain_up)
 
 
 @dataclass(frozen=True)
@@ -180,7 +190,9 @@ class Design:
         return "command" if self.force is None else "force"
 
 
-def margin_values(found: Margins, worst: float | None) -> MarginValues:
+def margin_values(
+    found: Margins, worst: float | None, at: LoopFrequencies | None = None
+) -> MarginValues:
     """The margins as results carry them."""
     return MarginValues(
         modulus=found.modulus,
@@ -192,4 +204,6 @@ def margin_values(found: Margins, worst: float | None) -> MarginValues:
         S_yp_max_db=found.S_yp_max_db,
         S_up_max_db=found.S_up_max_db,
         worst_modulus=worst,
+        crossover_hz=at.crossover if at else None,
+        bandwidth_hz=at.bandwidth if at else None,
     )

@@ -44,7 +44,13 @@ from workbench.interface.inputs import (
     read_card,
     sources,
 )
-from workbench.interface.logs import AxisTestResult, DriftResult, PredictResult, SimulateResult
+from workbench.interface.logs import (
+    AxisTestResult,
+    DriftResult,
+    PredictResult,
+    ResponseResult,
+    SimulateResult,
+)
 from workbench.interface.loops import DesignResult, ExperimentResult, RobustResult, ValidateResult
 from workbench.interface.models import IdentifyResult, TraceResult
 from workbench.logs.fetch import card_path
@@ -61,6 +67,7 @@ from workbench.steps.identify_sources import Options, identify_sources
 from workbench.steps.loop_figures import Limits
 from workbench.steps.predict import predict_sources
 from workbench.steps.present import present_of_card
+from workbench.steps.response import identified_or_not, respond
 from workbench.steps.robust.robust import ROBUST_STAGES, RobustAsked
 from workbench.steps.robust.robust import robust_design as robust_of_model
 from workbench.steps.simulate import as_columns, record, truth
@@ -238,6 +245,34 @@ def predict(
     return PredictResult(told, known.rotary)
 
 
+def response(
+    logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
+    signals: Signals | None = None, model: ModelLike | None = None, lowest: float | None = None,
+    friction_left_in: bool = False, seed: int = 0,
+) -> ResponseResult:  # fmt: skip
+    """Plant, controller and open loop over frequency, their resonances and margins, as `workbench
+    response`.
+
+    model: whose friction is taken off the force, identified from the logs where none is given;
+    friction_left_in: take nothing off; lowest [Hz]: the frequency to reach down to. Raises
+    NotIdentifiable where the logs show the machine at no frequency.
+    """
+    left_in = "asked for" if friction_left_in else None
+    known = None if model is None else _model(model)
+    found = sources(logs, *_machine(model, card, rig, signals))
+    if known is None and left_in is None:
+        with _bar("identifying", 1.0) as bar:
+            course = Course(bar, IDENTIFY_STAGES, time.monotonic, told=bar.told)
+            with moving(course):
+                known, left_in = identified_or_not(found, seed, course.report)
+    with _bar("averaging spectra"):
+        made = respond(
+            found.runs, found.rig, found.card.name, known, lowest, left_in=left_in,
+            read=found.remarks,
+        )  # fmt: skip
+    return ResponseResult(made)
+
+
 def drift(
     model: ModelLike, logs: Logs, card: CardLike | None = None, *, rig: RigLike | None = None,
     signals: Signals | None = None, state: PathLike | None = None,
@@ -362,7 +397,7 @@ def _rivals(given: "TraceResult | PathLike", model: Model) -> tuple[str, ...]:
 
 
 def _machine(
-    model: ModelLike, card: CardLike | None, rig: RigLike | None, signals: Signals | None
+    model: ModelLike | None, card: CardLike | None, rig: RigLike | None, signals: Signals | None
 ) -> tuple[Any, ...]:
     """Card, rig and signals as given, else the card by which the model's logs were read."""
     own = model.card if isinstance(model, IdentifyResult | TraceResult) else None

@@ -1,8 +1,11 @@
-"""Results of `predict`, `drift` and `simulate`: what is said of logs, and logs that are made."""
+"""Results of `predict`, `response`, `drift` and `simulate`: what is said of logs, and logs that are
+made."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from identification.log import Log
 from workbench.cards.card import Card
@@ -11,6 +14,7 @@ from workbench.output import dumps
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.drift import Drifted
 from workbench.steps.predict import Predicted
+from workbench.steps.response import Curve, Responded
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -73,6 +77,76 @@ class PredictResult(Result):
     @property
     def _command(self) -> str:
         return "predict"
+
+
+@dataclass(frozen=True, repr=False)
+class ResponseResult(Result):
+    """A machine over frequency: plant, controller and open loop with bands, resonances, margins."""
+
+    found: Responded
+
+    @property
+    def document(self) -> Mapping[str, Any]:
+        from workbench.steps.response import response_document
+
+        return response_document(self.found)
+
+    @property
+    def frame(self) -> "pd.DataFrame":
+        """The columns of response.csv, a row a frequency; NaN where nothing is seen."""
+        from workbench.steps.response import response_frame
+
+        return response_frame(self.found)
+
+    def to_control(self, what: Curve = "plant") -> Any:
+        """A curve as control.FRD of python-control, at the frequencies [rad/s] that are seen.
+
+        what: "plant" (force to position), "velocity" (force to velocity), "controller", "open_loop"
+        or "plant_with_friction". Raises BadModel where the logs show no such curve.
+        """
+        from design.convert import frd
+        from workbench.steps.response import curve_of
+
+        one = curve_of(self.found, what)
+        return frd(one.H[one.seen], 2.0 * np.pi * one.f[one.seen])
+
+    def report(self) -> str:
+        from workbench.report.response import response_report
+
+        return response_report(self.found)
+
+    def plot(self) -> "Figure":
+        from workbench.report.chart_figure import chart_figure
+        from workbench.report.response import plant_chart
+
+        return chart_figure(plant_chart(self.found))
+
+    def _view(self) -> object:
+        from workbench.report.response import response_view
+
+        return response_view(self.found, None)
+
+    def _told(self) -> tuple[str, Sequence[Part]]:
+        from workbench.report.response import (
+            PEAK_HEAD,
+            peak_rows,
+            response_lines,
+            response_sentence,
+        )
+
+        lines = [*response_lines(self.found), *(f"note: {one}" for one in self.found.remarks)]
+        return response_sentence(self.found), [Part(PEAK_HEAD, peak_rows(self.found), lines)]
+
+    def _files(self) -> Iterator[tuple[str, str]]:
+        from workbench.steps.response import response_csv
+
+        yield "response.json", self.to_json() + "\n"
+        yield "response.csv", response_csv(self.found)
+        yield "report.html", self.report()
+
+    @property
+    def _command(self) -> str:
+        return "response"
 
 
 @dataclass(frozen=True, repr=False)

@@ -131,7 +131,8 @@ def kept_form(folder: Path) -> CardForm | None:
     found = json.loads(path.read_text(encoding="utf-8"))
     columns = [(str(key), str(words)) for key, words in found["columns"]]
     why = {name: (bool(sure), str(said)) for name, (sure, said) in found["why"].items()}
-    others = {name: (str(words), dict(one)) for name, (words, one) in found["others"].items()}
+    kept = found.get("others", {})  # which forms of older versions lack
+    others = {name: (str(words), dict(one)) for name, (words, one) in kept.items()}
     return CardForm(found["fields"], columns, why, found["remarks"], found["layout"], others)
 
 

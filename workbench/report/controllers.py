@@ -11,8 +11,10 @@ from workbench.documents.design import Controller, Design
 from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
 from workbench.report.design_tables import (
     DESIGN_HEAD,
+    IN_DRIVES_HEAD,
     design_lines,
     drive_lines,
+    drive_rows,
     margin_rows,
     polynomial_lines,
 )
@@ -28,6 +30,9 @@ def controllers(found: Design, rotary: bool = False) -> Section:
     html = render(
         "table", head=DESIGN_HEAD, rows=margin_rows(found), lines=design_lines(found, rotary)
     )
+    words = drive_rows(found)
+    if words:
+        html += render("table", head=IN_DRIVES_HEAD, rows=words, lines=())
     return Section("Controllers", html)
 
 

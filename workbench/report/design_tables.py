@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from workbench.cards.parameter_units import Shown, shown
-from workbench.cards.readable import length
+from workbench.cards.readable import length, number
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import DriveUnits, equation_lines, force_lines
 from workbench.output import Row, next_step, written
@@ -23,6 +23,9 @@ DESIGN_HEAD = (
     "periods",
     "|S_up|",
 )
+IN_DRIVES_HEAD = (
+    "in a drive's words", "crossover", "bandwidth", "gain margin", "phase margin", "delay margin",
+)  # fmt: skip
 MARGINS_SAID = (
     "modulus, gain, phase, delay: the margins, how much more of each the loop bears; worst: the"
     " least modulus margin inside the parameters' intervals; periods: the delay margin in sampling"
@@ -33,6 +36,23 @@ MARGINS_SAID = (
 def margin_rows(found: Design) -> list[Row]:
     """One row a controller, by `DESIGN_HEAD`."""
     return [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+
+
+def drive_rows(found: Design) -> list[Row]:
+    """The same in a drive engineer's words, by `IN_DRIVES_HEAD`; none of an older file."""
+    rows = []
+    for name, one in found.controllers.items():
+        m = one.margins
+        if m.crossover_hz is None and m.bandwidth_hz is None:
+            continue
+        rows.append((
+            name.upper(),
+            *("-" if f is None else f"{number(f)} Hz" for f in (m.crossover_hz, m.bandwidth_hz)),
+            "any" if m.gain_db is None else f"{number(m.gain_db)} dB",
+            "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
+            "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
+        ))  # fmt: skip
+    return rows
 
 
 def _margins(one: Controller) -> Row:
@@ -191,6 +211,7 @@ def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Scr
     parts += [
         tabled(DESIGN_HEAD, margin_rows(found)),
         MARGINS_SAID,
+        tabled(IN_DRIVES_HEAD, drive_rows(found)),
         listed(other_lines(found)),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),

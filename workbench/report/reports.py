@@ -25,6 +25,7 @@ from workbench.report.notes import report_notes
 from workbench.report.page import Section, page
 from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
+from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.validation_tables import then_of_validation, validation_sentence
 from workbench.steps.identify_sources import Identified
@@ -43,6 +44,7 @@ def identification_report(found: Identified) -> str:
         parameters_section(model),
         friction_curve(model, found.fit, sources),
         fit(model, sources, runs),
+        *over_frequency(model, sources),
         Section("In words", render("lines", lines=report_notes(told, logs_of(model)))),
     )
     then = [next_of_model(model)]

@@ -4,6 +4,7 @@ from workbench.output import Row
 from workbench.report.free_curves import free_curves
 from workbench.report.notes import report_notes
 from workbench.report.page import Section, page
+from workbench.report.response import over_frequency
 from workbench.report.templating import render
 from workbench.report.trace_friction import friction_before_after
 from workbench.report.trace_pictures import (
@@ -67,6 +68,7 @@ def trace_report(traced: Traced) -> str:
     ):
         if rows:
             sections.append(_table(title, head, rows))
+    sections += over_frequency(model, traced.train)
     notes = report_notes((*traced.remarks, *found.remarks), logs_of_trace(traced))
     if notes:
         sections.append(Section("Notes", render("lines", lines=notes)))

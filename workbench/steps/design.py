@@ -10,6 +10,7 @@ import numpy as np
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
 from design.filters import filters_at
+from design.loop_frequencies import loop_frequencies
 from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
@@ -98,7 +99,8 @@ def placed_design(
     found = _placed(model, asked, goals, (source, period), drawn)
     command = command_of(model, found.force)
     controllers = {
-        name: _controller(tuned, shown(model.rotary)) for name, tuned in found.tuned.items()
+        name: _controller(tuned, found.plant, shown(model.rotary))
+        for name, tuned in found.tuned.items()
     }
     return Design(
         card=model.card,
@@ -267,7 +269,7 @@ def effort_limit(model: Model) -> float | None:
     return float(20 * np.log10(NOISE_SHARE * coulomb / model.fit.noise_y))
 
 
-def _controller(tuned: Tuned, units: Shown) -> Controller:
+def _controller(tuned: Tuned, plant: Linear, units: Shown) -> Controller:
     rst, pid, taken = tuned.rst, tuned.pid, tuned.followed
     found = Controller(
         R=tuple(rst.R.tolist()),
@@ -276,7 +278,7 @@ def _controller(tuned: Tuned, units: Shown) -> Controller:
         h=rst.h,
         dominant=tuned.dominant,
         auxiliary=tuple((z.real, z.imag) for z in tuned.auxiliary),
-        margins=margin_values(tuned.margins, tuned.worst),
+        margins=margin_values(tuned.margins, tuned.worst, loop_frequencies(plant.A, plant.B, rst)),
         rate=taken.rate,
         lag=taken.lag,
         overshoot=taken.overshoot,
@@ -321,11 +323,22 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
         out.append(f"{' and '.join(names)} not identified: an assumed value stands in the design")
     if model.assumed:
         out.append(f"compensator: assumed, not identified: {', '.join(model.assumed)}")
+    if model.rig.motor_inertia and model.friction["m"].value is not None:
+        out.append(_inertia(model.friction["m"].value, model.rig.motor_inertia, model.rotary))
     if not model.fit.adequate:
         out.append("the model leaves more than noise; check the loop on the machine with care")
     if model.resonance is not None:
         out += _below_resonance(used(model.resonance["frequency"]), found, chosen)
     return out
+
+
+def _inertia(whole: float, motor: float, rotary: bool) -> str:
+    """The machine's inertia beside that of its motor, and the load's ratio to it, in words."""
+    unit = "kg m^2" if rotary else "kg"
+    said = f"inertia {number(whole, 4)} {unit}, {number(motor, 4)} {unit} of it the motor's"
+    if whole < motor:
+        return f"{said}: less than the motor's alone; check motor_inertia in the card"
+    return f"{said}: the load is {number(whole / motor - 1.0, 2)} times the motor"
 
 
 def _below_resonance(resonance: float, found: Design, chosen: Recommendation) -> Iterator[str]:

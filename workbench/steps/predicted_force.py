@@ -11,7 +11,7 @@ from identification.errors import BadLog
 from identification.log import Log
 from identification.model.inverse_model import Smoothing, force_predicted
 from identification.model.plant import Motor, Plant
-from identification.signals.differentiate import differentiate
+from identification.signals.differentiate import Motion, differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
@@ -43,6 +43,20 @@ def force_needed(log: Log, plant: Plant, how: Smoothing) -> Array:
     limits = np.minimum(p.F_sn - stick, 0.0), np.maximum(p.F_sp + stick, 0.0)
     resting = np.clip(log["F"] + pushed, *limits)
     return np.asarray(p.m * motion.a + np.where(d == 0, resting, d * sliding) - pushed)
+
+
+def opposing_force(log: Log, plant: Plant, motion: Motion, d: Array) -> Array:
+    """Force that friction and the effects oppose to a motion, but for viscous friction [N], (n,).
+
+    d: its direction (n,), 0 where it is taken to rest, where this means nothing. Viscous friction
+    that is not the same in both directions is opposed by how far it lies from the mean.
+    """
+    p, blank = plant.friction, np.zeros(len(log))
+    signals = {"u": blank, **log.signals, "y": motion.y, "v": motion.v, "d": d}
+    pushed = _sum(plant, lambda place: place.drives, signals, log.h)
+    slip = _sum(plant, lambda place: place.rubs, signals, log.h)
+    uneven = 0.5 * (p.F_vp - p.F_vn) * np.abs(motion.v)
+    return np.asarray(d * (_coulomb(plant, signals, log.h) + slip) + uneven - pushed)
 
 
 def of_body(log: Log, plant: Plant) -> Log:

@@ -70,6 +70,12 @@ def test_numbers_with_a_unit_are_brought_to_the_command_s(tmp_path: Path) -> Non
     found = card(tmp_path, 'force_per_command = "0.045 kN/A"\ncontrol_limit = "8000 mA"').rig()
     assert found.force_per_command == pytest.approx(45.0)
     assert found.control_limit == pytest.approx(8.0)
+    inertia = card(tmp_path, 'force_per_command = 1\nmotor_inertia = "300 g"').rig().motor_inertia
+    assert inertia == pytest.approx(0.3)
+    turning = 'motion = "rotary"\nforce_per_command = 1\nmotor_inertia = "0.3 kg cm^2"'
+    rotary = MOTOR.format(rig=turning, unit="A", rest="").replace('"mm"', '"rad"')
+    (tmp_path / "rotary.toml").write_text(rotary, encoding="utf-8")
+    assert load_card(tmp_path / "rotary.toml").rig().motor_inertia == pytest.approx(3e-5)
     older = card(tmp_path, "force_per_command = 45.0\ncontrol_limit_v = 8.0").rig()
     assert (older.force_per_command, older.control_limit) == (45.0, 8.0)
 
@@ -80,6 +86,8 @@ def test_numbers_with_a_unit_are_brought_to_the_command_s(tmp_path: Path) -> Non
         ('force_per_command = "45 N/V"', "rig.force_per_command: unit 'N/V' is of another kind"),
         ('control_limit = "ten"', "rig.control_limit = 'ten': a number"),
         ('control_limit = "-3 A"', "rig.control_limit = -3, must be > 0"),
+        ('motor_inertia = "3 kg m^2"', "rig.motor_inertia: unit 'kg m^2' is of another kind"),
+        ('motor_inertia = "0 kg"', "rig.motor_inertia = 0, must be > 0"),
         ('control_limit = "3 A"\ncontrol_limit_v = 3.0', "are the same; give one"),
     ],
 )

@@ -105,7 +105,16 @@ def test_nothing_heavy_is_imported_before_it_is_named() -> None:
 
 
 def test_every_name_of_the_front_is_there() -> None:
-    for name in ("identify", "trace", "design", "validate", "predict", "drift", "simulate"):
+    for name in (
+        "identify",
+        "trace",
+        "design",
+        "validate",
+        "predict",
+        "drift",
+        "simulate",
+        "response",
+    ):
         found = getattr(wb, name)
         assert callable(found)
         assert name in dir(wb)

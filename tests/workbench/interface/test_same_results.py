@@ -19,6 +19,7 @@ from workbench.output import dumps
 pytestmark = pytest.mark.slow
 
 LOGS = ("day1.csv", "day2.csv")
+BESIDE = ("report.html", "model.json", "response.csv")  # the document of a command
 PULL = '''"""A magnet."""
 
 from identification.effects._base import Effect, Param
@@ -79,9 +80,7 @@ def the_same(found: Result, folder: Path, tmp_path: Path) -> None:
     assert sorted(path.name for path in out.iterdir()) == names
     for name in names:
         assert (out / name).read_text("utf-8") == (folder / name).read_text("utf-8"), name
-    (main_file,) = [name for name in names if name not in ("report.html", "model.json")] or [
-        names[0]
-    ]
+    (main_file,) = [name for name in names if name not in BESIDE] or [names[0]]
     if main_file.endswith(".json"):
         assert found.to_json() + "\n" == (folder / main_file).read_text("utf-8")
 
@@ -209,6 +208,19 @@ def test_axis_test(bench: Bench, tmp_path: Path) -> None:
     shown_well(found, "YELLOW")
 
 
+@pytest.mark.slow
+def test_response(bench: Bench, model: Any, tmp_path: Path) -> None:
+    arguments = ("response", bench.path("day1.csv"), bench.path("day2.csv"))
+    given = ("--card", bench.path("card.toml"), "--model", bench.path("model/model.json"))
+    folder = bench.ran("response", *arguments, *given)
+    logs = [bench.path(name) for name in LOGS]
+    found = wb.response(logs, bench.path("card.toml"), model=bench.path("model/model.json"))
+    the_same(found, folder, tmp_path)
+    assert list(found.frame) == (folder / "response.csv").read_text().split("\n")[0].split(",")
+    shown_well(found, "The plant is seen from")
+
+
+@pytest.mark.slow
 def test_drift(bench: Bench, model: Any, tmp_path: Path) -> None:
     path = bench.path("model/model.json")
     arguments = ("drift", path, bench.path("day2.csv"), "--card", bench.path("card.toml"))

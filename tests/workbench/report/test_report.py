@@ -62,15 +62,16 @@ def checked(html: str, figures: int) -> str:
 
 
 def test_identification_report() -> None:
-    html = checked(identification_report(identified()), 3)
+    html = checked(identification_report(identified()), 4)
     for text in ("position [mm]", "applied force [N]", "velocity [mm/s]", "friction force [N]",
-                 "time [s]", "moving mass", "95 % interval", "short.csv", "a remark"):  # fmt: skip
+                 "time [s]", "moving mass", "95 % interval", "short.csv", "a remark",
+                 "Over frequency", "from force to position [m/N]"):  # fmt: skip
         assert text in html
 
 
 def test_a_rotary_report_shows_rotary_units() -> None:
     found = turned(identified())
-    html = checked(identification_report(found), 3)
+    html = checked(identification_report(found), 4)
     for text in ("position [rad]", "applied force [N m]", "velocity [rad/s]", "N m s/rad",
                  "kg m^2", "moment of inertia", "breakaway torque", "N m/(V s)"):  # fmt: skip
         assert text in html

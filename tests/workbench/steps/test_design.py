@@ -10,6 +10,7 @@ from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
+from workbench.report.design_tables import design_view
 from workbench.steps.closed_loop import run_loop
 from workbench.steps.design import reference_demand
 from workbench.steps.validate import validate
@@ -17,6 +18,9 @@ from workbench.steps.validate import validate
 ACTUATOR = Actuator(19530.0, 10405.0)
 MODELS = {name: model_of(p, ACTUATOR) for name, p in TABLES.items()}
 MODELS["emps"] = model_of(EMPS, k_a=35.15)
+
+
+SLOW = Asked((20.0, 0.9))  # nothing to be searched
 
 
 def rng() -> np.random.Generator:
@@ -153,3 +157,24 @@ def test_validation_judges_overshoot() -> None:
     assert one.overshoot > 0.2
     assert any(said.startswith("overshoot") for said in one.missed)
     assert one.settling > 0.2
+
+
+def test_inertia_is_told_beside_the_motors() -> None:
+    model = model_of(TABLES["paper_table1"], k_a=20.0)
+    with_motor = replace(model, rig=replace(model.rig, motor_inertia=0.25))
+    said = [line for line in designed(with_motor, SLOW).remarks if line.startswith("inertia")]
+    assert said == ["inertia 1 kg, 0.25 kg of it the motor's: the load is 3 times the motor"]
+    heavy = replace(model, rig=replace(model.rig, motor_inertia=2.0))
+    assert any("check motor_inertia" in line for line in designed(heavy, SLOW).remarks)
+
+
+def test_a_design_has_crossover_and_bandwidth_of_each_loop() -> None:
+    found = designed(model_of(TABLES["paper_table1"], k_a=20.0), SLOW)
+    for one in found.controllers.values():
+        m = one.margins
+        assert m.crossover_hz is not None and m.bandwidth_hz is not None
+        assert 0.3 < m.bandwidth_hz / m.crossover_hz < 3.0
+        assert m.gain_up is not None and m.gain_db == pytest.approx(20 * np.log10(m.gain_up))
+    (head, *rows) = (line.split() for line in design_view(found, None).text().splitlines()
+                     if "drive's" in line or ("Hz" in line and "deg" in line))  # fmt: skip
+    assert head[:3] == ["in", "a", "drive's"] and len(rows) == len(found.controllers)

@@ -1,0 +1,1 @@
+"""Frequency responses of a machine from its logs: averaged spectra, bands, resonances."""

@@ -1,0 +1,105 @@
+"""`workbench response`: logs -> frequency responses, resonances, margins of the open loop."""
+
+import time
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from workbench.course import Course, watched
+from workbench.ending import StatusCommand, refused_with
+from workbench.options import (
+    POSITIVE,
+    budget_option,
+    card_option,
+    complete_file,
+    effects_option,
+)
+from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.steps.stages import IDENTIFY_STAGES
+
+if TYPE_CHECKING:
+    from workbench.documents.model import Model
+    from workbench.logs.sources import Sources
+
+
+@click.command(
+    cls=StatusCommand,
+    refusal="the logs show the machine at no frequency",
+    epilog="Example: workbench response run1.csv run2.csv --card bench-a --model model.json",
+)
+@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
+@card_option
+@click.option(
+    "--model", "model_file", type=click.Path(path_type=Path), metavar="MODEL",
+    help="model.json whose friction is taken off the force.  [default: identified from the logs]",
+)  # fmt: skip
+@click.option("--friction-left-in", is_flag=True, help="Take nothing off the force.")
+@click.option(
+    "--lowest", type=POSITIVE, metavar="HZ",
+    help="Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",
+)  # fmt: skip
+@budget_option
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@effects_option
+@output_options
+def command(
+    logs: tuple[str, ...],
+    card: str,
+    model_file: Path | None,
+    friction_left_in: bool,
+    lowest: float | None,
+    budget: float,
+    seed: int,
+    effects: tuple[Path, ...],
+    as_json: bool,
+    out: Path | None,
+) -> None:
+    """Show a machine over frequency: plant, controller and open loop, resonances, margins.
+
+    Friction and whatever else of the model is not linear is taken off the force first, and the
+    reference is the instrument, so that noise in the loop does not bend the curves. Where the logs
+    do not reach, nothing is drawn. Writes response.json, response.csv (the curves with their 95 %
+    bands and coherence) and report.html (Bode).
+    """
+    begun = time.monotonic()
+    from workbench.cards.own_effects import library
+    from workbench.documents.model_file import read_model
+    from workbench.logs.sources import read_sources
+    from workbench.report.next_steps import looked_over
+    from workbench.report.response import response_report, response_view
+    from workbench.steps.response import respond, response_csv, response_document
+
+    known = None if model_file is None else read_model(model_file, library(effects))
+    left_in = "asked for" if friction_left_in else None
+    with (
+        refused_with(looked_over(logs, card)),
+        OutputFolder("response", out, now=datetime.now()) as folder,
+    ):
+        sources = read_sources(logs, card)
+        if known is None and left_in is None:
+            left = budget - (time.monotonic() - begun)
+            known, left_in = _identified(sources, seed, left, as_json)
+        with progress("averaging spectra", as_json=as_json):
+            found = respond(
+                sources.runs, sources.rig, sources.card.name, known, lowest, left_in=left_in,
+                read=sources.remarks,
+            )  # fmt: skip
+        document = response_document(found)
+        folder.write_json("response.json", document)
+        folder.write_text("response.csv", response_csv(found))
+        folder.write_text("report.html", response_report(found))
+    emit({**document, "out": folder.final}, as_json, lambda: response_view(found, folder.final))
+
+
+def _identified(
+    sources: "Sources", seed: int, budget: float, as_json: bool
+) -> "tuple[Model | None, str | None]":
+    """The model that the logs themselves give, or None and why they give none."""
+    from workbench.steps.response import identified_or_not
+
+    with progress("identifying", 1.0, as_json=as_json) as bar:
+        course = Course(bar, IDENTIFY_STAGES, time.monotonic, budget, bar.told)
+        with watched(course):
+            return identified_or_not(sources, seed, course.report, course.keep_going)

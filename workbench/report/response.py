@@ -1,0 +1,323 @@
+"""Frequency responses for a terminal and as Bode plots."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.errors import UserError
+from identification.estimation.estimates import told_estimate
+from identification.frequency.estimate import COHERENCE_SURE, Response
+from identification.frequency.stretches import ComplexArray
+from identification.model.size import Size
+from workbench.cards.parameter_units import shown
+from workbench.cards.readable import number
+from workbench.documents.model import Model
+from workbench.logs.sources import Source
+from workbench.output import Row, written
+from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.notes import notes, report_notes
+from workbench.report.page import Section, page
+from workbench.report.templating import render
+from workbench.screen import Part, Screen, listed, screen, tabled
+from workbench.steps.response import (
+    Responded,
+    decibels,
+    degrees,
+    ranges,
+    respond,
+    sure_share,
+)
+
+PEAK_HEAD = ("", "frequency", "95 % interval", "damping", "95 % interval")
+FREQUENCY = "frequency [Hz]"
+SAMPLES_IN_A_REPORT = 100_000  # after which no further log is taken
+COHERENCE_SAID = (
+    "The band holds 95 % of what the noise could make of it. Where the coherence is too low,"
+    " nothing is drawn."
+)
+
+
+def response_sentence(found: Responded) -> str:
+    """What the logs show of the machine, in a sentence or two."""
+    body = found.found.body
+    spans = ranges(body.f, body.seen)
+    said = f"The plant is seen {_spans(spans)}"
+    peaks = found.peaks
+    if not peaks:
+        return f"{said}; no resonance stands out there."
+    named = [
+        f"{'a resonance' if one.kind == 'resonance' else 'an anti-resonance'} at"
+        f" {number(one.frequency.value)} Hz (damping {number(one.damping.value, 2)})"
+        for one in peaks
+    ]
+    return f"{said}, with {_and(named)}."
+
+
+def peak_rows(found: Responded) -> list[Row]:
+    """Resonances and anti-resonances with their intervals, a row each."""
+    return [
+        (one.kind, *_cells(one.frequency, "Hz"), *_cells(one.damping, "1")) for one in found.peaks
+    ]
+
+
+def _cells(one: Size, unit: str) -> tuple[str, str]:
+    told = told_estimate(one.value, unit, one.sd)
+    shown_unit = "" if unit == "1" else f" {unit}"
+    if told.low is None or told.high is None:
+        return f"{number(one.value)}{shown_unit}", "not told"
+    return (
+        f"{number(one.value, 4)}{shown_unit}", f"{number(told.low, 4)} to {number(told.high, 4)}"
+    )  # fmt: skip
+
+
+def loop_line(found: Responded) -> str:
+    """The open loop's crossover and margins, in words."""
+    if found.open_loop is None or found.margins is None:
+        return "open loop: not shown, since the logs do not tell the controller" + (
+            "" if found.found.instrument else " (no moving reference is logged)"
+        )
+    m = found.margins
+    by = "the logs" if found.found.controller is not None else "the card's controller"
+    if m.crossover is None:
+        return f"open loop (by {by}): {_where_it_crosses(found.open_loop)}"
+    said = [f"crosses 0 dB at {number(m.crossover)} Hz"]
+    if m.phase_deg is not None:
+        said.append(f"phase margin {number(m.phase_deg)} deg")
+    gain = "not within what the logs show" if m.gain_db is None else f"{number(m.gain_db)} dB"
+    said.append(f"gain margin {gain}")
+    if m.delay_s is not None:
+        said.append(f"delay margin {number(1e3 * m.delay_s)} ms")
+    return f"open loop (by {by}): {', '.join(said)}"
+
+
+def _where_it_crosses(loop: Response) -> str:
+    """On which side of what is seen an open loop crosses 0 dB, in words."""
+    f, size = loop.f[loop.seen], np.abs(loop.H[loop.seen])
+    if len(f) and np.all(size < 1.0):
+        return (
+            f"crosses 0 dB below {number(float(f[0]))} Hz, the lowest frequency at which the logs"
+            " show it (--lowest reaches further down)"
+        )
+    if len(f) and np.all(size > 1.0):
+        return f"crosses 0 dB above {number(float(f[-1]))} Hz, the highest at which it is seen"
+    return "its crossing of 0 dB is not within what the logs show"
+
+
+def friction_line(found: Responded) -> str:
+    """Whether friction was taken off the force, and what that bought."""
+    if found.left_in is not None:
+        return f"friction: left in the force, {found.left_in}"
+    every = found.found
+    upto = float(every.f[every.body.seen][-1])
+    with_, without = (sure_share(one, upto) for one in (every.with_friction, every.body))
+    return (
+        f"friction: taken off the force; that leaves a coherence above {COHERENCE_SURE:g} on"
+        f" {100 * without:.0f} % of the octaves up to {number(upto)} Hz,"
+        f" {100 * with_:.0f} % with friction left in"
+    )
+
+
+def spectra_line(found: Responded) -> str:
+    """How the spectra were made."""
+    lengths, body = found.found.stretches, found.found.body
+    by = "the reference as instrument" if found.found.instrument else "no instrument"
+    averages = [float(body.averages[0]), float(body.averages[-1])]
+    return (
+        f"spectra: Welch, {by}; stretches of {number(lengths[0])} s at low frequencies to"
+        f" {number(lengths[-1])} s at high ones, {averages[0]:.0f} to {averages[1]:.0f} averages"
+    )
+
+
+def response_lines(found: Responded) -> list[str]:
+    """All that is said of the curves, a line each."""
+    body = found.found.body
+    sure = ranges(body.f, body.seen & (body.coherence > COHERENCE_SURE))
+    return [
+        loop_line(found),
+        friction_line(found),
+        f"coherence above {COHERENCE_SURE:g}: {_spans(sure)}",
+        spectra_line(found),
+    ]
+
+
+def response_view(found: Responded, folder: Path | None) -> Screen:
+    """The responses for a terminal."""
+    parts: list[Part | str] = [response_sentence(found)]
+    if found.peaks:
+        parts.append(tabled(PEAK_HEAD, peak_rows(found), right=(1, 3)))
+    parts.append(listed(response_lines(found)))
+    parts.append(notes(found.remarks, tuple(one["file"] for one in found.logs)))
+    if folder is not None:
+        parts.append(written(folder, "response.json", "response.csv", "report.html"))
+    return screen(*parts)
+
+
+def response_report(found: Responded) -> str:
+    """The responses as a page."""
+    sections = [Section("Plant", plant_html(found))]
+    if found.open_loop is not None:
+        sections.append(Section("Open loop", loop_html(found)))
+    if found.found.controller is not None:
+        sections.append(Section("Controller", controller_html(found)))
+    table = render(
+        "table", head=PEAK_HEAD, rows=peak_rows(found), lines=response_lines(found)
+    ) if found.peaks else render("lines", lines=response_lines(found))  # fmt: skip
+    sections.insert(1, Section("Resonances and margins", table))
+    told = report_notes(found.remarks, tuple(one["file"] for one in found.logs))
+    if told:
+        sections.append(Section("Notes", render("lines", lines=told)))
+    title = f"Frequency response of {found.card}"
+    return page(title, response_sentence(found), sections)
+
+
+def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
+    """The section of other reports: the plant over frequency of the model's own logs (of many the
+    longest), with its resonances; none where they show it nowhere."""
+    ordered = sorted(runs, key=lambda one: -len(one.log))
+    before = np.cumsum([0, *(len(one.log) for one in ordered[:-1])])
+    taken = [one for one, n in zip(ordered, before, strict=True) if n < SAMPLES_IN_A_REPORT]
+    try:
+        found = respond(taken, model.rig, model.card, model)
+    except UserError:
+        return []
+    lines = [response_sentence(found), friction_line(found)]
+    said = render("lines", lines=lines)
+    if found.peaks:
+        said = render("table", head=PEAK_HEAD, rows=peak_rows(found), lines=lines)
+    return [Section("Over frequency", plant_html(found) + said)]
+
+
+def plant_html(found: Responded) -> str:
+    """The plant's Bode plot with its caption."""
+    without = "" if found.left_in else " Grey: the same with friction left in the force."
+    model = "" if found.curves is None else " Dashed: the model's mass, friction and springs."
+    return str(chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}"))
+
+
+def plant_chart(found: Responded) -> Chart:
+    """Position by force: magnitude, phase and coherence."""
+    every, units = found.found, shown(found.rotary)
+    f, by_position = every.f, -1.0 / (2.0 * np.pi * every.f) ** 2 + 0j
+    others = [("the model", None if found.curves is None else found.curves.plant)]
+    beside = None if found.left_in else every.with_friction.times(by_position)
+    marks = [Mark(one.frequency.value, "x") for one in found.peaks]
+    title = f"from force to position [{units.position}/{units.force}]"
+    panels = _bode(f, every.position, title, others, beside, marks)
+    return Chart("plant", "Bode plot of the plant from force to position", panels)
+
+
+def loop_html(found: Responded) -> str:
+    """The open loop's Bode plot with its caption."""
+    by = (
+        "the controller that the logs show" if found.found.controller is not None
+        else "the card's controller"
+    )  # fmt: skip
+    return str(chart_html(loop_chart(found), f"Plant and {by} in series. {loop_line(found)}."))
+
+
+def loop_chart(found: Responded) -> Chart:
+    """The open loop: magnitude, phase and coherence."""
+    assert found.open_loop is not None
+    curves = found.curves
+    L = None
+    if curves is not None and curves.controller is not None:
+        L = curves.plant * curves.controller
+    at = found.margins.crossover if found.margins else None
+    marks = [] if at is None else [Mark(at, "x")]
+    panels = _bode(
+        found.found.f, found.open_loop, "open loop [-]", [("the model, card's controller", L)],
+        None, marks, levels=(0.0, -180.0),
+    )  # fmt: skip
+    return Chart("open-loop", "Bode plot of the open loop", panels)
+
+
+def controller_html(found: Responded) -> str:
+    """The controller's Bode plot with its caption."""
+    caption = "From the position to the force that counters it, by the reference and the position."
+    return str(chart_html(controller_chart(found), caption))
+
+
+def controller_chart(found: Responded) -> Chart:
+    """The controller: magnitude, phase and coherence."""
+    assert found.found.controller is not None
+    curves, units = found.curves, shown(found.rotary)
+    card = None if curves is None else curves.controller
+    panels = _bode(
+        found.found.f, found.found.controller, f"controller [{units.stiffness}]",
+        [("of the card", card)], None, [],
+    )  # fmt: skip
+    return Chart("controller", "Bode plot of the controller", panels)
+
+
+def _bode(
+    f: Array, one: Response, title: str, others: Sequence[tuple[str, ComplexArray | None]],
+    beside: Response | None, marks: Sequence[Mark], levels: tuple[float, float] | None = None,
+) -> list[Panel]:  # fmt: skip
+    """Panels of magnitude, phase and coherence up to the highest frequency that is seen."""
+    use = f <= f[one.seen][-1] * 1.3 if np.any(one.seen) else np.ones(len(f), dtype=bool)
+    x = f[use]
+    H = np.where(one.seen, one.H, np.nan)[use]
+    half = np.where(one.seen, one.half_band, np.nan)[use]
+    size, phase = decibels(np.abs(H)), degrees(H)
+    spread = np.minimum(np.degrees(half), 180.0)
+    low = decibels(np.maximum(np.abs(H) * (1.0 - np.minimum(half, 0.99)), 1e-300))
+    areas = (
+        Area("95 %", x, low, decibels(np.abs(H) * (1.0 + half)), "measured"),
+        Area("95 %", x, phase - spread, phase + spread, "measured"),
+    )
+    magnitude, turn = [_line("measured", x, size)], [_line("measured", x, phase)]
+    if beside is not None:
+        left_in = np.where(beside.seen, beside.H, np.nan)[use]
+        magnitude.insert(0, _line("friction left in", x, decibels(np.abs(left_in)), "before"))
+        turn.insert(0, _line("friction left in", x, _near(degrees(left_in), phase), "before"))
+    for name, curve in others:
+        if curve is not None:
+            own = curve[use]
+            magnitude.append(_line(name, x, decibels(np.abs(own)), "model", "dashed"))
+            turn.append(_line(name, x, _near(degrees(own), phase), "model", "dashed"))
+    coherence = [_line("measured", x, one.coherence[use])]
+    if beside is not None:
+        coherence.insert(0, _line("friction left in", x, beside.coherence[use], "before"))
+    shown_range = _round_range(x)
+    level = [[], []] if levels is None else [[Mark(one)] for one in levels]
+    return [
+        Panel(FREQUENCY, "magnitude [dB]", magnitude, title, areas[:1],
+              marks=[*marks, *level[0]], log_x=True, x_range=shown_range),
+        Panel(FREQUENCY, "phase [deg]", turn, "", areas[1:], marks=[*marks, *level[1]],
+              log_x=True, x_range=shown_range),
+        Panel(FREQUENCY, "coherence [-]", coherence, marks=[Mark(COHERENCE_SURE)],
+              y_range=(0.0, 1.02), log_x=True, height=150, x_range=shown_range),
+    ]  # fmt: skip
+
+
+def _round_range(f: Array) -> tuple[float, float]:
+    """The least range with ends of 1, 2 or 5 that holds the frequencies."""
+    ends = np.sort(np.outer(10.0 ** np.arange(-4, 6), [1.0, 2.0, 5.0]).ravel())
+    low = ends[max(int(np.searchsorted(ends, f[0], side="right")) - 1, 0)]
+    high = ends[min(int(np.searchsorted(ends, f[-1])), len(ends) - 1)]
+    return float(low), float(high)
+
+
+def _line(name: str, x: Array, y: Array, colour: Colour = "measured", look: Look = "line") -> Line:
+    return Line(name, x, y, colour, look)
+
+
+def _near(phase: Array, other: Array) -> Array:
+    """A phase moved by whole turns to where the other one is."""
+    apart = np.nanmedian(phase - other) if np.any(np.isfinite(phase - other)) else 0.0
+    return phase - 360.0 * round(float(apart) / 360.0)
+
+
+def _spans(spans: Sequence[tuple[float, float]]) -> str:
+    """Ranges of frequency in words, the three widest of many."""
+    if not spans:
+        return "nowhere"
+    widest = sorted(sorted(spans, key=lambda one: one[0] / one[1])[:3])
+    said = _and([f"{number(a)} to {number(b)} Hz" for a, b in widest])
+    return f"from {said}" + (" and in narrow stretches between" if len(spans) > 3 else "")
+
+
+def _and(words: Sequence[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"

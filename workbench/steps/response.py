@@ -1,0 +1,388 @@
+"""Logs + model -> frequency responses of plant, controller and open loop, and their resonances."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from design.measured_loop import MeasuredMargins, measured_margins
+from design.polynomial import evaluate
+from identification.arrays import Array, BoolArray
+from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.estimation.estimates import told_estimate
+from identification.frequency.body import body_response
+from identification.frequency.estimate import COHERENCE_SURE, Response, in_series
+from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
+from identification.frequency.modes import Modes, Peak, fit_modes
+from identification.frequency.stretches import ComplexArray, hold
+from identification.frequency.swinging_load import swinging_load
+from identification.log import Log, Rig
+from identification.model.estimates import Estimate
+from identification.model.plant import Motor
+from identification.model.size import Size
+from identification.progress import KeepGoing, without_end
+from identification.signals.clean import applied_force
+from workbench.cards.parameter_units import shown
+from workbench.documents.model import Model, used
+from workbench.documents.plain import as_number
+from workbench.logs.sources import Source, Sources, fingerprints
+from workbench.steps.identify import Progress
+from workbench.steps.identify_sources import identify_sources
+from workbench.steps.linear_force import (
+    freed,
+    of_load,
+    of_model,
+    of_modes,
+    plain_recording,
+    stiffness_of,
+)
+from workbench.steps.linear_loop import dead_time
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Curve = Literal["plant", "velocity", "plant_with_friction", "controller", "open_loop"]
+PASSES_AT_REST = 1  # in which what a body at rest is held by follows from its own response
+RESPONSE_SCHEMA = "response/1"
+GAP_FORGIVEN = 3  # points in a row that are missing, within a range of frequencies
+FEWEST_IN_RANGE = 3  # points of a range
+
+
+@dataclass(frozen=True, eq=False)
+class Curves:
+    """What the model says at the same frequencies: (k,) each, None where it does not."""
+
+    plant: ComplexArray
+    controller: ComplexArray | None
+
+
+@dataclass(frozen=True, eq=False)
+class Responded:
+    """The responses of a machine: measured, by the model, resonances, margins of the open loop.
+
+    model: whose friction was taken off the force; None where none was, for the reason `left_in`.
+    """
+
+    card: str
+    rotary: bool
+    logs: tuple[dict[str, Any], ...]
+    found: MachineResponses
+    modes: Modes | None
+    open_loop: Response | None
+    margins: MeasuredMargins | None
+    curves: Curves | None
+    model: Model | None
+    left_in: str | None
+    remarks: tuple[str, ...]
+
+    @property
+    def peaks(self) -> tuple[Peak, ...]:
+        """Resonances and anti-resonances by their frequency."""
+        return self.modes.peaks if self.modes else ()
+
+
+def respond(
+    runs: Sequence[Source], rig: Rig, card: str, model: Model | None, lowest: float | None = None,
+    *, left_in: str | None = None, read: Sequence[str] = (),
+) -> Responded:  # fmt: skip
+    """The frequency responses of the runs together; card: its name.
+
+    model: whose friction is taken off the force; left_in: why not, where there is none, or where it
+    is not to be; lowest [Hz]: the frequency to reach down to. read: more remarks. Raises BadLog
+    without an applied force, NotIdentifiable where the runs show nothing.
+    """
+    if model is not None and rig.motion != model.rig.motion:
+        raise BadModel(
+            f"the model is of a {model.rig.motion} machine, but the card {card} says"
+            f' motion = "{rig.motion}"; give the model and the card of one machine'
+        )
+    logs = [_with_force(one.log, rig) for one in runs]
+    taken = model if left_in is None else None
+    found, modes = _measured(logs, rig.kind == "motor", taken, lowest)
+    if not np.any(found.body.seen):
+        raise NotIdentifiable(_nothing(runs, found))
+    curves = None if model is None else curves_of(model, found.f)
+    loop = _open_loop(found, curves)
+    return Responded(
+        card=card,
+        rotary=rig.motion == "rotary",
+        logs=tuple(fingerprints(runs)),
+        found=found,
+        modes=modes,
+        open_loop=loop,
+        margins=None if loop is None else measured_margins(found.f, loop.H, loop.seen),
+        curves=curves,
+        model=taken,
+        left_in=left_in,
+        remarks=(*read, *_remarks(logs, card, found, taken)),
+    )
+
+
+def identified_or_not(
+    sources: Sources, seed: int, on_progress: Progress | None = None,
+    keep_going: KeepGoing = without_end,
+) -> tuple[Model | None, str | None]:  # fmt: skip
+    """The model that the logs themselves give, or None and why they give none."""
+    try:
+        found = identify_sources(sources, seed=seed, on_progress=on_progress, keep_going=keep_going)
+    except NotIdentifiable as error:
+        return None, f"the logs do not tell it ({error})"
+    return found.model, None
+
+
+def _measured(
+    logs: Sequence[Log], held: bool, model: Model | None, lowest: float | None
+) -> tuple[MachineResponses, Modes | None]:
+    """The responses and their modes; a body at rest is held by what its own modes make of it."""
+    if model is None:
+        found = machine_responses([plain_recording(log, held) for log in logs], lowest)
+        return found, fit_modes(found.body)
+    every = [freed(log, model) for log in logs]
+    runs = [one.held_by(of_model(model)) for one in every]
+    if model.resonance is None:
+        load = swinging_load(runs, [one.rests for one in every], model.karnopp.m)
+        runs = [one.held_by(of_load(model, load)) for one in every]
+    for _ in range(PASSES_AT_REST):
+        body = body_by_force(runs, lowest)
+        modes = fit_modes(body)
+        if modes is None:
+            break
+        rests = of_modes(modes, float(body.f[body.seen][-1]))
+        runs = [one.held_by(rests) for one in every]
+    found = machine_responses(runs, lowest)
+    return found, fit_modes(found.body)
+
+
+def curves_of(model: Model, f: Array) -> Curves:
+    """What the model's mass, friction, second mass and lag make of the plant, and the controller of
+    its card, at f [Hz]."""
+    p, two = model.karnopp, model.resonance
+    second = None
+    if two is not None:
+        second = (used(two["frequency"]), used(two["anti_resonance"]), used(two["damping"]))
+    plant = body_response(
+        f, p.m, 0.5 * (p.F_vp + p.F_vn), stiffness=stiffness_of(model),
+        lag=dead_time(model), second_mass=second,
+    )  # fmt: skip
+    return Curves(plant, _law_of_card(model, f))
+
+
+def _law_of_card(model: Model, f: Array) -> ComplexArray | None:
+    """The card's controller from position to the force that counters it [N/m], with its hold; None
+    where there is none, or a force loop stands between."""
+    now = model.present
+    drive = model.simulated.actuator
+    if now is None or now.force is not None:
+        return None
+    if now.output == "command" and not isinstance(drive, Motor):
+        return None
+    per = drive.k_a if isinstance(drive, Motor) and now.output == "command" else 1.0
+    z = np.exp(2j * np.pi * f * now.law.h)
+    rst = now.law.rst
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = per * evaluate(rst.R, z) / evaluate(rst.S, z) * hold(f, now.law.h)
+    return np.where(f < 0.5 / now.law.h, found, np.nan)
+
+
+def _open_loop(found: MachineResponses, curves: Curves | None) -> Response | None:
+    """The plant in series with the controller that the logs show, else with that of the card."""
+    if found.controller is not None:
+        return in_series(found.position, found.controller)
+    if curves is None or curves.controller is None:
+        return None
+    return found.position.times(curves.controller)
+
+
+def _with_force(log: Log, rig: Rig) -> Log:
+    if "F" in log:
+        return log
+    F = applied_force(log, rig)
+    if F is None:
+        raise BadLog(
+            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
+        )
+    return log.with_signals(F=F)
+
+
+def _nothing(runs: Sequence[Source], found: MachineResponses) -> str:
+    """Why no frequency is drawn, in words."""
+    names = ", ".join(dict.fromkeys(one.file for one in runs))
+    best = float(np.max(found.body.coherence, initial=0.0))
+    follows = "the reference" if found.instrument else "the force"
+    return (
+        f"{names}: no frequency at which the motion follows {follows} (coherence at most"
+        f" {best:.2f}, at least 0.5 needed); log a livelier run, or lay a small multisine on the"
+        " reference"
+    )
+
+
+def _remarks(
+    logs: Sequence[Log], card: str, found: MachineResponses, model: Model | None
+) -> list[str]:
+    """What to know of the curves."""
+    out = []
+    if not found.instrument:
+        why = "the reference rests" if "r" in logs[0] else "no reference is logged"
+        out.append(
+            f"{why}: the response is that from force to position directly; where noise goes round"
+            " a loop it shows the controller's inverse instead"
+        )
+    if model is not None and model.card != card:
+        out.append(f"the model is of {model.card}, the logs of {card}")
+    return out
+
+
+def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
+    """Stretches of frequencies [Hz] where it holds, gaps of a few points left aside."""
+    at = np.flatnonzero(where)
+    if not len(at):
+        return []
+    parts = np.split(at, np.flatnonzero(np.diff(at) > GAP_FORGIVEN) + 1)
+    return [(float(f[one[0]]), float(f[one[-1]])) for one in parts if len(one) >= FEWEST_IN_RANGE]
+
+
+def sure_share(response: Response, upto: float) -> float:
+    """Share of the octaves up to a frequency [Hz] at which the response is to be relied on."""
+    inside = response.f <= upto
+    weight = np.gradient(np.log(response.f))
+    sure = response.seen & (response.coherence > COHERENCE_SURE)
+    return float(np.sum(weight[inside & sure]) / np.sum(weight[inside]))
+
+
+def response_document(found: Responded) -> dict[str, Any]:
+    """What response.json holds; the curves themselves are in response.csv."""
+    units, f = shown(found.rotary), found.found.f
+    loop, m = found.open_loop, found.margins
+    return {
+        "schema": RESPONSE_SCHEMA,
+        "card": found.card,
+        "log": found.logs,
+        "friction": {"taken_out": found.left_in is None, "reason": found.left_in},
+        "instrument": "r" if found.found.instrument else None,
+        "stretches": [{"length": _plain(one, "s")} for one in found.found.stretches],
+        "plant": _seen(found.found.body, f"{units.position}/{units.force}"),
+        "plant_with_friction": _seen(found.found.with_friction, f"{units.position}/{units.force}"),
+        "controller": None if found.found.controller is None
+        else _seen(found.found.controller, units.stiffness),
+        "open_loop": None if loop is None or m is None else {
+            **_seen(loop, "1"),
+            "crossover": _plain(m.crossover, "Hz"),
+            "phase_margin": _plain(m.phase_deg, "deg"),
+            "gain_margin": _plain(m.gain_db, "dB"),
+            "gain_margin_at": _plain(m.gain_at, "Hz"),
+            "delay_margin": _plain(m.delay_s, "s"),
+            "modulus_margin": _plain(m.modulus, "1"),
+        },
+        "peaks": [
+            {"kind": one.kind, "frequency": _sized(one.frequency, "Hz"),
+             "damping": _sized(one.damping, "1")}
+            for one in found.peaks
+        ],
+        "frequencies": len(f),
+        "remarks": found.remarks,
+    }  # fmt: skip
+
+
+def _seen(response: Response, unit: str) -> dict[str, Any]:
+    sure = response.seen & (response.coherence > COHERENCE_SURE)
+    return {
+        "unit": unit,
+        "seen_hz": ranges(response.f, response.seen),
+        "sure_hz": ranges(response.f, sure),
+    }
+
+
+def _plain(value: float | None, unit: str) -> dict[str, Any]:
+    if value is None:
+        return as_number(Estimate(None, unit, reason="not within what the logs show"))
+    return as_number(Estimate(value, unit))
+
+
+def _sized(one: Size, unit: str) -> dict[str, Any]:
+    return as_number(told_estimate(one.value, unit, one.sd))
+
+
+def response_frame(found: Responded) -> "pd.DataFrame":
+    """The columns of response.csv, a row a frequency; NaN where nothing is seen."""
+    import pandas as pd
+
+    every, f = found.found, found.found.f
+    columns: dict[str, Array] = {"frequency_hz": f}
+    for name, one in (
+        ("plant", every.position), ("velocity", every.velocity),
+        ("plant_with_friction", every.with_friction.times(_by_position(f))),
+        ("controller", every.controller), ("open_loop", found.open_loop),
+    ):  # fmt: skip
+        columns |= _of_response(name, one, f)
+    curves = found.curves
+    for name, curve in (
+        ("plant_model", curves.plant if curves else None),
+        ("controller_card", curves.controller if curves else None),
+    ):
+        values = np.full(len(f), np.nan + 0j) if curve is None else curve
+        columns |= _of_curve(name, values)
+    return pd.DataFrame(columns)
+
+
+def curve_of(found: Responded, what: Curve) -> Response:
+    """One of the curves; raises BadModel where the logs show none."""
+    every = found.found
+    curves = {
+        "plant": every.position,
+        "velocity": every.velocity,
+        "plant_with_friction": every.with_friction.times(_by_position(every.f)),
+        "controller": every.controller,
+        "open_loop": found.open_loop,
+    }
+    if what not in curves:
+        raise BadModel(f"no curve {what!r}; there are {', '.join(curves)}")
+    one = curves[what]
+    if one is None or not np.any(one.seen):
+        raise BadModel(f"the logs show no {what.replace('_', ' ')}; it needs a moving reference")
+    return one
+
+
+def _by_position(f: Array) -> ComplexArray:
+    return np.asarray(-1.0 / (2.0 * np.pi * f) ** 2 + 0j)
+
+
+def _of_response(name: str, one: Response | None, f: Array) -> dict[str, Array]:
+    blank = np.full(len(f), np.nan)
+    if one is None:
+        keys = ("magnitude_db", "phase_deg", "band_db", "band_deg", "coherence")
+        return {f"{name}_{key}": blank for key in keys}
+    H = np.where(one.seen, one.H, np.nan)
+    half = np.where(one.seen, one.half_band, np.nan)
+    return {
+        **_of_curve(name, H),
+        f"{name}_band_db": decibels(1.0 + half),
+        f"{name}_band_deg": np.minimum(np.degrees(half), 180.0),
+        f"{name}_coherence": one.coherence,
+    }
+
+
+def _of_curve(name: str, H: ComplexArray) -> dict[str, Array]:
+    return {f"{name}_magnitude_db": decibels(np.abs(H)), f"{name}_phase_deg": degrees(H)}
+
+
+def decibels(size: Array) -> Array:
+    """Magnitudes in dB; NaN stays."""
+    with np.errstate(invalid="ignore"):
+        return np.asarray(20.0 * np.log10(np.maximum(size, 1e-300)))
+
+
+def degrees(H: ComplexArray) -> Array:
+    """Phase without jumps [deg], its middle between -270 and 90; NaN stays."""
+    known = np.isfinite(H)
+    out = np.full(len(H), np.nan)
+    if np.any(known):
+        phase = np.degrees(np.unwrap(np.angle(H[known])))
+        out[known] = phase - 360.0 * math.ceil((float(np.median(phase)) - 90.0) / 360.0)
+    return out
+
+
+def response_csv(found: Responded) -> str:
+    """response.csv; a cell is empty where nothing is seen."""
+    return str(response_frame(found).to_csv(index=False, float_format="%.7g"))
