@@ -79,7 +79,7 @@ docs: environment
 	@echo "the site: build/site/index.html"
 
 slow: environment
-	$(PYTEST) --dist loadfile -m "slow and not method"
+	$(PYTEST) --dist loadfile --durations 15 -m "slow and not method"
 
 # Traces and fits of many seconds each, and the longer half of the verdicts, for who changes a method.
 test-method: environment kernels

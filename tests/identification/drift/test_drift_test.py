@@ -202,6 +202,7 @@ def test_none_needs_both_coulomb_levels_and_no_more() -> None:
         assert found.could_have_seen[name] > 0.05 > found.could_have_seen["F_cp"]
 
 
+@pytest.mark.slow
 def test_what_is_seen_is_found() -> None:
     """A change as large as the smallest that could have been seen, of one parameter alone."""
     known, quiet = coulomb(0.003, 0.0, "m", "F_cp", "F_cn")

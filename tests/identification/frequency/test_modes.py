@@ -48,6 +48,7 @@ def test_both_peaks_of_two_masses_are_found_in_a_log() -> None:
     assert abs(anti.frequency.value - HERTZ) < 5.0 * anti.frequency.sd
 
 
+@pytest.mark.slow
 def test_deviations_are_those_of_repeated_noise() -> None:
     every = [fit_modes(exact(accelerations(), seed=seed)) for seed in range(12)]
     found = np.array([[p.frequency.value for p in one.peaks] for one in every if one])

@@ -59,6 +59,7 @@ def test_a_model_that_follows_no_better_is_refused() -> None:
     assert "one of them has to fall by 10 % at least" in found.reason
 
 
+@pytest.mark.slow
 def test_a_model_that_follows_worse_is_refused() -> None:
     found = contest(contender(NEW), contender(OLD))
     assert not found.won

@@ -110,6 +110,7 @@ def test_the_load_that_swings_behind_a_motor_at_rest_is_seen() -> None:
     assert responded(ONE).peaks == ()
 
 
+@pytest.mark.slow
 def test_the_hidden_load_is_found_where_friction_hides_the_force() -> None:
     for one in (TWO, ONE):
         known = model(one)
@@ -150,6 +151,7 @@ def test_a_spring_stays_in_the_plant_but_for_its_cube() -> None:
     assert abs(curves.plant[0]) == pytest.approx(1 / 500.0, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch) -> None:
     log = log_of(ONE, 6.0)
     monkeypatch.setattr("workbench.report.response.SAMPLES_IN_A_REPORT", len(log) + 1)
@@ -257,6 +259,7 @@ def test_what_shows_nothing_is_refused() -> None:
         of_logs(log, model=rotary)
 
 
+@pytest.mark.slow
 def test_several_logs_narrow_the_band() -> None:
     both = of_logs(log_of(ONE), log_of(ONE).part(0, 30_000), model=model(ONE), lowest=2.0)
     alone = of_logs(log_of(ONE), model=model(ONE), lowest=2.0)

@@ -121,7 +121,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad**3",
     ]
     assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in trace_sentence(found)
-    html = checked(trace_report(found), 4)
+    html = checked(trace_report(found), 5)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
 
@@ -289,8 +289,8 @@ def test_the_view_for_a_terminal() -> None:
 
 @pytest.mark.parametrize(
     ("verdict", "keys", "figures"),
-    [("effect", ("stribeck",), 3), ("effect", ("stribeck", "spring"), 4), ("none", (), 3),
-     ("drift", (), 3), ("unknown", ("stribeck",), 4), ("inseparable", ("stribeck",), 3)],
+    [("effect", ("stribeck",), 4), ("effect", ("stribeck", "spring"), 5), ("none", (), 4),
+     ("drift", (), 4), ("unknown", ("stribeck",), 5), ("inseparable", ("stribeck",), 4)],
 )  # fmt: skip
 def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) -> None:
     found = traced(trace_of(verdict, keys))
@@ -310,7 +310,7 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
 
 
 def test_an_effect_without_a_picture_is_named() -> None:
-    html = checked(trace_report(traced(trace_of("effect", ("rising_stiction",)))), 1)
+    html = checked(trace_report(traced(trace_of("effect", ("rising_stiction",)))), 2)
     assert "rising stiction shows in neither equation" in html
     assert pictures(replace(trace_of(), residuals=())) == []
 
@@ -319,7 +319,7 @@ def test_the_free_run_is_drawn_before_and_after() -> None:
     found = trace_of("effect", ("rising_stiction",))
     t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
     run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
-    html = checked(trace_report(traced(replace(found, run=run))), 2)
+    html = checked(trace_report(traced(replace(found, run=run))), 3)
     assert "rising stiction shows in neither" in html and "residual [mm]" in html
     assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
     assert "residual [rad]" in trace_report(traced(replace(found, run=run), rotary=True))
@@ -329,7 +329,7 @@ def test_a_law_is_drawn_beside_what_the_logs_say_without_it() -> None:
     at = np.linspace(0.01, 0.3, 12)
     curve = FreeCurve("stribeck", "mechanical", "v", at, np.exp(-at), 0.01 + 0 * at, np.exp(-at))
     found = replace(trace_of("effect", ("stribeck",)), curves=(curve,))
-    html = checked(trace_report(traced(found)), 4)
+    html = checked(trace_report(traced(found)), 5)
     for text in ("Law and logs", "stribeck [N]", "by the logs alone", "velocity [mm/s]"):
         assert text in html
 

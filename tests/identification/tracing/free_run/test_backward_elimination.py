@@ -62,6 +62,7 @@ def test_a_choice_goes_on_from_its_first_effect(found: tuple[Setting, Choice]) -
     assert keys[0] == keys[2][:1] and keys[1] == keys[2]
 
 
+@pytest.mark.slow
 def test_one_effect_is_enough_where_its_run_leaves_noise(found: tuple[Setting, Choice]) -> None:
     setting, choice = found
     part = first_steps(choice, 1)
