@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from design.compensation_tables import (
-    LOWEST_SHARE,
+    LOWEST_OF_TABLE,
     Harmonic,
     SlidingFriction,
     along,
@@ -111,7 +111,7 @@ class Compensation:
             for name, found in self.model.effects[one.key].items():
                 if not found.known:
                     raise BadModel(self.untold("a friction table", f"{one.key}.{name}", found))
-        return SlidingFriction(self.model.simulated, LOWEST_SHARE * self.high, self.high)
+        return SlidingFriction(self.model.simulated, LOWEST_OF_TABLE * self.high, self.high)
 
     @property
     def high(self) -> float:

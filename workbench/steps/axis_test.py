@@ -29,7 +29,7 @@ AXIS_SCHEMA = "axis_test/1"
 LEAST_EXPLAINED = 0.8  # of the force, below which something acts that the numbers do not hold
 ALONG_PLACES = 24  # along the travel
 FEWEST_THERE = 3  # windows of sliding at a place
-NO_BACKLASH = "no model with a play is in force; `workbench trace` finds one in this log"
+NO_BACKLASH = "the active model has no play; `workbench trace` finds one in this log"
 
 WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
 
