@@ -19,6 +19,8 @@ from identification.arx.residual_tests import residual_tests
 from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
+from identification.estimation.imposed_motion import left_by
+from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
@@ -103,7 +105,7 @@ def identify(
         plant_reason=reason,
         fit=_summary(
             fit,
-            _force_error(fit.surroundings.taken_out(logs[0]), fit, rig),
+            _force_error([fit.surroundings.taken_out(log) for log in logs], fit, rig),
             closed_loop_remarks(logs),
         ),
         log=tuple(_entry(source, fit, i) for i, source in enumerate(sources)),
@@ -215,10 +217,16 @@ def _entry(source: Source, fit: KarnoppFit, index: int) -> LogEntry:
     )
 
 
-def _force_error(log: Log, fit: KarnoppFit, rig: Rig) -> ForceError | None:
-    """What the mechanical equation leaves of the force on sliding samples; None without any."""
+def _force_error(logs: Sequence[Log], fit: KarnoppFit, rig: Rig) -> ForceError | None:
+    """What the mechanical equation leaves of the force on sliding samples; None without any.
+
+    Of a fit by that equation alone as it was fitted, of a fit of a run on the first log.
+    """
+    if fit.imposed:
+        left = left_by(fit.friction, recorded_logs(logs, rig, fit.drive))
+        return None if left is None else ForceError(left[0] / left[2], left[0])
     try:
-        return force_error(log, fit.friction, Smoothing(held=rig.kind == "motor"))
+        return force_error(logs[0], fit.friction, Smoothing(held=rig.kind == "motor"))
     except (NotIdentifiable, BadLog):
         return None
 

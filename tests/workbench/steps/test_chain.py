@@ -11,11 +11,14 @@ import pytest
 from design.loop import LoopRun
 from design.tune import Asked, Goals
 from identification.errors import BadCard, BadLog, BadModel, BadSpecification, NotIdentifiable
+from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.recorded_logs import recorded_logs
 from identification.log import Log, Rig
-from identification.model.estimates import Estimate
+from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator
 from tests.chain import EMPS, TABLES, designed, identified, model_of, short_recipe
+from tests.identification.plants import made_log, table
 from workbench.cards.recipe import RecipePID
 from workbench.documents.design_file import design_document
 from workbench.documents.design_read import read_design
@@ -26,6 +29,7 @@ from workbench.steps import loop_figures
 from workbench.steps.closed_loop import run_driven, run_loop
 from workbench.steps.design import effort_limit
 from workbench.steps.identify import (
+    _force_error,
     arx_plant,
     closed_loop_remarks,
     common_period,
@@ -440,3 +444,21 @@ def test_a_run_by_force_says_what_held_it() -> None:
     alone = replace(model, fit=replace(model.fit, drive="force", stiffness=0.0))
     assert any("restarted from" in line for line in fit_lines(alone))
     assert not any("held to" in line for line in fit_lines(alone))
+
+
+def test_what_an_equation_leaves_is_told_as_it_was_fitted() -> None:
+    """In the weak form, which a clock that jitters does not spoil as it does derivatives."""
+    log = made_log(table(2), seed=1, seconds=8.0)
+    shaken = log.with_signals(y=log["y"] + 2e-5 * rng().standard_normal(len(log)))
+    rig = Rig("force")
+    fit = fit_imposed(recorded_logs([shaken], rig, "force"), rng(), "why", by_rig=False)
+    told = _force_error([shaken], fit, rig)
+    by_derivatives = _force_error([shaken], replace(fit, logs=followed(fit)), rig)
+    assert told is not None and by_derivatives is not None
+    assert told.relative < 0.1
+    assert told.relative < by_derivatives.relative
+
+
+def followed(fit: KarnoppFit) -> tuple[LogFit, ...]:
+    """The fit's logs as if a run had followed them."""
+    return tuple(replace(one, position_rms=0.0) for one in fit.logs)
