@@ -130,6 +130,7 @@ def _made(
             f"{why}: fitted on the force equation, which leaves {100 * fit.relative:.1f} % of the"
             " force",
         ),
+        command_period=recorded.command_period,
     )
     return untold(made, fit.relative) if is_unexplained(fit.relative) else made
 
