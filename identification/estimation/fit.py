@@ -5,8 +5,9 @@ force, or along a motion that a rig imposes; from nothing, or from the model tha
 
 1. The equations in weak form give a start (or the model in force does).
 2. The free run in windows from measured states, the states' uncertainty taken out, refines it.
-3. The fit settles (`settling`): whole runs where they are followed, windows elsewhere, the equation
-   of motion where that tells more. Events and spread say what is told.
+3. Where more than noise is left, a search for the plain plant looks for another start.
+4. The fit settles (`settling`): whole runs where they are followed, windows elsewhere, the mean of
+   what does about as well where the model lacks something. Events and spread say what is told.
 """
 
 from collections.abc import Sequence
@@ -40,6 +41,8 @@ from identification.estimation.settling import settled
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
+    search_is_hopeless,
+    searched,
 )
 from identification.estimation.surroundings import surrounding_estimates, widened_friction
 from identification.estimation.two_masses import of_two_masses, two_masses
@@ -76,6 +79,7 @@ SURER_WHY = (
     " command that is noisy hides; stick limits and band are not told"
 )
 CORRECTIONS = 3  # rounds in which bad samples are looked for
+WIDER_SEARCHES = 2  # for the plain plant, ever wider
 
 
 def fit_plant(
@@ -243,14 +247,16 @@ def finished(
     found: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
     *, by: Drive | None = None,
 ) -> KarnoppFit:  # fmt: skip
-    """The fit that a plain structure leads to.
+    """The fit that a plain structure leads to: searched where more than noise is left, settled.
 
     by: the drive that was asked for; without one, a run by command that a nonlinear actuator
     spoils is driven by the measured force instead.
     """
-    other, settle = rng.spawn(2)
+    search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
+    if (found.imposed or found.misfit > COMPLETE) and not search_is_hopeless(found, recorded):
+        found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:

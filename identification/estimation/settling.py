@@ -32,7 +32,7 @@ from identification.estimation.plain_search.problem import (
     simulated,
     start_of,
 )
-from identification.estimation.plain_search.search import opened, searched_over_runs
+from identification.estimation.plain_search.search import opened, searched_plant
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.walking_residual import walk_size, widened
 from identification.estimation.windowed_run.parameters import even, names_of, values_of
@@ -105,8 +105,11 @@ def _over_whole_runs(
     optimum = nearest(problem, plant)
     if optimum.cost > COMPLETE * problem.count:
         # A stop that turns on less than the noise makes minima beside the right one.
-        other = searched_over_runs(problem, rng, report)
-        optimum = min(optimum, nearest(problem, plant_of(problem, other)), key=lambda x: x.cost)
+        other = searched_plant(
+            recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
+            halt=recorded.halt,
+        )  # fmt: skip
+        optimum = min(optimum, nearest(problem, other), key=lambda one: one.cost)
     if optimum.cost > ADEQUATE * problem.count:
         return None
     solution = weigh_noise(problem, optimum, rng, optimum.evaluations, report)

@@ -6,7 +6,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.effects._base import Effect
+from identification.errors import UserError
 from identification.estimation.plain_search.actuator_fit import fit_actuator
+from identification.estimation.plain_search.search import searched_plant
 from identification.estimation.recorded_logs import RecordedLogs, led_by_rig
 from identification.estimation.regressed_plant import (
     RegressedPlant,
@@ -41,7 +43,7 @@ from identification.estimation.windowed_run.stick_search import stick_search, wi
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.karnopp import Karnopp
 from identification.model.plant import Actuator, Motor, Plant
-from identification.progress import Halted
+from identification.progress import Halted, Progress, quiet
 from identification.thresholds import ADEQUATE, COMPLETE, MUCH
 
 PIECE_SECONDS = 10.0  # s of each log, which fewer marginal stops spoil than the whole
@@ -202,19 +204,35 @@ def band(model: FittedStructure) -> float:
 def plain_structure(recorded: RecordedLogs, rng: np.random.Generator) -> FittedStructure:
     """The plant without effects: by the equations, refined on its free run.
 
-    Where these have too few rows of sliding, the run alone is fitted, from a first estimate.
+    Where these have too few rows of sliding, the run alone is fitted, from a first estimate. A
+    search follows where the equations of an actuator's plant are right but its run is not.
     """
+    regressed, search = rng.spawn(2)
     stage, first = first_stage(recorded.logs, recorded.by_command)
     if MECHANICAL not in first:
         return _from_first_estimate(stage, first, recorded)
-    return fitted_structure(stage, first, (), recorded, rng)
+    model = fitted_structure(stage, first, (), recorded, regressed)
+    if model.imposed or model.misfit <= COMPLETE or search_is_hard(model, recorded):
+        return model
+    return searched(model, recorded, search)
+
+
+def search_is_hard(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether a search for the plain plant takes long, or hardly has a chance."""
+    return loose(model.plant, recorded.drive) or rough(model.outcomes)
+
+
+def search_is_hopeless(model: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether it takes long and hardly has a chance."""
+    return loose(model.plant, recorded.drive) and rough(model.outcomes)
 
 
 def _from_first_estimate(
     stage: EffectRows, first: Mapping[str, RowFit], recorded: RecordedLogs
 ) -> FittedStructure:
-    plant = first_plant(recorded)
-    nine = plant.friction
+    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
+    nine = Karnopp.from_array(np.median(found, axis=0))
+    plant = Plant(nine, actuator_of(recorded))
     if led_by_rig(recorded):
         return FittedStructure(stage, first, plant, {}, True)
     done: Refit | None = None
@@ -239,7 +257,31 @@ def actuator_of(recorded: RecordedLogs) -> Actuator | Motor | None:
     return Actuator(max(found.k1, 1e-9), max(found.k2, 0.0))
 
 
-def first_plant(recorded: RecordedLogs) -> Plant:
-    """The plant of a first estimate, the median over the logs."""
-    found = [first_estimate(log, held=recorded.held).nine for log in recorded.plain]
-    return Plant(Karnopp.from_array(np.median(found, axis=0)), actuator_of(recorded))
+def searched(
+    model: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator,
+    report: Progress = quiet, attempts: int = 1,
+) -> FittedStructure:  # fmt: skip
+    """The plain model from global searches, where one of these follows the logs better.
+
+    Halted, it is the best so far.
+    """
+    for attempt in range(attempts):
+        try:
+            plant = searched_plant(
+                recorded.plain, rng, rig=recorded.rig, drive=recorded.drive, report=report,
+                attempt=attempt, halt=recorded.halt,
+            )  # fmt: skip
+        except (UserError, Halted):
+            return model
+        try:
+            found = refit(plant, recorded.logs, recorded.drive, prior={}, effort="near")
+            left_by = misfit(plant, recorded.logs, recorded.drive)
+            better = found.misfit < left_by
+            best, least = (found.plant, found.misfit) if better else (plant, left_by)
+            if least < model.misfit:
+                model = replace(model, plant=best, sd=found.sd, misfit=least, imposed=False)
+        except Halted:
+            return model
+        if model.misfit <= COMPLETE:
+            break
+    return model

@@ -1,1 +1,1 @@
-"""The nine parameters from whole runs by the command: search, refinement, weighing."""
+"""The nine parameters from the simulated response: search, refinement, weighing, posterior."""

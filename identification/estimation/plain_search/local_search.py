@@ -7,6 +7,7 @@ a cloud of parameter sets weighted by their likelihood, which also gives the cov
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,6 +21,7 @@ TRIALS = WIDTH - 1
 FREEDOM = 8.0  # degrees of freedom of the sampling t-distribution
 CLOUD = 256
 REFINE_ROUNDS = 40
+MANY_RUNS = 16  # runs from which their own unknowns are eliminated one by one
 SETTLED_SHARE = 0.2  # effective share of a cloud that ends the sampling
 STEP_WIDTHS = (0.01, 0.1, 1.0, 10.0)  # widths of the last differences, in the usual one
 
@@ -72,10 +74,11 @@ def refine(
     center = pack(runs, p, starts, free)
     prior = 1e-6 * np.ones(len(scale))
     theta, damping, spent = center, 1e-3, 0
+    own = [len(run.open) for run in runs]
     delta = np.full(len(scale), 1e-5)
     form = _quadratic(runs, p, starts, theta, free, scale, delta, cap)
     for _ in range(iterations):
-        trials = _steps(form, theta, center, scale, prior, damping)
+        trials = _steps(form, theta, center, scale, prior, damping, len(free), own)
         keep_near(trials, free, p)
         sets, begun = unpack(runs, p, starts, free, trials)
         costs = total_cost(runs, sets, cap, begun)
@@ -307,6 +310,8 @@ def _steps(
     scale: Array,
     prior: Array,
     damping: float,
+    shared: int,
+    own: Sequence[int],
 ) -> Array:
     """Trial points (TRIALS, d) for dampings around the last that served."""
     pull = form.gradient + prior * (theta - center) / scale
@@ -316,8 +321,31 @@ def _steps(
         weight = damping * 10.0 ** (i - 3) if i else 0.0
         matrix = form.hessian + np.diag(weight * diagonal + prior)
         try:
-            step = np.linalg.solve(matrix, pull)
+            step = _solved(matrix, pull, shared, own)
         except np.linalg.LinAlgError:
             step = np.linalg.pinv(matrix) @ pull
         trials[i] = theta - step * scale
     return trials
+
+
+def _solved(matrix: Array, pull: Array, shared: int, own: Sequence[int]) -> Array:
+    """Solution of matrix @ step = pull, the runs' own unknowns eliminated where they are many.
+
+    own: number of each run's unknowns, which meet those of other runs in zeros only.
+    """
+    if len(own) < MANY_RUNS:
+        return np.asarray(np.linalg.solve(matrix, pull), dtype=np.float64)
+    reduced, right = matrix[:shared, :shared].copy(), pull[:shared].copy()
+    bounds = shared + np.concatenate([[0], np.cumsum(own)])
+    solved = []
+    for low, high in pairwise(bounds):
+        beside = matrix[low:high, :shared]
+        both = np.linalg.solve(
+            matrix[low:high, low:high], np.column_stack([beside, pull[low:high]])
+        )
+        reduced -= beside.T @ both[:, :-1]
+        right -= beside.T @ both[:, -1]
+        solved.append(both)
+    step = np.linalg.solve(reduced, right)
+    out: Array = np.concatenate([step, *(both[:, -1] - both[:, :-1] @ step for both in solved)])
+    return out

@@ -1,5 +1,6 @@
-"""The nine parameters by a search over whole runs of the command, many at once."""
+"""A plant of the nine parameters by search, where what the equations give leads nowhere."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -7,14 +8,39 @@ import numpy as np
 from identification.estimation.global_search import evolve
 from identification.estimation.plain_search.cost import START_V, START_Y
 from identification.estimation.plain_search.fitted_runs import total_cost
+from identification.estimation.plain_search.growing_windows import climb
 from identification.estimation.plain_search.local_search import Optimum, refine
-from identification.estimation.plain_search.problem import Problem
-from identification.progress import Progress
+from identification.estimation.plain_search.problem import Problem, plant_of, pose
+from identification.log import Log, Rig
+from identification.model.estimates import Drive
+from identification.model.plant import Plant
+from identification.progress import Halt, Progress
 from identification.simulation.karnopp_step import DV_N, DV_P, F_SN, F_SP
 
 SEARCH_POPULATION = 64
 SEARCH_GENERATIONS = 150
+# Factors on a residual's bound and on the search's box, of each attempt after the first
+LOOSER, WIDER_BOX = 25.0, 3.0
 WORTH_A_SEARCH = 300.0  # chi-square over windows up to which a fit is worth a closer search
+
+
+def searched_plant(
+    logs: Sequence[Log], rng: np.random.Generator, *, rig: Rig, drive: Drive, report: Progress,
+    attempt: int = 0, halt: Halt | None = None,
+) -> Plant:  # fmt: skip
+    """The plant of one global search for the nine parameters, without intervals.
+
+    drive: "command" (of a motor too) or "force"; attempt: how many have failed before, perhaps
+    around a bad first estimate; halt: asked before each run. Raises NotIdentifiable where nothing
+    moves, BadLog where a signal is missing.
+    """
+    problem = pose(logs, rig, drive, halt)
+    found = (
+        climb(opened(problem), rng, report)
+        if problem.hold
+        else _search(problem, rng, report, attempt)
+    )
+    return plant_of(problem, found)
 
 
 def opened(problem: Problem) -> Problem:
@@ -26,9 +52,10 @@ def opened(problem: Problem) -> Problem:
     return replace(problem, runs=runs)
 
 
-def searched_over_runs(problem: Problem, rng: np.random.Generator, report: Progress) -> Optimum:
-    """The best member of a global search over windows, refined over the whole runs."""
-    cap, runs, box = problem.cap, problem.runs, problem.box
+def _search(problem: Problem, rng: np.random.Generator, report: Progress, attempt: int) -> Optimum:
+    """The best member of a global search over windows, refined over the whole run."""
+    cap, runs = problem.cap * LOOSER**attempt, problem.runs
+    box = problem.box.wider(WIDER_BOX**attempt)
     # k1 and k2 come from the regression: searched over in the refinement only.
     population = evolve(
         lambda z: total_cost(runs, box.rows(z), cap),
