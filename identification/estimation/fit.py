@@ -6,8 +6,8 @@ force, or along a motion that a rig imposes; from nothing, or from the model tha
 1. The equations in weak form give a start (or the model in force does).
 2. The free run in windows from measured states, the states' uncertainty taken out, refines it.
 3. Where more than noise is left, a search for the plain plant looks for another start.
-4. The fit settles (`settling`): whole runs where they are followed, windows elsewhere, the mean of
-   what does about as well where the model lacks something. Events and spread say what is told.
+4. The fit settles (`settling`): whole runs where they are followed, windows elsewhere; the equation
+   of motion answers where it tells more. Events and spread say what is told.
 """
 
 from collections.abc import Sequence

@@ -1,1 +1,1 @@
-"""The nine parameters from the simulated response: search, refinement, weighing, posterior."""
+"""The nine parameters from the simulated response: search, refinement, weighing."""

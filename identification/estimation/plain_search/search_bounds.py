@@ -58,12 +58,6 @@ class Box:
         every: BoolArray = np.all(inside, axis=1)
         return every
 
-    def moved_inside(self, values: Array) -> Array:
-        """Values (k, d) of the free parameters, clipped to the box."""
-        sign = SIGN[self.free]
-        clipped: Array = sign * np.clip(sign * values, self.low, self.high)
-        return clipped
-
     def wider(self, factor: float) -> "Box":
         """The box with the bounds of the nine moved out by `factor`; a coupling keeps its own."""
         by = np.where(self.free == K2, 1.0, factor)
