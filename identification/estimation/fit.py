@@ -320,7 +320,7 @@ def by_equation_if_surer(
 def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit | None:
     """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
     with suppress(NotIdentifiable):
-        return fit_imposed(recorded, rng, why, by_rig=False)
+        return fit_imposed(recorded, rng, why)
     with suppress(NotIdentifiable):
         return fit_one_way(recorded, rng, why)
     return None
