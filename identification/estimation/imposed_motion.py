@@ -28,16 +28,19 @@ from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
-from identification.thresholds import MOST_UNEXPLAINED, OTHER_WAY
+from identification.thresholds import HARDLY_MORE, MOST_UNEXPLAINED, OTHER_WAY
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
+SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
-HARDLY_MORE = 1.02  # times the least force left, that fewer columns may leave
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
-COLUMN_SETS = ((1, 2), (0, 1, 2), (1, 2, 3, 4), (0, 1, 2, 3, 4))  # fewest first
+OF_SPEED = ((), (3,), (4,), (3, 4))  # columns of viscous friction that may stand beside the others
+COLUMN_SETS = tuple(
+    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in OF_SPEED), key=len)
+)
 WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
     "F_v": "constant friction predicts as much of these logs; add runs at other speeds to tell"
@@ -92,7 +95,7 @@ def _made(
     samples = np.tile(center, (NORMAL_SETS, 1))
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
-    nine = _assumed(center, firsts)
+    nine = _assumed(center, firsts, _slightest_mass(rows))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -251,8 +254,13 @@ def _best(data: Sequence[Rows]) -> ForceFit:
     every = _solved(data, COLUMN_SETS[-1])
     sets = [used for used in COLUMN_SETS if 0 not in used or every.theta[0] > 0.0]
     left = [_unseen(data, used) for used in sets]
-    used = next(x for x, one in zip(sets, left, strict=True) if one <= HARDLY_MORE * min(left))
+    used = next(x for x, one in zip(sets, left, strict=True) if predicts_as_much(one, min(left)))
     return replace(_solved(data, used), share=every.share)
+
+
+def predicts_as_much(left: float, least: float) -> bool:
+    """Whether fewer columns, which leave this of a force that they have not seen, will do."""
+    return left <= HARDLY_MORE * least
 
 
 def _unseen(data: Sequence[Rows], used: tuple[int, ...]) -> float:
@@ -293,10 +301,18 @@ def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     )
 
 
-def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
-    """All nine for simulation: the five of sliding kept to their signs, stick just above slip."""
+def _slightest_mass(data: Sequence[Rows]) -> float:
+    """A mass [kg] whose inertia is next to nothing of the force."""
+    rows = stacked(data)
+    force, a = (float(np.sqrt(np.mean(x**2))) for x in (rows.b, rows.X[:, 0]))
+    return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
+
+
+def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> Array:
+    """All nine for simulation: the five of sliding kept to their signs, stick just above slip;
+    slight: a mass [kg] that the equation does without."""
     nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
-    m = center[0] if center[0] > 0 else nine[0]
+    m = center[0] if center[0] > 0 else slight
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
