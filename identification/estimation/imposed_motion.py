@@ -20,7 +20,11 @@ from identification.estimation.regression.equation_rows import (
     OF_FORCE,
     motion_log,
 )
-from identification.estimation.regression.motion_rows import motion_rows, rows_and_windows
+from identification.estimation.regression.motion_rows import (
+    OF_EQUATION,
+    motion_rows,
+    rows_and_windows,
+)
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.log import Log, Rig
@@ -293,7 +297,7 @@ def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     return ForceFit(
         used=used,
         theta=theta,
-        covariance=inverse * variance,
+        covariance=inverse * variance + np.diag((OF_EQUATION * theta) ** 2),
         residuals=parts,
         rms=float(np.sqrt(np.mean(residual**2))),
         relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),

@@ -23,6 +23,7 @@ from identification.estimation.regression.weighted_rows import BLOCKS, Rows, sol
 from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
 
+OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 HALF_WIDTHS = (8, 16, 32, 64)  # samples, half of a window
 FINEST = 4  # samples, of the window that shows direction and speed
 FINER = 4  # times narrower than the rows' windows it is
