@@ -99,10 +99,14 @@ def test_the_pages_form_takes_the_other_of_a_guess(joint: dict[str, Array], tmp_
     rival = next(one.rival for one in found.rig if one.key == "kind")
     assert form.others["kind"][0] == rival
     after = form.with_fields({**form.fields, OTHER_FIELD: "kind"})
-    assert after["kind"] == rival and "kind" not in after.others
+    assert after["kind"] == rival
+    again = after.with_fields({**after.fields, OTHER_FIELD: "kind"})  # and back by the same button
+    assert again.fields == {**again.fields, **form.fields}
     drive = {"force": "F", "motor": "u"}
     assert after[f"column_{drive[rival]}"] == form[f"column_{drive[found.kind]}"]
     assert after[f"column_{drive[found.kind]}"] == ""
+    assert f"else {rival}" in form.text("run.csv").partition("motion")[0]
+    assert f"else {form['kind']}" in after.text("run.csv").partition("motion")[0]
     turned = form.with_fields({**form.fields, OTHER_FIELD: "motion"})
     assert turned["motion"] != form["motion"] and turned["unit_y"] != form["unit_y"]
 
