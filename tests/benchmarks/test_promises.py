@@ -33,7 +33,7 @@ def test_what_differs_is_counted_both_ways(capsys: pytest.CaptureFixture[str]) -
     assert every["dv_p"] == ("no", False, True)
     print_table([found])
     said_lines = capsys.readouterr().out
-    assert "2 of 9 parameters over 1 differ; \"only if\" of 1" in said_lines
+    assert '2 of 9 parameters over 1 differ; "only if" of 1' in said_lines
     assert "| one | alone | F_cp | yes | no | b | d |" in said_lines
 
 

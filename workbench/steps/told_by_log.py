@@ -117,7 +117,7 @@ def told_by(
         if found is None:
             out.append(Told(name, False, "held at a value that does not matter for this log"))
         elif open_run and name not in FIVE:
-            out.append(_if_followed(name, recorded, ways, found))
+            out.append(_if_followed(name, recorded, ways, fit, found))
         elif found.value is not None:
             out.append(_told(name, found, fit, ways, run.get(name), led=led))
         else:  # a path that a rig leads has no breakaways, however it is run
@@ -145,8 +145,8 @@ def _told(
         which = "the force equation" if led else "the equation of motion alone"
         return Told(name, True, f"to {half:.1%} by {which}", within=half)
     within = run.within if run is not None and run.can else half
-    return Told(name, True, f"{_events(name, ways)}; within {within:.1%} of it by the free run",
-                within=within)  # fmt: skip
+    why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"
+    return Told(name, True, why, within=within)
 
 
 def _half(found: Estimate) -> float:
@@ -155,25 +155,30 @@ def _half(found: Estimate) -> float:
     return 0.5 * (found.high - found.low) / abs(found.value)
 
 
-def _events(name: str, ways: Ways) -> str:
-    """What of the measured motion carries a parameter."""
+def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:
+    """What carries a parameter, of the measured motion or of the fit's run, which may show more."""
     side = 1 if name.endswith("n") else 0
     if name.startswith("F_s"):
-        return f"{ways.events.breakaways[side]} breakaways ({EVENTS_NEEDED} needed)"
+        count = max(ways.events.breakaways[side], fit.breakaways[side])
+        return f"{count} breakaways ({EVENTS_NEEDED} needed)"
     if name.startswith("dv"):
-        return f"{ways.events.crossings[side]} starts and stops ({EVENTS_NEEDED} needed)"
+        count = ways.events.crossings[side]
+        seen = f"{count} starts and stops" if count >= EVENTS_NEEDED else "stops of the run itself"
+        return f"{seen} ({EVENTS_NEEDED} needed)"
     if name == "m":
         return f"{ways.reversals} reversals"
     way = (ways.positive, ways.negative)[side]
     return f"{way.seconds:.3g} s of motion that way"
 
 
-def _if_followed(name: str, recorded: RecordedLogs, ways: Ways, found: Estimate) -> Told:
+def _if_followed(
+    name: str, recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, found: Estimate
+) -> Told:
     """What only a run tells that may be followed: no promise, where the log has the events."""
     lacks = silent_reason(name, ways.events, recorded.name)
     if lacks is not None:
         return _not_told(name, found, recorded.name, lacks)
-    return Told(name, False, _events(name, ways), MEND[name[:3]], only_if=OPEN)
+    return Told(name, False, _events(name, ways, fit), MEND[name[:3]], only_if=OPEN)
 
 
 def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
