@@ -87,8 +87,8 @@ def print_table(found: Sequence[Answers]) -> None:
     print('| | said and told | said, not told | not said, told | neither | "only if": told | not |')
     print("|---|---|---|---|---|---|---|")
     for name in (*NAMES, "all"):
-        own = Counter((one.said, one.told) for one in every if name in (one.name, "all"))
-        cells = [own[key] for key in (("yes", True), ("yes", False), ("no", True), ("no", False),
+        count = Counter((one.said, one.told) for one in every if name in (one.name, "all"))
+        cells = [count[key] for key in (("yes", True), ("yes", False), ("no", True), ("no", False),
                                       ("if", True), ("if", False))]  # fmt: skip
         print(f"| {name} | " + " | ".join(map(str, cells)) + " |")
     print()
