@@ -32,7 +32,8 @@ from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
-from identification.thresholds import HARDLY_MORE, MOST_UNEXPLAINED, OTHER_WAY
+from identification.signals.one_way import is_one_way
+from identification.thresholds import HARDLY_MORE, MOST_UNEXPLAINED
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
@@ -212,11 +213,6 @@ def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
 def _way(up: BoolArray) -> bool | None:
     share = float(np.mean(up)) if len(up) else 0.5
     return share > 0.5 if len(up) >= FEWEST_JUDGED and is_one_way(share) else None
-
-
-def is_one_way(share_up: float) -> bool:
-    """Whether motion of which so much goes up goes one way alone, up or down."""
-    return not OTHER_WAY < share_up < 1.0 - OTHER_WAY
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:

@@ -35,11 +35,7 @@ from identification.estimation.fit import (
     leaves_much,
 )
 from identification.estimation.gauss_newton import Minimum
-from identification.estimation.imposed_motion import (
-    is_one_way,
-    is_unexplained,
-    predicts_as_much,
-)
+from identification.estimation.imposed_motion import is_unexplained, predicts_as_much
 from identification.estimation.recorded_logs import chosen_drive, recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
@@ -77,6 +73,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_walk import shows
 from identification.signals.frozen import frozen
+from identification.signals.one_way import is_one_way
 from identification.signals.steps import (
     jump_size,
     outstanding,

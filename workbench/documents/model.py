@@ -144,6 +144,7 @@ class Told:
     """Whether the logs can tell a parameter, why (not), and what run to add where they cannot.
 
     within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
+    only_if: what has to hold for it to be told where that is not known before the fit; "": it is.
     """
 
     name: str
@@ -151,6 +152,7 @@ class Told:
     why: str
     add: str = ""
     within: float | None = None
+    only_if: str = ""
 
 
 @dataclass(frozen=True)
