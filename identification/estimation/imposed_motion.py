@@ -29,7 +29,7 @@ from identification.estimation.regression.three_step import FirstEstimate, first
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
-from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS, Karnopp
+from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
@@ -42,9 +42,14 @@ WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has sho
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
-OF_SPEED = ((), (3,), (4,), (3, 4))  # columns of viscous friction that may stand beside the others
+SPEED_COLUMNS = (
+    (),
+    (3,),
+    (4,),
+    (3, 4),
+)  # columns of viscous friction that may stand beside the others
 COLUMN_SETS = tuple(
-    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in OF_SPEED), key=len)
+    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in SPEED_COLUMNS), key=len)
 )
 WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
@@ -394,7 +399,7 @@ def _of_sliding(
 
 def _falls(name: str, one: Estimate) -> bool:
     """Whether friction falls with speed, which predicts a motion but cannot be simulated."""
-    return name in VISCOUS and one.assumed is not None and one.assumed < 0.0
+    return name in VISCOUS_NAMES and one.assumed is not None and one.assumed < 0.0
 
 
 def _reasoned(

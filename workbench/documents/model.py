@@ -10,7 +10,7 @@ from identification.effects._library import Library, built_in
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
-from identification.model.karnopp import NAMES, VISCOUS, Karnopp
+from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import known_effect
@@ -225,12 +225,12 @@ class Model(ModelFile):
         Friction that falls with speed is constant there: it would drive the body.
         """
         values = {name: used(self.friction[name]) for name in NAMES}
-        return Karnopp(**{k: max(x, 0.0) if k in VISCOUS else x for k, x in values.items()})
+        return Karnopp(**{k: max(x, 0.0) if k in VISCOUS_NAMES else x for k, x in values.items()})
 
     @property
     def falling(self) -> tuple[float, float]:
         """Slopes at most 0 [N s/m] with which friction up and down falls with speed."""
-        up, down = (min(used(self.friction[name]), 0.0) for name in VISCOUS)
+        up, down = (min(used(self.friction[name]), 0.0) for name in VISCOUS_NAMES)
         return up, down
 
     @property

@@ -25,15 +25,18 @@ from identification.signals.weak_form import WeakWindows, all_windows, noise_gai
 
 OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 HALF_WIDTHS = (8, 16, 32, 64)  # samples, half of a window
-FINEST = 4  # samples, of the window that shows direction and speed
-FINER = 4  # times narrower than the rows' windows it is
+FINEST_WINDOW = 4  # samples, of the window that shows direction and speed
+FINER_WINDOW = 4  # times narrower than the rows' windows it is
 SHORTEST_LOGS = 20  # half-widths, that the shortest log is long at least
-NEARLY, AS_WELL = 1.1, 0.005  # times the least share left, or more than it, that a window may leave
-SLOWEST = 0.02  # of the quick speeds, below which a body may as well be at rest
+NEARLY_LEAST, AS_WELL_LEFT = (
+    1.1,
+    0.005,
+)  # times the least share left, or more than it, that a window may leave
+SLOWEST_SLIDING = 0.02  # of the quick speeds, below which a body may as well be at rest
 FAST_SPEEDS = 0.95  # quantile of speed
-WITHIN = 1e-3  # share of a window, in which it may be within the band of a plant
-UNSURE = 0.02  # share of a window in which the body may be at rest
-FEWEST_ROWS = 30
+WITHIN_BAND = 1e-3  # share of a window, in which it may be within the band of a plant
+UNSURE_IN_WINDOW = 0.02  # share of a window in which the body may be at rest
+FEWEST_IN_MOTION = 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +51,7 @@ class MotionRows:
         """Rows (r,) in which the body is faster than the band of a plant, which says something else
         of friction within it."""
         within = (self.v < p.dv_p) & (self.v > p.dv_n)
-        return np.asarray(self.windows.mean @ (1.0 * within) < WITHIN)
+        return np.asarray(self.windows.mean @ (1.0 * within) < WITHIN_BAND)
 
 
 def motion_rows(logs: Sequence[MotionLog], theta: Array) -> list[Rows]:
@@ -68,11 +71,11 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
         for half in HALF_WIDTHS
         if SHORTEST_LOGS * half < shortest or half == HALF_WIDTHS[0]
     ]
-    found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_ROWS]
+    found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION]
     if not found:
         return tried[0]
     left = [_share_left([one.rows for one in made]) for made in found]
-    enough = max(NEARLY * min(left), min(left) + AS_WELL)
+    enough = max(NEARLY_LEAST * min(left), min(left) + AS_WELL_LEFT)
     return next(made for made, share in zip(found, left, strict=True) if share <= enough)
 
 
@@ -82,13 +85,13 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     length = min(2 * half, n - 1)
     every = all_windows(n, length, h)
     mean, first, second, *_ = weights(length, h)
-    fine = weights(max(FINEST, 2 * (half // FINER)), h)[1]
+    fine = weights(max(FINEST_WINDOW, 2 * (half // FINER_WINDOW)), h)[1]
     padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
     v = np.correlate(padded, fine, "valid")[:n]
     sure = SURE_OF_DIRECTION * one.noise_y * float(np.sqrt(noise_gain(first)))
-    sure = max(sure, SLOWEST * float(np.quantile(np.abs(v), FAST_SPEEDS)))
+    sure = max(sure, SLOWEST_SLIDING * float(np.quantile(np.abs(v), FAST_SPEEDS)))
     over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
-    w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE)))
+    w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
     over, up, down = w.first @ y, v > 0.0, v < 0.0
     X = np.column_stack(
         [w.second @ y, w.mean @ (1.0 * up), -(w.mean @ (1.0 * down)), w.mean @ (v * up),
