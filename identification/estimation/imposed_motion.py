@@ -139,6 +139,7 @@ def _made(
             " force",
         ),
         command_period=recorded.command_period,
+        left=(fit.relative, fit.rms),
     )
     return untold(made, fit.relative) if is_unexplained(fit.relative) else made
 

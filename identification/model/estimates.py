@@ -71,6 +71,8 @@ class KarnoppFit:
     command_period: time [s] after which the drive gives its next command, None where no log shows
     that it is sooner than the next sample. surroundings: what acts beside the applied force, which
     was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
+    left: share and root mean square [N] of the force that the equation of motion leaves, where it
+    was fitted alone.
     """
 
     friction: Karnopp
@@ -92,6 +94,7 @@ class KarnoppFit:
     bad: tuple[BadSamples, ...] = ()
     command_period: float | None = None
     surroundings: Surroundings = NO_SURROUNDINGS
+    left: tuple[float, float] | None = None
 
     @property
     def imposed(self) -> bool:

@@ -19,8 +19,6 @@ from identification.arx.residual_tests import residual_tests
 from identification.drift.own_logs import with_own_logs
 from identification.errors import BadLog, BadModel, NotIdentifiable
 from identification.estimation.fit import fit_plant
-from identification.estimation.imposed_motion import left_by
-from identification.estimation.recorded_logs import recorded_logs
 from identification.estimation.surroundings import lag_estimate, surrounding_estimates
 from identification.estimation.two_masses import resonance_estimates
 from identification.log import Log, Rig
@@ -222,9 +220,8 @@ def _force_error(logs: Sequence[Log], fit: KarnoppFit, rig: Rig) -> ForceError |
 
     Of a fit by that equation alone as it was fitted, of a fit of a run on the first log.
     """
-    if fit.imposed:
-        left = left_by(fit.friction, recorded_logs(logs, rig, fit.drive))
-        return None if left is None else ForceError(left[0] / left[2], left[0])
+    if fit.left is not None:
+        return ForceError(*fit.left)
     try:
         return force_error(logs[0], fit.friction, Smoothing(held=rig.kind == "motor"))
     except (NotIdentifiable, BadLog):
