@@ -214,7 +214,9 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     acts = c.ratio == 1 or s.turn[0] == 0
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
-    if c.friction != NO_COUNTERMEASURE:
+    if c.friction == FEED_FORWARD:
+        added = friction_force(c, s, aim, y, 0.0) if acts else s.last[ADDED]
+    elif c.friction != NO_COUNTERMEASURE:
         force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
         added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
     if c.k_a != 0.0 or c.k_i == 0.0:
@@ -235,7 +237,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         u = min(max(u + shake, -c.limit), c.limit)
     if acts:
         position_moved(c, s, y, asked, taken)
-    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE:
+    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE and c.friction != FEED_FORWARD:
         s.held[U_BEFORE] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0

@@ -47,7 +47,8 @@ def bode_chart(found: Design) -> Chart:
     for name, rst, colour in pairs:
         L = open_loop_response(A, B, rst, f)
         size.append(Line(name, f, _decibels(np.abs(L)), colour))
-        phase.append(Line(name, f, np.degrees(np.unwrap(np.angle(L))), colour))
+        turned = np.degrees(np.unwrap(np.angle(L)))
+        phase.append(Line(name, f, turned - 360.0 * np.ceil(turned[0] / 360.0), colour))
         S = np.abs(sensitivities(A, B, rst, 2.0 * np.pi * f).S_yp)
         sensitivity.append(Line(name, f, _decibels(S), colour))
     panels = (
