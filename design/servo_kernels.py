@@ -27,8 +27,9 @@ SUM, SLOPE, ERROR = range(3)
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
 # What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
-# A reference within so many times its speed and acceleration is a path, and no step.
-PATH_SPEED, PATH_ACCELERATION = 2.0, 4.0
+# A reference within so many times its speed is a path, and no step; one that got ahead is caught
+# up with by so many times the acceleration.
+PATH_SPEED, PATH_ACCELERATION = 3.0, 4.0
 R_MOVED, INTEGRAL_SUM, U_BEFORE, R_STEP, R_BEFORE = range(5)
 
 
@@ -143,27 +144,28 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
 def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
     """The reference [m] moved towards r within its speed and acceleration, so that it stops there.
 
-    One that keeps both, or goes on as a path within some times of both, is taken as it is. The way
-    to a stop from a speed v is v^2/(2 a) at most.
+    One that goes on as a path, within some times of the speed, is taken as it is; one that has got
+    ahead is caught up with. From a speed v the way to a stop is v^2/(2 a) at most.
     """
     left, step = r - held[R_MOVED], held[R_STEP]
-    behind = held[R_BEFORE] - held[R_MOVED]
+    behind, pace = held[R_BEFORE] - held[R_MOVED], r - held[R_BEFORE]
     held[R_BEFORE] = r
-    most, change = rate, acceleration
-    if behind == 0.0:
-        most, change = PATH_SPEED * rate, PATH_ACCELERATION * acceleration
-    if abs(left) <= most and abs(left - step) <= change:
+    most, change = PATH_SPEED * rate, PATH_ACCELERATION * acceleration
+    path = behind == 0.0 and abs(pace) <= most
+    if pace == 0.0 or abs(pace) > most:  # it rests, perhaps after a step
+        pace, most, change = 0.0, rate, acceleration
+    if path or (abs(left) <= most and abs(left - step) <= change):
         held[R_STEP] = left
         held[R_MOVED] = r
     else:
         way = 1.0 if left >= 0.0 else -1.0
-        ahead, speed = abs(left), way * step
-        faster = min(speed + acceleration, rate)
-        if ahead - faster < faster * faster / (2.0 * acceleration):
+        ahead, speed = abs(left), way * (step - pace)
+        faster = speed + change
+        if faster > 0.0 and ahead - faster < faster * faster / (2.0 * change):
             faster = speed
-            if ahead - speed < speed * speed / (2.0 * acceleration):
-                faster = speed - acceleration
-        held[R_STEP] = way * faster
+            if speed > 0.0 and ahead - speed < speed * speed / (2.0 * change):
+                faster = speed - change
+        held[R_STEP] = min(max(pace + way * faster, -most), most)
         held[R_MOVED] += held[R_STEP]
     return float(held[R_MOVED])
 

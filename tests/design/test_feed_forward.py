@@ -10,7 +10,7 @@ from design.feed_forward import FeedForward, feed_forward_force
 from design.present import cascade_to_rst
 from design.program_run import ProgramRun
 from design.servo import Servo, simulate_servo
-from design.servo_kernels import PATH_ACCELERATION, profiled
+from design.servo_kernels import PATH_ACCELERATION, PATH_SPEED, profiled
 from identification.arrays import Array
 from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
@@ -62,13 +62,21 @@ def test_a_step_becomes_a_trapezoid_that_stops_at_its_end() -> None:
     assert H * int(np.argmax(x >= 0.1)) == pytest.approx(0.01 + shortest, abs=0.02)
 
 
-@pytest.mark.parametrize("harder", [1.0, 0.9 * PATH_ACCELERATION])
-def test_a_path_is_taken_as_it_is(harder: float) -> None:
+@pytest.mark.parametrize("harder", [0.3, 1.0, 8.0])
+def test_a_path_is_taken_as_it_is_however_hard_it_turns(harder: float) -> None:
     t = H * np.arange(3000)
-    r = 0.05 * np.sin(2.0 * np.pi * 0.5 * t) * np.clip(t, 0.0, 1.0) ** 2
-    r *= harder * ACCELERATION / float(np.max(np.abs(np.diff(r, 2)))) * H * H
-    r *= min(1.0, 1.9 * RATE * H / float(np.max(np.abs(np.diff(r)))))
+    r = np.sin(2.0 * np.pi * (0.5 + harder) * t) * np.clip(t, 0.0, 1.0) ** 2
+    r *= 0.9 * PATH_SPEED * RATE * H / float(np.max(np.abs(np.diff(r))))
     np.testing.assert_array_equal(moved(r), r)
+
+
+def test_one_that_is_too_fast_is_caught_up_with() -> None:
+    t = H * np.arange(4000)
+    r = 0.3 * np.sin(2.0 * np.pi * 1.0 * t) * np.clip(t, 0.0, 1.0) * (t < 2.0)
+    x = moved(r)
+    assert np.max(np.abs(np.diff(r))) > PATH_SPEED * RATE * H
+    assert np.max(np.abs(np.diff(x))) <= PATH_SPEED * RATE * H * (1.0 + 1e-9)
+    assert np.max(np.abs(x)) < 0.45 and x[-1] == r[-1]
 
 
 def test_one_that_turns_back_on_the_way_is_followed_within_the_limits() -> None:
