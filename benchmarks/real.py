@@ -28,6 +28,8 @@ from benchmarks.real_report import line, print_report
 from workbench.logs.fetch import DATA_VARIABLE
 
 ROOT = Path(__file__).resolve().parent.parent
+PARTS_ASKED = {"look": (), "both": ("identify", "trace"), "promise": ("said_alone", "alone")}
+PARTS_ASKED["promise_of_test"] = PARTS_ASKED["promise"]
 PARTS = ("look", "identify", "trace", "both")
 
 
@@ -47,7 +49,7 @@ def answered(case: Case, limit: float, part: str) -> dict[str, Any]:
         return found
     over = done.returncode in (-signal.SIGXCPU, -signal.SIGKILL)
     why = f"over {limit:g} s" if over else done.stderr.strip()[-400:]
-    wanted = {"look": (), "both": ("identify", "trace")}.get(part, (part,))
+    wanted = PARTS_ASKED.get(part, (part,))
     for what in wanted:
         found.setdefault(what, {"over" if over else "fault": why})
     return found

@@ -1,8 +1,10 @@
 """The process that runs one case of `real`: lines of JSON, each of which holds the one before.
 
-    python -m benchmarks.real_child NAME LIMIT look|identify|trace|both
+    python -m benchmarks.real_child NAME LIMIT look|identify|trace|both|said|promise
 
 look: init, doctor and yardstick; identify: these and the fit; trace: the yardstick and the trace.
+said: what is told of the first log before a fit, alone, and of all logs; promise: this and what
+`identify` then tells (see `promises`); with `_of_test` behind it, of the held-out logs.
 LIMIT: processor time [s], after which the system ends the process; a trace is told to end a little
 before, as by `--budget`. Everything is asked through the functions behind the commands.
 """
@@ -27,16 +29,19 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.tracing.result import Trace
 from workbench.cards.card import Card
-from workbench.documents.model import Model
+from workbench.documents.model import Model, Told
 from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
 from workbench.steps.doctor import Examined, examine
 from workbench.steps.first_card.proposal import proposed
-from workbench.steps.identify_sources import identify_sources
+from workbench.steps.identify_sources import Identified, identify_sources
+from workbench.steps.runs_tell import runs_tell
 from workbench.steps.trace import trace_sources
 
 SEED = 0
 SHORT, LONG = 0.2, 2.0  # s, windows of the free run
+OF_TEST = "_of_test"
+PROMISES = ("said", "promise", f"said{OF_TEST}", f"promise{OF_TEST}")
 ROOM = 20.0  # s before the limit at which a trace is told to end
 
 
@@ -110,6 +115,23 @@ def doctor_answer(found: Examined) -> dict[str, Any]:
     }
 
 
+def said_answer(told: Sequence[Told], refused: str) -> dict[str, Any]:
+    """What is said of each parameter before a fit."""
+    said = {one.name: {"can": one.can, "why": one.why, "only_if": one.only_if} for one in told}
+    return {"refused": refused, "told": said}
+
+
+def kept_answer(found: Identified) -> dict[str, Any]:
+    """What a fit tells of each parameter."""
+    every = {**found.model.friction, **(found.model.actuator or {})}
+    return {
+        "kept": {name: {"value": one.value, "sd": one.sd, "why": one.reason}
+                 for name, one in every.items()},
+        "adequate": found.model.fit.adequate,
+        "remarks": list(found.model.fit.remarks),
+    }  # fmt: skip
+
+
 def init_answer(path: Path) -> dict[str, Any]:
     """The card that init proposes."""
     found = proposed(path)
@@ -145,12 +167,42 @@ class Answers:
         return found
 
 
+def promise(answers: Answers, ready: Prepared, card: Card, part: str) -> None:
+    """What is said before a fit, and what the fit tells: of the first log alone, and of all."""
+    paths = ready.test if part.endswith(OF_TEST) else ready.train
+    first, every = [str(paths[0])], [str(path) for path in paths]
+
+    def said() -> dict[str, Any]:
+        found = examine(paths[0], card)
+        return said_answer(found.told, found.refused)
+
+    def said_of_all() -> dict[str, Any]:
+        read = sources_of(every, card)
+        found = runs_tell([one.log for one in read.runs], read.rig)
+        return said_answer(found.told, found.reason)
+
+    def kept(asked: Sequence[str]) -> dict[str, Any]:
+        return kept_answer(identify_sources(sources_of(asked, card), seed=SEED))
+
+    several = len(every) > 1
+    answers.ask("said_alone", said)
+    if several:
+        answers.ask("said_all", said_of_all)
+    if part.startswith("promise"):
+        answers.ask("alone", lambda: kept(first))
+        if several:
+            answers.ask("all", lambda: kept(every))
+
+
 def run(case: Case, ready: Prepared, limit: float, part: str) -> None:
     """Asks everything of a case."""
     answers, card = Answers(case), ready.card
-    if case.right.init is not None and part != "trace":
+    if case.right.init is not None and part not in ("trace", *PROMISES):
         answers.ask("init", lambda: init_answer(ready.train[0]))
     if card is None:
+        return
+    if part in PROMISES:
+        promise(answers, ready, card, part)
         return
     if part != "trace":
         answers.ask("doctor", lambda: doctor_answer(examine(ready.train[0], card)))

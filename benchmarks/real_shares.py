@@ -22,7 +22,7 @@ from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
 from workbench.documents.model import Model, used
 from workbench.steps.predict import predict
-from workbench.steps.predicted_force import force_needed, of_body, refuse_missing
+from workbench.steps.predicted_force import force_by_model, of_body, refuse_missing
 
 ROUNDS = 8  # of friction by load, each with the force of the last
 MOST = 1e6  # times the signal, beyond which a prediction runs away
@@ -84,7 +84,7 @@ def _needs(model: Model, record: Record, read: Log | None) -> Array:
     by_load = any("F" in one.effect.depends_on for one in plant.effects)
     force = np.zeros(len(log))
     for _ in range(ROUNDS if by_load else 1):
-        force = force_needed(body.with_signals(F=force), plant, how)
+        force = force_by_model(model, body.with_signals(F=force), how)
         force = np.clip(np.nan_to_num(force, nan=most), -most, most)
     t = record.t if read is None else record.t - record.t[0] + log["t"][0]
     return np.interp(t, log["t"], force - plant.friction.m * a)

@@ -101,6 +101,7 @@ EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
+HARDLY_MORE = 1.02  # times the least force left unseen, that fewer terms of friction may leave
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
 GATE_MARGIN = 3.0  # times the information's deviation, that a log is said to tell a parameter by
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most

@@ -9,9 +9,9 @@ from identification.arrays import Array, frozen
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, KarnoppFit
+from identification.model.karnopp import VISCOUS_NAMES
 from identification.model.plant import Actuator, Plant, units_of
 
-VISCOUS = ("F_vp", "F_vn")
 COULOMB = ("F_cp", "F_cn")
 FORCES = ("F_cp", "F_cn", "F_sp", "F_sn")
 LEAST_EFFECT = 0.1  # of an effect's typical parameter, below which one is small
@@ -98,7 +98,7 @@ class InForce:
         for i, name in enumerate(self.names):
             if name in FORCES:
                 size[i] = max(size[i], LEAST_FORCE * largest)
-            if name in VISCOUS and self.fastest > 0:
+            if name in VISCOUS_NAMES and self.fastest > 0:
                 size[i] = max(size[i], LEAST_FORCE * largest / self.fastest)
             if "." in name:
                 size[i] = max(size[i], self._least_of_effect(name))

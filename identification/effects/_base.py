@@ -20,7 +20,6 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.arrays import Array
-from identification.compiled import kernel_pointer
 from identification.effects._places import PLACES, Acts, Place
 from identification.errors import BadModel
 
@@ -134,6 +133,8 @@ class Effect:
     @cached_property
     def pointers(self) -> tuple[Any, Any, Any]:
         """Compiled `value`, `evolve` and `initial`, None where there is none; cached on disk."""
+        from identification.compiled import kernel_pointer  # numba takes half a second to import
+
         parts = ((self.value, False), (self.evolve, True), (self.initial, False))
         return tuple(k and kernel_pointer(k, self.key, step) for k, step in parts)  # type: ignore[return-value]
 

@@ -12,6 +12,7 @@ import numpy as np
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
 from identification.estimation.regression.equation_rows import MotionLog, mechanical, motion_log
+from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.standstill import breakaways
 from identification.estimation.regression.weighted_rows import (
     Rows,
@@ -20,7 +21,6 @@ from identification.estimation.regression.weighted_rows import (
 )
 from identification.log import Log
 
-OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
 COULOMB_LEVELS = ("F_cp", "F_cn")
 COLUMNS_TRIED = ([0, 1, 2, 3, 4], [1, 2, 3, 4], [0, 1, 2], [1, 2])
 MOST_SPREAD = 0.25  # deviation of mass and viscous friction, of their values, that is told

@@ -37,7 +37,7 @@ from identification.estimation.recorded_logs import (
     recorded_logs,
 )
 from identification.estimation.regression.equation_rows import FIVE, MotionLog
-from identification.estimation.settling import settled
+from identification.estimation.settling import is_adequate, settled
 from identification.estimation.structure_fit import (
     FittedStructure,
     plain_structure,
@@ -51,9 +51,11 @@ from identification.estimation.windowed_run.refinement import RESCUES, Refit, re
 from identification.log import Log, Rig
 from identification.model.estimates import Drive, KarnoppFit
 from identification.model.plant import Actuator, Plant
+from identification.model.surroundings import Surroundings
 from identification.progress import Halt, Halted, KeepGoing, Progress, quiet, without_end
 from identification.signals.bad_samples import BadSamples
 from identification.signals.check import check_driven
+from identification.signals.one_way import ONE_WAY_WHY
 from identification.thresholds import (
     ACTUATOR_MISFIT,
     ACTUATOR_SHARE,
@@ -70,7 +72,6 @@ from identification.thresholds import (
 IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
-ONE_WAY_WHY = "motion one way, in which no free run tells friction from a constant force"
 FLOOR_WHY = (
     "the free run is not followed, and bends mass and friction; stick limits and band are not told"
 )
@@ -107,9 +108,21 @@ def fit_plant(
     for log in logs:
         check_driven(log)
     beside = what_acts_beside(logs, rig, halt)
+    return fit_beside(logs, beside, rng, rig, drive, on_progress, halt)
+
+
+def fit_beside(
+    logs: Sequence[Log], beside: Surroundings, rng: np.random.Generator, rig: Rig,
+    drive: Drive | None, on_progress: Progress | None, halt: Halt, *, quick: bool = False,
+) -> KarnoppFit:  # fmt: skip
+    """As `fit_plant`, of logs of which it is known what acts beside the applied force.
+
+    quick: as a first look has it, without a search or whole runs, and without a second mass where
+    inertia does not show.
+    """
     alone = [beside.taken_out(log) for log in logs]
     try:
-        fit = _fit(alone, rng, rig, drive, None, on_progress, halt)
+        fit = _fit(alone, rng, rig, drive, None, on_progress, halt, quick=quick)
     except NotIdentifiable as refused:
         try:
             fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
@@ -120,7 +133,8 @@ def fit_plant(
             fit = fit_one_way(recorded_logs(alone, rig, drive), rng, ONE_WAY_WHY)
     up = way_of(alone, held=rig.kind == "motor")
     fit = fit if up is None else of_one_way(fit, up, rig)
-    if not (fit.adequate or beside.orders or halt.reached()):
+    shows = not quick or fit.estimates["m"].value is not None
+    if shows and not (fit.adequate or beside.orders or halt.reached()):
         resonance = two_masses(alone, rig) if chosen_drive(alone, rig, drive) == "force" else None
         if resonance is not None:
             beside, fit = replace(beside, resonance=resonance), of_two_masses(fit, resonance)
@@ -138,7 +152,7 @@ def fit_plant(
 
 def _fit(
     logs: Sequence[Log], rng: np.random.Generator, rig: Rig, drive: Drive | None,
-    prior: Plant | None, on_progress: Progress | None, halt: Halt,
+    prior: Plant | None, on_progress: Progress | None, halt: Halt, *, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
     """As `fit_plant`, of logs beside whose applied force nothing acts but what the prior has."""
     report = on_progress or quiet
@@ -162,7 +176,8 @@ def _fit(
     recorded, found, set_aside = _without_bad(recorded, begin, set_aside)
     if near is not None and near.misfit < found.misfit:
         found = replace(found, plant=near.plant, sd=near.sd, misfit=near.misfit, imposed=False)
-    fit = _with_actuator(finished(found, recorded, settle, report, by=drive), recorded)
+    fit = finished(found, recorded, settle, report, by=drive, quick=quick)
+    fit = _with_actuator(fit, recorded)
     return set_aside.told(fit, given)
 
 
@@ -245,9 +260,10 @@ def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
 
 def finished(
     found: FittedStructure, recorded: RecordedLogs, rng: np.random.Generator, report: Progress,
-    *, by: Drive | None = None,
+    *, by: Drive | None = None, quick: bool = False,
 ) -> KarnoppFit:  # fmt: skip
-    """The fit that a plain structure leads to: searched where more than noise is left, settled.
+    """The fit that a plain structure leads to: searched where more than noise is left, settled;
+    quick: neither searched nor settled over whole runs.
 
     by: the drive that was asked for; without one, a run by command that a nonlinear actuator
     spoils is driven by the measured force instead.
@@ -255,19 +271,26 @@ def finished(
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
-    if (found.imposed or found.misfit > COMPLETE) and not search_is_hopeless(found, recorded):
+    if not (quick or search_is_vain(found, recorded)):
         found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
         if said:
             forced = recorded_logs(recorded.plain, recorded.rig, "force", recorded.halt)
-            again = finished(plain_structure(forced, other), forced, settle, report, by="force")
+            start = plain_structure(forced, other)
+            again = finished(start, forced, settle, report, by="force", quick=quick)
             return replace(again, remarks=(said, *again.remarks))
     if recorded.drive == "force" and (found.imposed or is_no_run(found.misfit)):
         why = LOST_WHY if found.imposed else "no free run follows these logs"
         return fit_imposed(recorded, settle, why)
+    if quick and not is_adequate(found.misfit):
+        left = left_by(found.plant.friction, recorded)
+        if left is not None and contradicts_the_equation(left[0], left[1]):
+            fit = _by_equation(recorded, other, FLOOR_WHY)
+            if fit is not None:
+                return _unless_unexplained(fit, left)
     try:
-        fit = settled(found.plant, recorded, found.misfit, settle, report)
+        fit = settled(found.plant, recorded, found.misfit, settle, report, quick=quick)
     except Halted:
         with recorded.halt.closing():
             fit = settled(found.plant, recorded, found.misfit, settle, report, quick=True)
@@ -298,8 +321,20 @@ def on_the_floor(fit: KarnoppFit, recorded: RecordedLogs, rng: np.random.Generat
     elif not fit.adequate:  # of a run that is not followed, windows may tell next to nothing
         other = _by_equation(recorded, rng, FLOOR_WHY)
         fit = other if other is not None and _told(other) > _told(fit) else fit
+    return _unless_unexplained(fit, left)
+
+
+def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> KarnoppFit:
+    """The fit, with nothing told where it and the equation leave most of the force; left: as
+    `left_by` has it."""
     share = min(left[0], left[1]) / left[2]
     return untold(fit, share) if is_unexplained(share) else fit
+
+
+def search_is_vain(found: FittedStructure, recorded: RecordedLogs) -> bool:
+    """Whether no search for the plain plant is made: it is followed, or that is hopeless."""
+    open_to_more = found.imposed or found.misfit > COMPLETE
+    return not open_to_more or search_is_hopeless(found, recorded)
 
 
 def _told(fit: KarnoppFit) -> int:
@@ -320,7 +355,7 @@ def by_equation_if_surer(
 def _by_equation(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit | None:
     """The fit by the equation of motion, of both ways or of the one that there is, if it can be."""
     with suppress(NotIdentifiable):
-        return fit_imposed(recorded, rng, why, by_rig=False)
+        return fit_imposed(recorded, rng, why)
     with suppress(NotIdentifiable):
         return fit_one_way(recorded, rng, why)
     return None

@@ -18,41 +18,56 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
     OF_FORCE,
-    MotionLog,
-    mechanical,
     motion_log,
 )
-from identification.estimation.regression.inertia import speed_ratios
+from identification.estimation.regression.motion_rows import (
+    OF_EQUATION,
+    motion_rows,
+    rows_and_windows,
+)
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
-from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, Karnopp
+from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
-from identification.thresholds import MOST_UNEXPLAINED, OTHER_WAY, SPEEDS_APART
+from identification.signals.one_way import is_one_way
+from identification.thresholds import HARDLY_MORE, MOST_UNEXPLAINED
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
+SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
-CONDITION = 30.0  # of the scaled columns, beyond which viscous friction is one with Coulomb
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
-COLUMN_SETS = {"all": (0, 1, 2, 3, 4), "no mass": (1, 2, 3, 4), "constant": (1, 2)}
+SPEED_COLUMNS = (
+    (),
+    (3,),
+    (4,),
+    (3, 4),
+)  # columns of viscous friction that may stand beside the others
+COLUMN_SETS = tuple(
+    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in SPEED_COLUMNS), key=len)
+)
 WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
-    "F_v": "the speeds of each direction are too alike to tell viscous from Coulomb friction;"
-    " add runs at other speeds",
+    "F_v": "constant friction predicts as much of these logs; add runs at other speeds to tell"
+    " viscous friction",
     "stick": "no free run was fitted (see the notes), and the force equation does not hold it;"
     " log the body driven by a force, from rest",
 }
+FALLS_WHY = (
+    "found {:.3g} {}: friction falls with speed, which viscous friction does not; 'workbench trace'"
+    " looks for why"
+)
 
 
 @dataclass(frozen=True)
 class ForceFit:
     """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia in the
-    force, condition of the scaled columns."""
+    force."""
 
     used: tuple[int, ...]
     theta: Array
@@ -61,24 +76,17 @@ class ForceFit:
     rms: float
     relative: float
     share: float
-    condition: float
 
 
 def fit_imposed(
-    recorded: RecordedLogs,
-    rng: np.random.Generator,
-    why: str,
-    remarks: Sequence[str] = (),
-    *,
-    by_rig: bool = True,
+    recorded: RecordedLogs, rng: np.random.Generator, why: str, remarks: Sequence[str] = ()
 ) -> KarnoppFit:
     """Sliding friction from the force equation, the rest named as not identifiable.
 
-    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`. by_rig:
-    a rig leads the body, so that its motion may be smoothed until its direction is sure.
+    why: what kept a free run from being fitted; it stands in the remarks, after `remarks`.
     Raises NotIdentifiable where no log slides enough in both directions.
     """
-    fit, rows = force_fit(recorded, by_rig=by_rig)
+    fit, rows = force_fit(recorded)
     return _made(fit, rows, recorded, rng, why, remarks)
 
 
@@ -97,7 +105,7 @@ def _made(
     samples = np.tile(center, (NORMAL_SETS, 1))
     drawn = rng.multivariate_normal(fit.theta, fit.covariance, NORMAL_SETS, check_valid="ignore")
     samples[:, list(fit.used)] = drawn
-    nine = _assumed(center, firsts)
+    nine = _assumed(center, firsts, _slightest_mass(rows))
     friction = Karnopp.from_array(nine)
     found = _estimates(fit, nine, samples, rows, recorded)
     names = tuple(FIVE[i] for i in fit.used)
@@ -161,17 +169,30 @@ def _motor(recorded: RecordedLogs) -> Motor | None:
     return Motor(gives) if recorded.held and gives is not None else None
 
 
-def force_fit(recorded: RecordedLogs, *, by_rig: bool = True) -> tuple[ForceFit, list[Rows]]:
-    """Sliding friction by the force equation, and the rows that it was fitted on; by_rig: as above.
+def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
+    """Sliding friction by the force equation, and the rows that it was fitted on.
 
     Raises NotIdentifiable where no log slides enough in both directions.
     """
-    moved = [
-        motion_log(one, held=recorded.held, by_command=False, imposed=by_rig)
-        for one in recorded.plain
-    ]
-    rows = _rows(moved, recorded.name)
-    return _best(rows, alike=max(speed_ratios(moved)) < SPEEDS_APART), rows
+    rows = _rows(recorded)
+    up, down = (sum(int(np.count_nonzero(way(part))) for part in rows) for way in (_ups, _downs))
+    if min(up, down) < FEWEST_OF_DIRECTION:
+        raise NotIdentifiable(
+            f"{recorded.name}: {up} windows of sliding in positive and {down} in negative"
+            f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
+            " directions"
+        )
+    return _best(rows), rows
+
+
+def _ups(rows: Rows) -> BoolArray:
+    """Rows in which the body mostly moves up."""
+    return np.asarray(rows.X[:, 1] > 0.5)
+
+
+def _downs(rows: Rows) -> BoolArray:
+    """Rows in which it mostly moves down."""
+    return np.asarray(rows.X[:, 2] < -0.5)
 
 
 def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
@@ -179,29 +200,24 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
 
     Raises NotIdentifiable where they go both ways, or hardly slide.
     """
-    moved = _moved(recorded.plain, recorded.held)
-    way = _way(moved)
+    rows = _rows(recorded)
+    ups = np.concatenate([_ups(part) for part in rows])
+    way = _way(ups)
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
-    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
-    data = [_kept(mechanical(one, theta), one.up == way) for one in moved]
+    data = [_kept(part, _ups(part) == way) for part in rows]
     return _made(_solved(data, ONE_WAY[way]), data, recorded, rng, why, ())
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    return _way(_moved(logs, held))
+    moved = [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
+    return _way(np.concatenate([one.up for one in moved]))
 
 
-def _way(moved: Sequence[MotionLog]) -> bool | None:
-    up = np.concatenate([one.up for one in moved])
+def _way(up: BoolArray) -> bool | None:
     share = float(np.mean(up)) if len(up) else 0.5
     return share > 0.5 if len(up) >= FEWEST_JUDGED and is_one_way(share) else None
-
-
-def is_one_way(share_up: float) -> bool:
-    """Whether motion of which so much goes up goes one way alone, up or down."""
-    return not OTHER_WAY < share_up < 1.0 - OTHER_WAY
 
 
 def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
@@ -221,10 +237,6 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
     return replace(fit, estimates={**fit.estimates, name: both})
 
 
-def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
-    return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
-
-
 def _kept(rows: Rows, kept: BoolArray) -> Rows:
     return replace(
         rows, b=rows.b[kept], X=rows.X[kept], sd=rows.sd[kept], block=rows.block[kept],
@@ -232,38 +244,39 @@ def _kept(rows: Rows, kept: BoolArray) -> Rows:
     )  # fmt: skip
 
 
-def _rows(logs: Sequence[MotionLog], name: str) -> list[Rows]:
-    """The equation of motion in weak form, in windows of sliding, of each log.
-
-    Raises NotIdentifiable where they do not slide enough in both directions.
-    """
-    up = sum(int(np.count_nonzero(one.up)) for one in logs)
-    down = sum(len(one.up) for one in logs) - up
-    if min(up, down) < FEWEST_OF_DIRECTION:
-        raise NotIdentifiable(
-            f"{name}: {up} windows of sliding in positive and {down} in negative direction, at"
-            f" least {FEWEST_OF_DIRECTION} of each needed; log strokes in both directions"
-        )
+def _rows(recorded: RecordedLogs) -> list[Rows]:
+    """The equation of motion of each log."""
+    moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
     theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
     for _ in range(ROUNDS):
-        theta = solve_rows(stacked([mechanical(one, theta) for one in logs])).theta
-    return [mechanical(one, theta) for one in logs]
+        theta = solve_rows(stacked(motion_rows(moved, theta))).theta
+    return motion_rows(moved, theta)
 
 
-def _best(data: Sequence[Rows], alike: bool) -> ForceFit:
-    """The largest set of columns that the motion tells apart; alike: whether its speeds are."""
-    made = _solved(data, COLUMN_SETS["all"])
-    inertia = made.share
-    for name in ("all", "no mass", "constant"):
-        if name != "all":
-            made = _solved(data, COLUMN_SETS[name])
-        if name == "all" and (made.theta[0] <= 0 or inertia < INERTIA_SHARE):
-            continue
-        if alike and name == "no mass":
-            continue
-        if made.condition < CONDITION:
-            break
-    return replace(made, share=inertia)
+def _best(data: Sequence[Rows]) -> ForceFit:
+    """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
+    than those that leave least; a mass that comes out below 0 is none."""
+    every = _solved(data, COLUMN_SETS[-1])
+    sets = [used for used in COLUMN_SETS if 0 not in used or every.theta[0] > 0.0]
+    left = [_unseen(data, used) for used in sets]
+    used = next(x for x, one in zip(sets, left, strict=True) if predicts_as_much(one, min(left)))
+    return replace(_solved(data, used), share=every.share)
+
+
+def predicts_as_much(left: float, least: float) -> bool:
+    """Whether fewer columns, which leave this of a force that they have not seen, will do."""
+    return left <= HARDLY_MORE * least
+
+
+def _unseen(data: Sequence[Rows], used: tuple[int, ...]) -> float:
+    """Force that least squares of these columns leave on blocks that they have not seen."""
+    every = stacked(data)
+    some = replace(every, X=every.X[:, used])
+    left = np.zeros(len(some.b))
+    for block in np.unique(some.block):
+        out = some.block == block
+        left[out] = (some.b - some.X @ solve_rows(some, ~out).theta)[out]
+    return float(np.sqrt(np.mean(left**2)))
 
 
 def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
@@ -285,19 +298,26 @@ def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
     return ForceFit(
         used=used,
         theta=theta,
-        covariance=inverse * variance,
+        covariance=inverse * variance + np.diag((OF_EQUATION * theta) ** 2),
         residuals=parts,
         rms=float(np.sqrt(np.mean(residual**2))),
         relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),
         share=float(inertia),
-        condition=float(np.linalg.cond(chosen / size)),
     )
 
 
-def _assumed(center: Array, firsts: Sequence[FirstEstimate]) -> Array:
-    """All nine for simulation: the five of sliding kept to their signs, stick just above slip."""
+def _slightest_mass(data: Sequence[Rows]) -> float:
+    """A mass [kg] whose inertia is next to nothing of the force."""
+    rows = stacked(data)
+    force, a = (float(np.sqrt(np.mean(x**2))) for x in (rows.b, rows.X[:, 0]))
+    return SLIGHT_INERTIA * force / a if force > 0.0 and a > 0.0 else 1.0
+
+
+def _assumed(center: Array, firsts: Sequence[FirstEstimate], slight: float) -> Array:
+    """All nine for simulation: the five of sliding kept to their signs, stick just above slip;
+    slight: a mass [kg] that the equation does without."""
     nine = np.median([np.abs(first.nine) for first in firsts], axis=0)
-    m = center[0] if center[0] > 0 else nine[0]
+    m = center[0] if center[0] > 0 else slight
     least = 1e-3 * max(float(np.max(np.abs(center[1:3]))), 1e-9)
     coulomb = np.maximum(center[1:3], least)
     viscous = np.maximum(center[3:5], 0.0)
@@ -314,8 +334,10 @@ def _estimates(
     up = int(sum(np.count_nonzero(part.X[:, 1] > 0.5) for part in data))
     down = int(sum(np.count_nonzero(part.X[:, 2] < -0.5) for part in data))
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
-    used = [FIVE[i] for i in fit.used]
-    told = _of_sliding(used, fit.theta, samples[:, list(fit.used)], (up, down), fastest, recorded)
+    shown = [i for i in fit.used if i != 0 or fit.share >= INERTIA_SHARE]
+    values = np.array([fit.theta[fit.used.index(i)] for i in shown])
+    names = [FIVE[i] for i in shown]
+    told = _of_sliding(names, values, samples[:, shown], (up, down), fastest, recorded)
     return _reasoned(told, nine, fit.share, recorded)
 
 
@@ -329,8 +351,9 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
     """
     logs = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
     theta = np.array([p.m, p.F_cp, p.F_cn, p.F_vp, p.F_vn])
-    rows = stacked([mechanical(one, theta) for one in logs])
-    fast = rows.speed > np.where(rows.X[:, 1] > 0.5, p.dv_p, -p.dv_n)
+    made = rows_and_windows(logs, theta)
+    rows = stacked([one.rows for one in made])
+    fast = np.concatenate([one.outside(p) for one in made])
     if np.count_nonzero(fast) < FEWEST_JUDGED:
         return None
     own = (rows.b - rows.X @ theta)[fast]
@@ -374,6 +397,11 @@ def _of_sliding(
     return estimates(names, values, samples, events, recorded.rig, recorded.name)
 
 
+def _falls(name: str, one: Estimate) -> bool:
+    """Whether friction falls with speed, which predicts a motion but cannot be simulated."""
+    return name in VISCOUS_NAMES and one.assumed is not None and one.assumed < 0.0
+
+
 def _reasoned(
     told: Mapping[str, Estimate], nine: Array, share: float | None, recorded: RecordedLogs
 ) -> dict[str, Estimate]:
@@ -385,7 +413,11 @@ def _reasoned(
     for key, value in zip(NAMES, nine, strict=True):
         if key in told:
             one = told[key]  # not told: what is assumed has the sign that a friction has
-            out[key] = one if one.value is not None else replace(one, assumed=float(value))
+            if _falls(key, one):
+                one = replace(one, reason=FALLS_WHY.format(one.assumed, units[key]))
+            elif one.value is None:
+                one = replace(one, assumed=float(value))
+            out[key] = one
             continue
         kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")
         reason = f"{recorded.name}: " + WHY_NOT[kind].format(share=explained)

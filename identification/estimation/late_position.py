@@ -34,9 +34,15 @@ LAG_SD = 0.25  # samples, within which the best of halves is known
 SEED = 0  # the lags are compared on the same draws
 
 
-def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) -> Surroundings:
+def what_acts_beside(
+    logs: Sequence[Log], rig: Rig, halt: Halt | None = None, *,
+    each: Callable[[], Halt] = Halt,
+) -> Surroundings:  # fmt: skip
     """What acts beside the applied force, as `surroundings` has it, with a lag that lets a run
-    follow the logs."""
+    follow the logs.
+
+    halt: whether further lags are tried; each: how long one is, where that has an end of its own.
+    """
     found, motor = surroundings(logs, rig), rig.kind == "motor"
     if motor and not rig.force_per_command:
         return found
@@ -48,7 +54,8 @@ def what_acts_beside(logs: Sequence[Log], rig: Rig, halt: Halt | None = None) ->
         """Misfit of the plain plant on the logs with that lag taken out."""
         if samples not in tried:
             late = replace(found, lag=Size(samples * h))
-            tried[samples] = _misfit([late.taken_out(log) for log in logs], rig, halt)
+            shifted = [late.taken_out(log) for log in logs]
+            tried[samples] = _misfit(shifted, rig, halt if each is Halt else each())
         return tried[samples]
 
     def follows(samples: float) -> bool:

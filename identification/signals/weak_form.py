@@ -42,9 +42,13 @@ class WeakWindows:
 
     def every(self, k: int) -> "WeakWindows":
         """Each k-th window."""
+        return self.at(np.arange(0, len(self.start), k))
+
+    def at(self, index: IntArray) -> "WeakWindows":
+        """The windows of these numbers (k,)."""
         return WeakWindows(
-            self.mean[::k], self.first[::k], self.second[::k], self.held[::k], self.kinked[::k],
-            self.start[::k], self.length,
+            self.mean[index], self.first[index], self.second[index], self.held[index],
+            self.kinked[index], self.start[index], self.length,
         )  # fmt: skip
 
 

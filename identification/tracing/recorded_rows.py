@@ -17,7 +17,7 @@ from identification.estimation.recorded_logs import (
     with_clocks,
 )
 from identification.estimation.regression.equation_rows import ACTUATOR, MotionLog, motion_log
-from identification.estimation.regression.inertia import speed_ratios
+from identification.estimation.regression.inertia import speed_ratio
 from identification.estimation.regression.row_fit import first_stage
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
@@ -130,7 +130,10 @@ def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library,
 
     There they would stand in for whatever makes one stroke differ from another.
     """
-    ratio = max(speed_ratios(logs))
+    ratio = max(
+        speed_ratio(np.concatenate([one.speed[one.up == way] for one in logs]))
+        for way in (True, False)
+    )
     of_speed = [
         k for k, e in library.items() if "v" in e.depends_on and set(e.depends_on) <= OF_SPEED
     ]

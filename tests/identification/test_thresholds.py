@@ -35,7 +35,7 @@ from identification.estimation.fit import (
     leaves_much,
 )
 from identification.estimation.gauss_newton import Minimum
-from identification.estimation.imposed_motion import is_one_way, is_unexplained
+from identification.estimation.imposed_motion import is_unexplained, predicts_as_much
 from identification.estimation.recorded_logs import chosen_drive, recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
@@ -73,6 +73,7 @@ from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
 from identification.signals.force_walk import shows
 from identification.signals.frozen import frozen
+from identification.signals.one_way import is_one_way
 from identification.signals.steps import (
     jump_size,
     outstanding,
@@ -807,6 +808,12 @@ def test_most_unexplained() -> None:
     """A model that leaves more of the force than this has no number to tell."""
     assert not is_unexplained(0.4)
     assert is_unexplained(0.625)
+
+
+def test_hardly_more() -> None:
+    """Terms of friction that predict no better than this are left out."""
+    assert predicts_as_much(1.015, 1.0)
+    assert not predicts_as_much(1.03, 1.0)
 
 
 def test_worse_prediction() -> None:

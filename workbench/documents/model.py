@@ -10,7 +10,7 @@ from identification.effects._library import Library, built_in
 from identification.errors import BadModel
 from identification.log import Rig
 from identification.model.estimates import Drive, Estimate
-from identification.model.karnopp import NAMES, Karnopp
+from identification.model.karnopp import NAMES, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.effect_values import known_effect
@@ -144,6 +144,7 @@ class Told:
     """Whether the logs can tell a parameter, why (not), and what run to add where they cannot.
 
     within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
+    only_if: what has to hold for it to be told where that is not known before the fit; "": it is.
     """
 
     name: str
@@ -151,6 +152,7 @@ class Told:
     why: str
     add: str = ""
     within: float | None = None
+    only_if: str = ""
 
 
 @dataclass(frozen=True)
@@ -218,8 +220,18 @@ class Model(ModelFile):
 
     @property
     def karnopp(self) -> Karnopp:
-        """The nine that simulations use; assumed ones where the log does not tell them."""
-        return Karnopp(**{name: used(self.friction[name]) for name in NAMES})
+        """The nine that simulations use; assumed ones where the log does not tell them.
+
+        Friction that falls with speed is constant there: it would drive the body.
+        """
+        values = {name: used(self.friction[name]) for name in NAMES}
+        return Karnopp(**{k: max(x, 0.0) if k in VISCOUS_NAMES else x for k, x in values.items()})
+
+    @property
+    def falling(self) -> tuple[float, float]:
+        """Slopes at most 0 [N s/m] with which friction up and down falls with speed."""
+        up, down = (min(used(self.friction[name]), 0.0) for name in VISCOUS_NAMES)
+        return up, down
 
     @property
     def simulated(self) -> Plant:

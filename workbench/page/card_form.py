@@ -65,21 +65,34 @@ class CardForm:
         texts = {
             name: " ".join(str(given.get(name, "")).split())[:LONGEST_FIELD] for name in _names()
         }
-        wanted = str(given.get(OTHER_FIELD, ""))
+        wanted, back = str(given.get(OTHER_FIELD, "")), dict[str, tuple[str, Mapping[str, str]]]()
         if wanted in self.others:
-            texts |= self.others[wanted][1]
+            new = self.others[wanted][1]
+            back[wanted] = (self._shown(wanted), {name: texts[name] for name in new})
+            texts |= new
         changed = {name for name in texts if texts[name] != self[name]}
         changed |= {f"column_{name.partition('_')[2]}" for name in changed if "_" in name}
         changed |= {"kind", "motion"} if {"kind", "motion"} & changed else set()
         why = {name: said for name, said in self.why.items() if name not in changed}
         others = {name: one for name, one in self.others.items() if name not in changed}
-        return CardForm(texts, self.columns, why, self.remarks, self.layout, others)
+        return CardForm(texts, self.columns, why, self.remarks, self.layout, {**others, **back})
+
+    def _shown(self, name: str) -> str:
+        """What a field holds, as the other of a guess is told."""
+        part, _, signal = name.partition("_")
+        if part != "column" or signal not in FORM_SIGNALS:
+            return self[name] or "none"
+        words = dict(self.columns).get(self[name], "no column")
+        return f"{words} {self[f'unit_{signal}']}".strip()
 
     def text(self, file: str) -> str:
         """The card; raises BadCard where a field can be none."""
         signals = [line for name in FORM_SIGNALS if (line := self._signal(name)) is not None]
-        rig = [Line("kind", self["kind"]), Line("motion", self["motion"] or "linear")]
-        rig += [Line(key, self._number(key)) for key in RIG_NUMBERS if self[key]]
+        rig = [
+            Line("kind", self["kind"], self._remark("kind")),
+            Line("motion", self["motion"] or "linear", self._remark("motion")),
+        ]
+        rig += [Line(k, self._number(k), self._remark(k)) for k in RIG_NUMBERS if self[k]]
         tables: dict[str, list[Line]] = {
             "card": [Line("name", self["name"])], "rig": rig, "signals": signals,
         }  # fmt: skip
@@ -102,8 +115,15 @@ class CardForm:
                 value["gain"] = gain
         if self[f"bits_{name}"].isdigit():
             value |= {"bits": int(self[f"bits_{name}"]), "signed": True}
-        sure, why = self.why.get(f"column_{name}", (True, ""))
-        return Line(name, value, f"{'sure' if sure else 'guess'}: {why}" if why else "")
+        return Line(name, value, self._remark(f"column_{name}"))
+
+    def _remark(self, name: str) -> str:
+        """How sure a field is and why, and what it would be otherwise; of a corrected one this
+        alone."""
+        sure, why = self.why.get(name, (True, ""))
+        said = [f"{'sure' if sure else 'guess'}: {why}"] if why else []
+        said += [f"else {self.others[name][0]}"] if name in self.others else []
+        return "; ".join(said)
 
     def _number(self, key: str) -> float | str:
         text = self[key]

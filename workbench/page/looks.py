@@ -15,6 +15,7 @@ from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
     from identification.arrays import Array
+    from workbench.documents.model import Told
     from workbench.logs.unknown import UnknownLog
     from workbench.steps.first_card.proposal import Proposal
 
@@ -129,9 +130,15 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
     except UserError as error:
         raise BadLook(without_path(str(error), [path, card])) from None
     lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
-    told = tuple((one.name, one.can, one.why if one.can else one.add or one.why)
-                 for one in found.told)  # fmt: skip
+    told = tuple((one.name, one.can, _said_of(one)) for one in found.told)
     return DoctorFound(found.verdict, tuple(lines), told)
+
+
+def _said_of(one: "Told") -> str:
+    """Why a parameter is told, on what that hangs, or what run would tell it."""
+    if one.only_if:
+        return f"only if {one.only_if}"
+    return one.why if one.can else one.add or one.why
 
 
 def _unknown(path: Path) -> "UnknownLog":

@@ -64,6 +64,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     if found.told:
         can = ", ".join(_within(one) for one in found.told if one.can)
         lines += _labelled("told", [can or "nothing"])
+    lines += _labelled("only if", _open(found.told))
     lines += _labelled("not told", _not_told(found.told), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
@@ -178,11 +179,20 @@ def _of_speed(found: Examined) -> tuple[float, str]:
 
 def _not_told(told: Iterable[Told]) -> list[str]:
     """The reasons, each with the parameters that it holds for."""
-    why: dict[str, list[str]] = {}
-    for one in told:
-        if not one.can:
-            why.setdefault(one.why, []).append(one.name)
-    return [f"{', '.join(names)}: {reason}" for reason, names in why.items()]
+    return _together((one.why, one.name) for one in told if not (one.can or one.only_if))
+
+
+def _open(told: Iterable[Told]) -> list[str]:
+    """On what it hangs whether others are told, each with the parameters that it holds for."""
+    return _together((one.only_if, one.name) for one in told if one.only_if)
+
+
+def _together(said: Iterable[tuple[str, str]]) -> list[str]:
+    """A line for each text of (text, name), with all its names."""
+    names: dict[str, list[str]] = {}
+    for text, name in said:
+        names.setdefault(text, []).append(name)
+    return [f"{', '.join(own)}: {text}" for text, own in names.items()]
 
 
 def doctor_picture(found: Examined, path: Path) -> None:

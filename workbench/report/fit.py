@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from identification.arrays import Array
-from identification.model.inverse_model import Smoothing, force_predicted
+from identification.model.inverse_model import Smoothing
 from identification.simulation.free_run import FreeRun
 from workbench.cards.readable import units_of
 from workbench.documents.model import Model
@@ -12,6 +12,7 @@ from workbench.report.chart import Chart, Line, Panel, Part, chart_html
 from workbench.report.in_a_row import in_a_row, liveliest
 from workbench.report.model_tables import held
 from workbench.report.page import Section
+from workbench.steps.predicted_force import force_by_model
 
 
 def fit(model: Model, sources: Sequence[Source], runs: Sequence[FreeRun | None]) -> Section:
@@ -46,7 +47,7 @@ def _force(model: Model, source: Source, run: FreeRun | None) -> Array:
     """Force by the model: simulated where an actuator gives it, else what the motion needs."""
     if model.fit.drive == "force" or model.rig.kind == "motor" or run is None:
         how = Smoothing(held=model.rig.kind == "motor")
-        return force_predicted(source.log, model.karnopp, how)
+        return force_by_model(model, source.log, how)
     return run.F
 
 

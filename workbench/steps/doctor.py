@@ -5,7 +5,7 @@ whether a parameter can be told is asked of the same thresholds, with the events
 motion shows in place of those of a fitted run.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from identification.errors import BadLog, UserError
-from identification.estimation.late_position import what_acts_beside
+from identification.errors import BadLog
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
 from identification.signals.bad_samples import BadSamples
@@ -194,7 +193,7 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
         else RunsTell(reason=found.refused)
     )
     remarks = list(found.remarks)
-    late = _late_command(runs, found.rig) if runs and not found.refused and seen.motion else None
+    late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else 0.0
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
         remarks += hardly_tells(runs, found.rig)
@@ -254,21 +253,10 @@ def _sensor(name: str, x: Array) -> SensorState:
                        resolution(good))  # fmt: skip
 
 
-def _late_command(runs: Sequence[Log], rig: Rig) -> float | None:
-    """By how much a motor's command acts late [s], as `identify` will find it; None where that
-    does not show."""
-    if rig.kind != "motor" or not rig.force_per_command:
-        return None
-    try:
-        return max(what_acts_beside(runs, rig).lag.value, 0.0) or None
-    except UserError:
-        return None
-
-
-def _delays(log: Log, motion: Motion, late_command: float | None) -> tuple[Delay, ...]:
+def _delays(log: Log, motion: Motion, late_command: float) -> tuple[Delay, ...]:
     """How late the command acts, and how far the position is behind its reference.
 
-    late_command [s]: of a motor, where the equation of motion or its run shows it.
+    late_command [s]: of a motor, where the equation of motion or its run shows it; else 0.
     """
     out = []
     longest = max(2, round(LONGEST_LAG / log.h))
@@ -311,7 +299,8 @@ def doctor_document(found: Examined, card: str) -> dict[str, Any]:
         "delays": [asdict(one) for one in found.delays],
         "motion": None if found.ways is None else asdict(found.ways),
         "told": {one.name: {"can": one.can, "why": one.why, "add": one.add or None,
-                            "within": one.within} for one in found.told},
+                            "within": one.within, "only_if": one.only_if or None}
+                 for one in found.told},
         "effects": found.effects,
         "add": found.add,
         "remarks": found.remarks,

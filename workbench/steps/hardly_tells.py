@@ -11,11 +11,10 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import BadLog
-from identification.estimation.fit import ONE_WAY_WHY
-from identification.estimation.imposed_motion import is_one_way
 from identification.log import Log, Rig
 from identification.signals.check import work_share
 from identification.signals.differentiate import Motion, differentiate, low_pass
+from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
 
 TELLING_RATE = 50.0  # Hz, below which starts and stops lie between two samples

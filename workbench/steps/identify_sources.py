@@ -56,7 +56,6 @@ def identify_sources(
     """
     options = options or Options()
     logs = [source.log for source in sources.runs]
-    gate = runs_tell(logs, sources.rig, options.drive)
     try:
         model, fit = identify(
             sources.runs,
@@ -70,6 +69,7 @@ def identify_sources(
     except NotIdentifiable as error:
         said = looks_like_velocity(logs, sources.rig)
         raise NotIdentifiable("; ".join([str(error), *said])) from error
+    gate = runs_tell(logs, sources.rig, options.drive, fit=fit)
     now = present_of_card(sources.card, sources.rig, model.period)
     bad = (*sources.bad, *fit.bad)
     model = replace(model, bad_samples=bad, controller=now, identifiability=gate.told)

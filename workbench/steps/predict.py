@@ -22,7 +22,13 @@ from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
 from workbench.documents.model import Model, used
 from workbench.logs.sources import Sources
-from workbench.steps.predicted_force import force_needed, of_body, refuse_missing, with_motor_force
+from workbench.steps.predicted_force import (
+    force_by_model,
+    of_body,
+    refuse_missing,
+    seen_moving,
+    with_motor_force,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -106,7 +112,7 @@ def predict(
     return Prediction(
         t=log["t"],
         force_applied=applied,
-        force_predicted=force_needed(body, plant, how),
+        force_predicted=force_by_model(model, body, how),
         force_simulated=blank if simulated is None else simulated.F,
         position_measured=log["y"],
         position_simulated=blank if run is None else run.shown,
@@ -213,7 +219,8 @@ def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
 
 def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:
     """Samples whose velocity, as the inverse model takes it, lies outside the stick band."""
-    v, p = differentiate(log["y"], log.h, how.cutoff, how.method).v, model.karnopp
+    v = differentiate(log["y"], log.h, how.cutoff, how.method).v
+    p = seen_moving(model, log).friction
     return np.asarray((v > p.dv_p) | (v < p.dv_n))
 
 

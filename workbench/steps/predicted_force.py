@@ -1,6 +1,7 @@
 """Force that a plant with effects needs for a measured motion: the inverse model with effects."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -9,23 +10,44 @@ from identification.effects._base import Acting
 from identification.effects._places import Place
 from identification.errors import BadLog
 from identification.log import Log
-from identification.model.inverse_model import Smoothing, force_predicted
+from identification.model.inverse_model import SURE_SLIDING, Smoothing, force_predicted
 from identification.model.plant import Motor, Plant
 from identification.signals.differentiate import Motion, differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
+from workbench.documents.model import Model
 
 REVERSALS = 2  # substitutions by which a transducer's reading is inverted
 
 
-def force_needed(log: Log, plant: Plant, how: Smoothing) -> Array:
+def seen_moving(model: Model, log: Log) -> Plant:
+    """The plant for a motion that was measured: a stick band that no log told is no wider than the
+    speed from which the body surely moves, since a body seen to slide is not stuck."""
+    plant = model.simulated
+    if not {"dv_p", "dv_n"} & set(model.assumed):
+        return plant
+    sure, p = SURE_SLIDING * differentiate(log["y"], log.h).v_noise, plant.friction
+    dv_p = min(p.dv_p, sure) if "dv_p" in model.assumed else p.dv_p
+    dv_n = max(p.dv_n, -sure) if "dv_n" in model.assumed else p.dv_n
+    return replace(plant, friction=replace(p, dv_p=dv_p, dv_n=dv_n))
+
+
+def force_by_model(model: Model, log: Log, how: Smoothing) -> Array:
+    """Force that the model needs for a motion that was measured [N], (n,)."""
+    return force_needed(log, seen_moving(model, log), how, model.falling)
+
+
+def force_needed(
+    log: Log, plant: Plant, how: Smoothing, falling: tuple[float, float] = (0.0, 0.0)
+) -> Array:
     """Force that the motion needs [N], (n,): as `inverse_model.force_predicted`, with effects.
 
     Friction of the effects is signed by the direction and their forces are taken off; inside the
-    stick band it is the applied force within the limits, which is no prediction.
+    stick band it is the applied force within the limits, which is no prediction. falling: slopes
+    [N s/m] with which friction falls with speed, down to 0.
     """
-    if not plant.effects:
+    if not (plant.effects or any(falling)):
         return force_predicted(log, plant.friction, how)
     p = plant.friction
     motion = differentiate(log["y"], log.h, how.cutoff, how.method)
@@ -37,7 +59,8 @@ def force_needed(log: Log, plant: Plant, how: Smoothing) -> Array:
     slip = _sum(plant, lambda place: place.rubs, signals, log.h)
     stick = _sum(plant, lambda place: place.holds, signals, log.h)
     coulomb = _coulomb(plant, signals, log.h)
-    viscous = np.where(d > 0, p.F_vp, p.F_vn) * np.abs(v)
+    slopes = p.F_vp + falling[0], p.F_vn + falling[1]
+    viscous = np.where(d > 0, *slopes) * np.abs(v)
     # Friction never drives, but a bent bristle does.
     sliding = np.maximum(coulomb + viscous + slip, np.minimum(coulomb, 0.0))
     limits = np.minimum(p.F_sn - stick, 0.0), np.maximum(p.F_sp + stick, 0.0)

@@ -1,4 +1,8 @@
-"""The gate before a fit: what runs can tell of each parameter."""
+"""The gate before a fit: what runs can tell of each parameter.
+
+The rule is the estimator's own: doctor has a first look at its fit, and what that tells is said to
+be told; `identify` says the same of its whole fit.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -6,23 +10,16 @@ from dataclasses import dataclass, replace
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.estimates import NORMAL_95
-from identification.estimation.recorded_logs import (
-    RecordedLogs,
-    commanded,
-    led_by_rig,
-    left_by_actuator,
-    recorded_logs,
-)
+from identification.estimation.first_look import FirstLook, first_look
+from identification.estimation.recorded_logs import led_by_rig, recorded_logs
 from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
 from identification.estimation.regression.three_step import first_estimate
-from identification.estimation.surroundings import surroundings
 from identification.experiment.identifiability import tellable_effects
 from identification.log import Log, Rig
-from identification.model.estimates import Drive
+from identification.model.estimates import Drive, KarnoppFit
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
-from identification.thresholds import LINEAR_ACTUATOR
 from identification.velocity.fit import fit
 from identification.velocity.record import recorded
 from identification.velocity.told import told, units
@@ -49,11 +46,13 @@ class RunsTell:
 
 
 def runs_tell(
-    runs: Sequence[Log], rig: Rig, drive: Drive | None = None, *, effects: bool = False
-) -> RunsTell:
-    """Motion, directions and what they tell of each parameter, of at least one run, before any fit.
+    runs: Sequence[Log], rig: Rig, drive: Drive | None = None, *, effects: bool = False,
+    fit: KarnoppFit | None = None,
+) -> RunsTell:  # fmt: skip
+    """Motion, directions and what they tell of each parameter, of at least one run.
 
-    drive: what the fit is asked to be driven by; effects: also which effects the runs could show.
+    drive: what the fit is asked to be driven by; effects: also which effects the runs could show;
+    fit: that of the runs, where there is one already.
     """
     log = max(runs, key=len)
     motion = differentiate(log["y"], log.h)
@@ -63,7 +62,8 @@ def runs_tell(
         if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
             rig = replace(rig, force_per_command=1.0)
-        around = surroundings(runs, rig)
+        look = first_look(runs, rig, drive) if fit is None else FirstLook(fit)
+        around = look.fit.surroundings
         runs = [around.taken_out(run) for run in runs]
         recorded = recorded_logs(runs, rig, drive)
         m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
@@ -72,12 +72,7 @@ def runs_tell(
     events = [breakaways(one, m) for one in recorded.logs]
     rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
     ways = ways_of(recorded.logs, events, rests)
-    try:
-        seen = told_by(
-            recorded, ways, imposed=led_by_rig(recorded), actuator=_actuator_follows(recorded)
-        )
-    except NotIdentifiable as error:
-        return RunsTell(motion, ways, reason=str(error))
+    seen = told_by(recorded, ways, look.fit, open_run=look.open)
     shown = None
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
@@ -97,10 +92,3 @@ def _valve_tells(runs: Sequence[Log], rig: Rig, motion: Motion) -> RunsTell:
         motion,
         told=tuple(Told(n, e.known, e.reason or "", within=half.get(n)) for n, e in found.items()),
     )
-
-
-def _actuator_follows(recorded: RecordedLogs) -> bool | None:
-    """Whether the force follows the command as a linear actuator's; None without a command."""
-    if recorded.held or not commanded(recorded.plain):
-        return None
-    return left_by_actuator(recorded.plain) <= LINEAR_ACTUATOR

@@ -1,25 +1,23 @@
-"""What the motion in a log can tell of each parameter, by the thresholds of the estimates."""
+"""What the motion in a log can tell of each parameter: its events, and the estimator's word."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from identification.arrays import Array
 from identification.estimation.estimates import Events, silent_reason
-from identification.estimation.imposed_motion import fit_imposed
-from identification.estimation.recorded_logs import NO_NOISE, RecordedLogs
-from identification.estimation.regression.equation_rows import FIVE, MotionLog, mechanical
+from identification.estimation.imposed_motion import WHY_NOT
+from identification.estimation.recorded_logs import RecordedLogs, commanded, led_by_rig
+from identification.estimation.regression.equation_rows import FIVE, MotionLog
 from identification.estimation.regression.standstill import Breakaways
-from identification.estimation.regression.weighted_rows import solve_rows, stacked
 from identification.experiment.identifiability import Tellable, identifiability
+from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NAMES
-from identification.thresholds import EVENTS_NEEDED, WIDEST_SD
+from identification.thresholds import EVENTS_NEEDED
 from workbench.documents.model import Told
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
-# Starts and stops with which a fit surely has EVENTS_NEEDED (benchmarks/gate.py, seeds below 1500)
-SURE_CROSSINGS = 4 * EVENTS_NEEDED
 MEND = {
     "m": "add faster reversals, in which inertia matters",
     "F_c": "add slow strokes both ways",
@@ -28,6 +26,9 @@ MEND = {
     "F_s": "add slow reversals, each after a rest",
     "k": "log the command while it moves the body",
 }
+NO_RUN_FOLLOWED = "no free run is followed, and the equation of motion does not hold it"
+MEND_OF_RUN = "log the body driven by a force, from rest"
+OPEN = "the run follows the log, which is near and which the whole fit alone can say"
 
 
 @dataclass(frozen=True)
@@ -102,99 +103,92 @@ def _reversals(d: Array) -> int:
 
 
 def told_by(
-    recorded: RecordedLogs, ways: Ways, *, imposed: bool, actuator: bool | None
+    recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, *, open_run: bool = False
 ) -> tuple[Told, ...]:
-    """Whether each of the nine, and of the actuator's parameters, can be told.
+    """Whether each of the nine, and of the actuator's parameters, is told by a fit of the logs.
 
-    imposed: a rig leads the body; actuator: whether the force follows the command, None without.
-    Raises NotIdentifiable where a rig leads the body and it does not slide in both directions.
+    fit: the fit itself, or a first look at it; open_run: whether its run may be followed or not.
     """
-    if imposed:
-        out = _along_a_path(recorded)
-    else:
-        spread, run = _spreads(recorded), identifiability(recorded)
-        out = [_by_run(_of_nine(n, recorded, ways, spread), run.get(n)) for n in NAMES]
-    if actuator is not None:
-        why = (
-            "the force follows the command as a linear actuator's"
-            if actuator
-            else "the force does not follow the command as a linear actuator's"
-        )
-        out += [Told(name, actuator, why) for name in ("k1", "k2")]
+    run = {} if fit.imposed else identifiability(recorded)
+    led = led_by_rig(recorded)
+    out = []
+    for name in NAMES:
+        found = fit.estimates.get(name)
+        if found is None:
+            out.append(Told(name, False, "held at a value that does not matter for this log"))
+        elif open_run and name not in FIVE:
+            out.append(_if_followed(name, recorded, ways, fit, found))
+        elif found.value is not None:
+            out.append(_told(name, found, fit, ways, run.get(name), led=led))
+        else:  # a path that a rig leads has no breakaways, however it is run
+            lacks = None if led else silent_reason(name, ways.events, recorded.name)
+            out.append(_not_told(name, found, recorded.name, lacks))
+    if fit.actuator is not None and "k1" in fit.estimates:
+        for name in ("k1", "k2"):
+            one = fit.estimates[name]
+            why = one.reason or "the force follows the command as a linear actuator's"
+            out.append(Told(name, one.value is not None, why))
+    elif commanded(recorded.plain) and not recorded.held:
+        why = "the force does not follow the command as a linear actuator's"
+        out += [Told(name, False, why) for name in ("k1", "k2")]
     elif not recorded.held:
         out += [Told(name, False, "no command is logged", MEND["k"]) for name in ("k1", "k2")]
     return tuple(out)
 
 
-def _by_run(one: Told, run: Tellable | None) -> Told:
-    """What the counts say, and how well the free run would tell it."""
-    if run is None or not one.can:
-        return one
-    if not run.can:
-        key = one.name if one.name in MEND else one.name[:3]
-        size = "by more than its size" if not run.within < 1.0 else f"by {run.within:.0%}"
-        return Told(one.name, False, f"its free run leaves it unsure {size}", MEND[key])
-    return replace(one, why=f"{one.why}; within {run.within:.1%} of it by the free run",
-                   within=run.within)  # fmt: skip
+def _told(
+    name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None, *, led: bool
+) -> Told:
+    """By what a parameter is told, and within what share of it."""
+    half = _half(found)
+    if fit.imposed:
+        which = "the force equation" if led else "the equation of motion alone"
+        return Told(name, True, f"to {half:.1%} by {which}", within=half)
+    within = run.within if run is not None and run.can else half
+    why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"
+    return Told(name, True, why, within=within)
 
 
-def _of_nine(name: str, recorded: RecordedLogs, ways: Ways, spread: Mapping[str, float]) -> Told:
+def _half(found: Estimate) -> float:
+    """Half an estimate's interval over its value."""
+    assert found.value is not None and found.low is not None and found.high is not None
+    return 0.5 * (found.high - found.low) / abs(found.value)
+
+
+def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:
+    """What carries a parameter, of the measured motion or of the fit's run, which may show more."""
     side = 1 if name.endswith("n") else 0
-    silent = silent_reason(name, ways.events, recorded.name)
-    if silent is not None:
-        why, _, add = silent.removeprefix(f"{recorded.name}: ").partition("; ")
-        return Told(name, False, why, add)
-    if name in spread:
-        relative = spread[name]
-        if relative > WIDEST_SD:
-            key = name if name == "m" else name[:3]
-            size = "by more than its size" if relative > 1.0 else f"by {relative:.0%}"
-            return Told(name, False, f"the equation of motion leaves it unsure {size}", MEND[key])
-        return Told(name, True, f"to {relative:.1%} by the equation of motion alone")
     if name.startswith("F_s"):
-        count = ways.events.breakaways[side]
-        return Told(name, True, f"{count} breakaways ({EVENTS_NEEDED} needed)")
-    count = ways.events.crossings[side]
-    if count < SURE_CROSSINGS:
-        why = (
-            f"{count} starts and stops, of which a fit may lose some ({SURE_CROSSINGS} to be sure)"
-        )
-        return Told(name, False, why, MEND["dv_"])
-    return Told(name, True, f"{count} starts and stops ({EVENTS_NEEDED} needed)")
+        count = max(ways.events.breakaways[side], fit.breakaways[side])
+        return f"{count} breakaways ({EVENTS_NEEDED} needed)"
+    if name.startswith("dv"):
+        count = ways.events.crossings[side]
+        seen = f"{count} starts and stops" if count >= EVENTS_NEEDED else "stops of the run itself"
+        return f"{seen} ({EVENTS_NEEDED} needed)"
+    if name == "m":
+        return f"{ways.reversals} reversals"
+    way = (ways.positive, ways.negative)[side]
+    return f"{way.seconds:.3g} s of motion that way"
 
 
-def _along_a_path(recorded: RecordedLogs) -> list[Told]:
-    """The nine of a body that a rig leads, as the fit of the force equation alone tells them."""
-    found = fit_imposed(recorded, np.random.default_rng(0), "imposed")
-    out = []
-    for name, one in found.estimates.items():
-        if one.value is not None and one.sd is not None:
-            relative = abs(one.sd / one.value)
-            out.append(Told(name, True, f"to {relative:.1%} by the force equation"))
-        else:
-            why, _, add = (one.reason or "").removeprefix(f"{recorded.name}: ").partition("; ")
-            out.append(Told(name, False, why, "" if add.startswith("see ") else add))
-    return out
+def _if_followed(
+    name: str, recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, found: Estimate
+) -> Told:
+    """What only a run tells that may be followed: no promise, where the log has the events."""
+    lacks = silent_reason(name, ways.events, recorded.name)
+    if lacks is not None:
+        return _not_told(name, found, recorded.name, lacks)
+    return Told(name, False, _events(name, ways, fit), MEND[name[:3]], only_if=OPEN)
 
 
-def _spreads(recorded: RecordedLogs) -> dict[str, float]:
-    """Relative deviation of mass and sliding friction by least squares of the equation of motion.
-
-    Widened by what the equation leaves beyond noise; infinite where a value is 0 or not told.
-    """
-    out = dict.fromkeys(FIVE, np.inf)
-    logs = [one for one in recorded.logs if len(one.sliding.start)]
-    if not logs:
-        return out
-    first = solve_rows(stacked([mechanical(one, NO_NOISE) for one in logs])).theta
-    rows = stacked([mechanical(one, first) for one in logs])
-    X, b = rows.X / rows.sd[:, np.newaxis], rows.b / rows.sd
-    size = np.maximum(np.sqrt(np.sum(X**2, axis=0)), 1e-300)
-    theta = np.linalg.lstsq(X / size, b, rcond=1e-12)[0]
-    left = max(1.0, float(np.sum((b - X / size @ theta) ** 2)) / max(len(b) - len(FIVE), 1))
-    inverse = np.linalg.pinv((X / size).T @ (X / size), rcond=1e-12)
-    sd = np.sqrt(left * np.maximum(np.diag(inverse), 0.0))
-    for name, value, own in zip(FIVE, theta.tolist(), sd.tolist(), strict=True):
-        if value != 0.0 and own > 0.0:
-            out[name] = own / abs(value)
-    return out
+def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
+    """Why a parameter is not told, and what run would tell it; lacks: what the measured motion has
+    too little of, which says more than how a fit came out."""
+    said = (lacks or found.reason or "the log does not tell it").removeprefix(f"{log}: ")
+    if said == WHY_NOT["stick"]:
+        said = f"{NO_RUN_FOLLOWED}; {MEND_OF_RUN}"
+    why, _, add = said.partition("; ")
+    key = name if name in MEND else name[:3]
+    if not add and found.at_most is None:
+        add = MEND[key]
+    return Told(name, False, why, "" if add.startswith("see ") else add)

@@ -18,7 +18,7 @@ from identification.estimation.plain_search.search_bounds import Box, search_box
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
-from identification.model.karnopp import Karnopp
+from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.progress import Halt
 from identification.simulation.free_run import FreeRun, free_run
@@ -159,7 +159,10 @@ def simulated(problem: Problem, optimum: Optimum, index: int) -> FreeRun:
 
 
 def plant_of(problem: Problem, optimum: Optimum) -> Plant:
-    friction = Karnopp.from_array(optimum.p[:9])
+    """The plant of an optimum; a friction of 0, which a step may leave a little below, is 0."""
+    negative = np.array([name in NEGATIVE for name in NAMES])
+    nine = optimum.p[:9]
+    friction = Karnopp.from_array(np.where(negative, np.minimum(nine, 0.0), np.maximum(nine, 0.0)))
     if problem.drive == "command":
         return Plant(friction, Actuator(float(optimum.p[K1]), float(optimum.p[K2])))
     if problem.hold:

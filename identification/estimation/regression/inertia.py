@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identification.arrays import Array
 from identification.estimation.regression.equation_rows import MotionLog, mechanical
 
 # Of the force's quick changes, that inertia explains of a body that is free
@@ -55,13 +56,7 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
     return not (inertia or tells(float(np.sum(b**2)), TOLD_BY_FORCE))
 
 
-def speed_ratios(logs: Sequence[MotionLog]) -> tuple[float, float]:
-    """How many times the slow strokes the quick ones are, in positive and in negative direction.
-
-    Raises ValueError where there is none in a direction.
-    """
-    up, down = (
-        np.quantile(np.concatenate([one.speed[one.up == way] for one in logs]), SPEED_RANGE)
-        for way in (True, False)
-    )
-    return float(up[1] / up[0]), float(down[1] / down[0])
+def speed_ratio(speed: Array) -> float:
+    """How many times the slow speeds (r,) of a direction the quick ones are."""
+    slow, fast = np.quantile(speed, SPEED_RANGE)
+    return float(fast / slow)

@@ -12,7 +12,7 @@ from benchmarks.init_table_words import KINDS as TABLES
 from identification.arrays import Array
 from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
-from workbench.page.card_form import OTHER_FIELD, form_of
+from workbench.page.card_form import OTHER_FIELD, form_of, kept_form
 from workbench.steps.first_card.answers import BadAnswer, with_rig
 from workbench.steps.first_card.looked_over import looked_over
 from workbench.steps.first_card.proposal import Proposal, proposed
@@ -99,12 +99,28 @@ def test_the_pages_form_takes_the_other_of_a_guess(joint: dict[str, Array], tmp_
     rival = next(one.rival for one in found.rig if one.key == "kind")
     assert form.others["kind"][0] == rival
     after = form.with_fields({**form.fields, OTHER_FIELD: "kind"})
-    assert after["kind"] == rival and "kind" not in after.others
+    assert after["kind"] == rival
+    again = after.with_fields({**after.fields, OTHER_FIELD: "kind"})  # and back by the same button
+    assert again.fields == {**again.fields, **form.fields}
     drive = {"force": "F", "motor": "u"}
     assert after[f"column_{drive[rival]}"] == form[f"column_{drive[found.kind]}"]
     assert after[f"column_{drive[found.kind]}"] == ""
+    assert f"else {rival}" in form.text("run.csv").partition("motion")[0]
+    assert f"else {form['kind']}" in after.text("run.csv").partition("motion")[0]
     turned = form.with_fields({**form.fields, OTHER_FIELD: "motion"})
     assert turned["motion"] != form["motion"] and turned["unit_y"] != form["unit_y"]
+
+
+def test_the_pages_form_is_kept_with_guesses_of_columns(
+    joint: dict[str, Array], tmp_path: Path
+) -> None:
+    noise = np.random.default_rng(1).standard_normal((2, len(T)))
+    y = joint["y"] + 1e-4 * noise[0]
+    form = form_of(propose(tmp_path, "t,a1,a2", T, y, joint["F"] + 0.5 * noise[1]), "run.csv")
+    form.keep(tmp_path)
+    assert not all(sure for sure, _ in form.why.values())
+    kept = kept_form(tmp_path)
+    assert kept is not None and kept.why == form.why and kept.others == form.others
 
 
 def test_a_sign_is_turned_only_where_the_force_tells_it(

@@ -394,7 +394,7 @@ def _signals(columns: Columns, roles: Roles, units: Mapping[str, UnitGuess]) -> 
         if sign < 0.0:
             why += "; with this sign friction takes energy" if name != "r" else ""
         why += f"; unit {unit.why}"
-        sure = odds >= SURE and unit.sure
+        sure = bool(odds >= SURE and unit.sure)
         out.append(
             SignalGuess(name, one.raw.key, one.shown, unit.unit, gain, one.bits, sure, why,
                         "" if sure else _rival(name, odds, unit, roles))

@@ -1,0 +1,115 @@
+"""The equation of motion over windows of sliding whose width the logs themselves choose.
+
+    mean F = m second y + F_cp share up - F_cn share down + F_vp mean v+ + F_vn mean v-   (N)
+
+in weak form (`signals/weak_form`). Wide windows average noise away, narrow ones keep up with quick
+motion: taken is the narrowest that leaves hardly more of the force than the best one does. A window
+may hold reversals, since its columns hold how long the body went each way.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.arrays import Array, BoolArray
+from identification.estimation.regression.equation_rows import (
+    FIVE,
+    OF_FORCE,
+    SURE_OF_DIRECTION,
+    MotionLog,
+)
+from identification.estimation.regression.weighted_rows import BLOCKS, Rows, solve_rows, stacked
+from identification.model.karnopp import Karnopp
+from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
+
+OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
+HALF_WIDTHS = (8, 16, 32, 64)  # samples, half of a window
+FINEST_WINDOW = 4  # samples, of the window that shows direction and speed
+FINER_WINDOW = 4  # times narrower than the rows' windows it is
+SHORTEST_LOGS = 20  # half-widths, that the shortest log is long at least
+NEARLY_LEAST, AS_WELL_LEFT = (
+    1.1,
+    0.005,
+)  # times the least share left, or more than it, that a window may leave
+SLOWEST_SLIDING = 0.02  # of the quick speeds, below which a body may as well be at rest
+FAST_SPEEDS = 0.95  # quantile of speed
+WITHIN_BAND = 1e-3  # share of a window, in which it may be within the band of a plant
+UNSURE_IN_WINDOW = 0.02  # share of a window in which the body may be at rest
+FEWEST_IN_MOTION = 30
+
+
+@dataclass(frozen=True, eq=False)
+class MotionRows:
+    """The equation's rows of one log, the windows that they are of, and the speed, (n,)."""
+
+    rows: Rows
+    windows: WeakWindows
+    v: Array
+
+    def outside(self, p: Karnopp) -> BoolArray:
+        """Rows (r,) in which the body is faster than the band of a plant, which says something else
+        of friction within it."""
+        within = (self.v < p.dv_p) & (self.v > p.dv_n)
+        return np.asarray(self.windows.mean @ (1.0 * within) < WITHIN_BAND)
+
+
+def motion_rows(logs: Sequence[MotionLog], theta: Array) -> list[Rows]:
+    """The equation's rows of each log, in the windows that suit all of them best.
+
+    theta: a first estimate of m, F_cp, F_cn, F_vp, F_vn, for the rows' noise. Rows without any
+    where too little slides.
+    """
+    return [one.rows for one in rows_and_windows(logs, theta)]
+
+
+def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows]:
+    """The same with their windows."""
+    shortest = min(len(one.log) for one in logs)
+    tried = [
+        [rows_of_width(one, half, theta) for one in logs]
+        for half in HALF_WIDTHS
+        if SHORTEST_LOGS * half < shortest or half == HALF_WIDTHS[0]
+    ]
+    found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION]
+    if not found:
+        return tried[0]
+    left = [_share_left([one.rows for one in made]) for made in found]
+    enough = max(NEARLY_LEAST * min(left), min(left) + AS_WELL_LEFT)
+    return next(made for made, share in zip(found, left, strict=True) if share <= enough)
+
+
+def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
+    """The rows of one log in windows of twice `half` samples; speed (r,): the mean in each."""
+    n, h, y = len(one.log), one.log.h, np.asarray(one.log["y"])
+    length = min(2 * half, n - 1)
+    every = all_windows(n, length, h)
+    mean, first, second, *_ = weights(length, h)
+    fine = weights(max(FINEST_WINDOW, 2 * (half // FINER_WINDOW)), h)[1]
+    padded = np.pad(y, len(fine) // 2, mode="reflect", reflect_type="odd")
+    v = np.correlate(padded, fine, "valid")[:n]
+    sure = SURE_OF_DIRECTION * one.noise_y * float(np.sqrt(noise_gain(first)))
+    sure = max(sure, SLOWEST_SLIDING * float(np.quantile(np.abs(v), FAST_SPEEDS)))
+    over, unsure = every.first @ y, every.mean @ (1.0 * (np.abs(v) < sure))
+    w = every.at(np.flatnonzero((np.abs(over) > sure) & (unsure < UNSURE_IN_WINDOW)))
+    over, up, down = w.first @ y, v > 0.0, v < 0.0
+    X = np.column_stack(
+        [w.second @ y, w.mean @ (1.0 * up), -(w.mean @ (1.0 * down)), w.mean @ (v * up),
+         w.mean @ (v * down)]
+    )  # fmt: skip
+    b = (w.held if one.held else w.mean) @ np.asarray(one.log["F"])
+    viscous = np.where(over > 0.0, theta[3], theta[4])[:, np.newaxis]
+    by_position = np.sum((theta[0] * second + viscous * first) ** 2, axis=1)
+    variance = one.noise_F**2 * noise_gain(mean) + one.position_sd[w.middle] ** 2 * by_position
+    # Of a mass and a damping of 0 the position's noise makes none, and no row is without.
+    sd = np.maximum(np.sqrt(variance), OF_FORCE * float(np.std(one.log["F"])))
+    block = (w.middle * BLOCKS // n).astype(np.int64)
+    return MotionRows(Rows(b, X, sd, block, np.abs(over), FIVE), w, v)
+
+
+def _share_left(rows: Sequence[Rows]) -> float:
+    """Share of the force that least squares leave."""
+    every = stacked(rows)
+    plain = solve_rows(every)
+    left = plain.residual * every.sd
+    return float(np.linalg.norm(left) / max(float(np.linalg.norm(every.b)), 1e-300))

@@ -1,0 +1,10 @@
+"""Motion that goes one way alone."""
+
+from identification.thresholds import OTHER_WAY
+
+ONE_WAY_WHY = "motion one way, in which no free run tells friction from a constant force"
+
+
+def is_one_way(share_up: float) -> bool:
+    """Whether motion of which so much goes up goes one way alone, up or down."""
+    return not OTHER_WAY < share_up < 1.0 - OTHER_WAY

@@ -1,0 +1,115 @@
+"""Windows of sliding whose width the logs choose, and which terms of friction hold in them."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from identification.arrays import Array
+from identification.estimation.imposed_motion import fit_imposed
+from identification.estimation.recorded_logs import recorded_logs
+from identification.estimation.regression.equation_rows import FIVE, MotionLog, motion_log
+from identification.estimation.regression.motion_rows import (
+    HALF_WIDTHS,
+    motion_rows,
+    rows_and_windows,
+    rows_of_width,
+)
+from identification.estimation.regression.weighted_rows import solve_rows, stacked
+from identification.log import Log, Rig
+from identification.model.karnopp import Karnopp
+
+H = 1e-3
+NONE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+
+
+def swinging(
+    five: tuple[float, float, float, float, float], *, hz: float = 1.0, noise_y: float = 0.0,
+    noise_F: float = 0.0, seconds: float = 12.0, seed: int = 0,
+) -> Log:  # fmt: skip
+    """A body led along two sines, its force that of m, F_cp, F_cn, F_vp, F_vn alone."""
+    t = H * np.arange(round(seconds / H), dtype=np.float64)
+    w = 2.0 * np.pi * hz
+    y = 0.05 * np.sin(w * t) + 0.02 * np.sin(2.3 * w * t)
+    v = w * (0.05 * np.cos(w * t) + 0.046 * np.cos(2.3 * w * t))
+    a = -(w**2) * (0.05 * np.sin(w * t) + 0.02 * 2.3**2 * np.sin(2.3 * w * t))
+    m, F_cp, F_cn, F_vp, F_vn = five
+    F = m * a + np.where(v > 0, F_cp + F_vp * v, -F_cn + F_vn * v)
+    rng = np.random.default_rng(seed)
+    noisy = y + noise_y * rng.standard_normal(len(t)), F + noise_F * rng.standard_normal(len(t))
+    return Log("swings", {"t": t, "y": noisy[0], "F": noisy[1]})
+
+
+def moved(log: Log) -> MotionLog:
+    return motion_log(log, held=False, by_command=False)
+
+
+def by_least_squares(log: Log) -> Array:
+    return solve_rows(stacked(motion_rows([moved(log)], NONE))).theta
+
+
+@settings(max_examples=12, deadline=None)
+@given(
+    m=st.floats(0.5, 5.0),
+    F_cp=st.floats(1.0, 10.0),
+    F_cn=st.floats(1.0, 10.0),
+    F_vp=st.floats(2.0, 20.0),
+    F_vn=st.floats(2.0, 20.0),
+)
+def test_the_rows_are_the_equation_of_motion(
+    m: float, F_cp: float, F_cn: float, F_vp: float, F_vn: float
+) -> None:
+    """Within reversals too: a window knows how long the body went each way."""
+    truth = m, F_cp, F_cn, F_vp, F_vn
+    assert by_least_squares(swinging(truth)) == pytest.approx(truth, rel=5e-3)
+
+
+def test_windows_widen_with_noise_and_narrow_with_quick_motion() -> None:
+    truth = 1.0, 4.0, 3.0, 8.0, 6.0
+
+    def length(log: Log) -> int:
+        (made,) = rows_and_windows([moved(log)], NONE)
+        return made.windows.length
+
+    quiet, noisy = swinging(truth), swinging(truth, noise_F=2.0, noise_y=2e-5)
+    quick = swinging(truth, hz=8.0)
+    assert length(noisy) > length(quiet)
+    assert length(quick) <= length(quiet)
+    found = by_least_squares(noisy)
+    assert found[[0, 1, 2]] == pytest.approx([1.0, 4.0, 3.0], rel=0.05)
+
+
+def test_rows_within_the_band_of_a_plant_are_known() -> None:
+    log = swinging((1.0, 4.0, 3.0, 8.0, 6.0))
+    made = rows_of_width(moved(log), HALF_WIDTHS[0], NONE)
+    wide = Karnopp(1.0, 4.0, 3.0, 8.0, 6.0, 0.2, -0.2, 5.0, -4.0)
+    narrow = Karnopp(1.0, 4.0, 3.0, 8.0, 6.0, 1e-6, -1e-6, 5.0, -4.0)
+    assert np.all(made.outside(narrow))
+    some = made.outside(wide)
+    assert 0 < np.count_nonzero(some) < len(some)
+    assert np.all(made.rows.speed[some] > 0.19)
+
+
+def told(log: Log) -> dict[str, float | None]:
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    return {name: fit.estimates[name].value for name in FIVE}
+
+
+def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction() -> None:
+    log = swinging((0.0, 9.0, 5.0, -12.0, 0.0), noise_F=0.1)
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    up, down = fit.estimates["F_vp"], fit.estimates["F_vn"]
+    assert up.value is None and up.assumed == pytest.approx(-12.0, rel=0.05)
+    assert "falls with speed" in str(up.reason)
+    assert down.value is None and "constant friction predicts as much" in str(down.reason)
+    assert fit.estimates["F_cp"].value == pytest.approx(9.0, rel=0.02)
+    assert fit.estimates["F_cn"].value == pytest.approx(5.0, rel=0.02)
+    assert fit.friction.F_vp == 0.0  # what drives a body is not simulated
+
+
+def test_terms_that_predict_nothing_are_left_out() -> None:
+    plain = told(swinging((0.0, 4.0, 3.0, 0.0, 0.0), noise_F=0.2))
+    assert plain["F_cp"] == pytest.approx(4.0, rel=0.01)
+    assert plain["F_vp"] is None and plain["m"] is None
+    whole = told(swinging((2.0, 4.0, 3.0, 8.0, 6.0), noise_F=0.2))
+    assert [whole[name] for name in FIVE] == pytest.approx([2.0, 4.0, 3.0, 8.0, 6.0], rel=0.03)

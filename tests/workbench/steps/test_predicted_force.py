@@ -1,0 +1,60 @@
+"""Force that a model says a measured motion needs."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.log import Log
+from identification.model.inverse_model import Smoothing
+from identification.model.karnopp import Karnopp
+from tests.chain import model_of
+from workbench.documents.model import Model
+from workbench.steps.predicted_force import force_by_model, force_needed, seen_moving
+
+WIDE = Karnopp(1.0, 12.0, 15.0, 30.0, 20.0, 0.5, -0.5, 20.0, -23.0)
+
+
+def swing() -> Log:
+    """A slow swing, at most 0.3 m/s, under no force."""
+    t = 1e-3 * np.arange(4000, dtype=np.float64)
+    y = 0.1 * np.sin(3.0 * t) + 1e-7 * np.random.default_rng(0).standard_normal(len(t))
+    return Log("swing", {"t": t, "y": y, "F": np.zeros(len(t))})
+
+
+def not_told(model: Model, **values: float) -> Model:
+    """The model with these parameters assumed, as no log told them."""
+    friction = {
+        name: replace(one, value=None, sd=None, low=None, high=None, reason="no", assumed=x)
+        if (x := values.get(name)) is not None
+        else one
+        for name, one in model.friction.items()
+    }
+    return replace(model, friction=friction)
+
+
+def test_a_band_that_no_log_told_holds_no_body_that_is_seen_to_slide() -> None:
+    log, how = swing(), Smoothing()
+    told = model_of(WIDE)
+    assumed = not_told(told, dv_p=0.5, dv_n=-0.5)
+    quick = np.abs(0.3 * np.cos(3.0 * log["t"])) > 0.1
+    assert np.all(np.abs(force_by_model(told, log, how)[quick]) < 1.0)  # held by no force
+    needed = np.abs(force_by_model(assumed, log, how)[quick])
+    assert np.all((needed > 12.0) & (needed < 25.0))
+    assert seen_moving(assumed, log).friction.dv_p < 1e-2
+    assert seen_moving(told, log) == told.simulated
+    assert seen_moving(not_told(told, dv_p=1e-6), log).friction.dv_p == 1e-6
+
+
+def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
+    log, how = swing(), Smoothing()
+    narrow = replace(WIDE, dv_p=1e-3, dv_n=-1e-3, F_vp=0.0)
+    falls = not_told(model_of(narrow), F_vp=-20.0)
+    assert falls.falling == (-20.0, 0.0)
+    assert falls.karnopp.F_vp == 0.0
+    up = 0.3 * np.cos(3.0 * log["t"]) > 0.28
+    constant = force_needed(log, falls.simulated, how)
+    assert force_by_model(falls, log, how)[up] - constant[up] == pytest.approx(-5.8, abs=0.3)
+    steep = not_told(model_of(narrow), F_vp=-1e3)
+    inertia = log["y"][up] * -9.0
+    assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives
