@@ -113,7 +113,7 @@ def without(one: Machine, plants: list[Plant], goals: Goals) -> Iterator[tuple[s
         ("RST on both", tune_rst, plants[0], None),
     ):  # fmt: skip
         try:
-            found = tune(A, B, one.h, Asked(), slow, plants[1:], whole=whole)
+            found = tune(A, B, one.h, Asked(whole=whole), slow, plants[1:])
         except BadSpecification:
             continue
         if not found.missed:

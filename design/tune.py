@@ -8,7 +8,7 @@ then chooses T.
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 import numpy as np
@@ -69,11 +69,16 @@ class Goals:
 
 @dataclass(frozen=True)
 class Asked:
-    """A specification by hand: dominant (w_n [rad/s], zeta), auxiliary poles z; None: searched."""
+    """A specification by hand: dominant (w_n [rad/s], zeta), auxiliary poles z; None: searched.
+
+    whole: the machine's plant (A, B), whose margins count, where poles are placed on its body
+    alone.
+    """
 
     dominant: tuple[float, float] | None = None
     auxiliary: tuple[complex, ...] | None = None
     integrator: bool = True
+    whole: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,14 +120,12 @@ def tune_rst(
     corners: Plants = (),
     demand: Demand = USUAL_DEMAND,
     drawn: DrawnPlants | None = None,
-    whole: tuple[Array, Array] | None = None,
 ) -> Tuned:
     """The fastest RST within the goals, or the one asked for; A, B in z^-1, h [s].
 
     corners: other plants (A, B) on which the modulus margin must hold too; drawn: where given, the
     goals must hold on so many of these instead. R holds 1 + z^-1, so that noise at half the
-    sampling rate does not reach the force. T: see `design.tracking`. whole: the machine's plant,
-    where A, B are the body alone on which poles are placed: the margins are those of the whole.
+    sampling rate does not reach the force. T: see `design.tracking`.
     Raises BadSpecification with the first reason where no poles of the search give a stable loop.
     """
     A, B = normalised_plant(A, B)
@@ -136,7 +139,7 @@ def tune_rst(
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))
-    plants = (whole or (A, B), *corners)
+    plants = (asked.whole or (A, B), *corners)
     holds = _inside(plants, goals, drawn)
     found = _best(plants, h, asked, goals, design, others, holds)
     slow = _slow_zeros(B)[:free]
@@ -159,7 +162,6 @@ def tune_pid(
     corners: Plants = (),
     demand: Demand = USUAL_DEMAND,
     drawn: DrawnPlants | None = None,
-    whole: tuple[Array, Array] | None = None,
 ) -> Tuned:
     """The fastest digital PID within the goals, or the one asked for; see `tune_rst`.
 
@@ -181,7 +183,7 @@ def tune_pid(
         return found.rst, found
 
     others = _auxiliary(A, h, min(A.size - 1, 2))
-    plants = (whole or (A, B), *corners)
+    plants = (asked.whole or (A, B), *corners)
     found = _best(plants, h, asked, goals, design, others, _inside(plants, goals, drawn))
     if found.pid is not None and found.pid.gains is not None:
         candidates = pid_candidates(found.pid.gains, h)

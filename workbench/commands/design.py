@@ -138,8 +138,7 @@ def command(
     """Design PID and RST controllers by pole placement, and P-PI cascades, with their margins.
 
     Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
-    keeps the margins; against a resonance the cascade gets a notch or a low-pass where that makes
-    it clearly faster, and acceleration, velocity and friction are fed forward in it.
+    keeps the margins; against a resonance the cascade gets a notch or a low-pass where that pays.
 
     With --robust: the poles, the integrator and the compensator that do best over the machines that
     the model's errors (and the machine's drift so far) allow; robust.json holds what that promises.
@@ -159,10 +158,8 @@ def command(
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
-    if "p-pi" in structures and not integrator:
-        raise click.UsageError("a P-PI cascade has an integrator; leave out --no-integrator.")
+    _refuse_beside(click.get_current_context(), robust, "p-pi" in structures and not integrator)
     if robust:
-        _refuse_with_robust(click.get_current_context())
         from workbench.steps.robust.robust import RobustAsked
 
         seen = _drift(where, machine) if machine else None
@@ -252,11 +249,17 @@ def _only_robust(context: click.Context) -> None:
             )
 
 
-def _refuse_with_robust(context: click.Context) -> None:
-    """Raises a usage error where an option is given that --robust has not."""
+def _refuse_beside(context: click.Context, robust: bool, without_integrator: bool) -> None:
+    """Raises a usage error where options are given that do not go together."""
+    if without_integrator:
+        raise click.UsageError("a P-PI cascade has an integrator; leave out --no-integrator.")
     for option in context.command.params:
         given = context.get_parameter_source(option.name or "")
-        if option.name in NOT_WITH_ROBUST and given is click.core.ParameterSource.COMMANDLINE:
+        if (
+            robust
+            and option.name in NOT_WITH_ROBUST
+            and given is click.core.ParameterSource.COMMANDLINE
+        ):
             raise click.UsageError(f"{option.opts[0]} has no meaning with --robust; leave it out.")
 
 

@@ -59,7 +59,6 @@ from workbench.steps.axis_test import axis_test as test_of_axis
 from workbench.steps.design import design as design_of_model
 from workbench.steps.design import effort_limit
 from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
-from workbench.steps.elastic import with_response
 from workbench.steps.experiment.plan import EXPERIMENT_STAGES
 from workbench.steps.experiment.plan import experiment as plan_experiment
 from workbench.steps.experiment.planned import Wanted
@@ -147,20 +146,19 @@ def design(
     auxiliary: Sequence[complex] | None = None, integrator: bool = True,
     source: "Literal['physical', 'arx'] | None" = None, period: float | None = None,
     goals: "Goals | None" = None, structures: "Sequence[Structure] | None" = None,
-    response: "PathLike | None" = None,
 ) -> DesignResult:  # fmt: skip
     """PID and RST for a model by pole placement, and P-PI cascades, as `workbench design`.
 
     poles: w_n [rad/s] and damping of the dominant pair, auxiliary: the others, values of z; both
     searched where not given. source: the plant to design on; period: of the position loop [s];
-    goals: margins to keep, by default those of the command; structures: of "rst", "pid", "p-pi";
-    response: a response.json whose resonance the plant has. Raises BadSpecification where the poles
+    goals: margins to keep, by default those of the command; structures: of "rst", "pid", "p-pi".
+    Raises BadSpecification where the poles
     cannot be placed, NotIdentifiable where the model carries no design.
     """
     from design.tune import Asked
     from design.tune import Goals as DesignGoals
 
-    known = with_response(_model(model), None if response is None else Path(response))
+    known = _model(model)
     asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
     wanted = goals or DesignGoals(effort=effort_limit(known))
     with _bar("designing"):

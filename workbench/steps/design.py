@@ -241,14 +241,13 @@ def _placed_at(
         if name == "pid" and not asked.integrator:
             refused[name] = "a PID has an integrator; asked for none"
             continue
-        wanted = asked
+        wanted = replace(asked, whole=whole)
         if name == "pid" and asked.auxiliary is not None:
-            wanted = Asked(asked.dominant, None, asked.integrator)
+            wanted = replace(wanted, auxiliary=None)
         try:
             tuned = partial(
-                tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines,
-                whole=whole,
-            )  # fmt: skip
+                tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
+            )
             slower = _below_resonance_of(model, goals)
             found[name] = _followable(tuned, slower, None if wanted.dominant else model.speed)
         except BadSpecification as error:
