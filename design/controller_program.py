@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from design.feed_forward import FeedForward
 from design.kernel_reader import KernelReader, NamedArray, as_expression
 from design.program import (
     Assign,
@@ -42,6 +43,7 @@ class ProgramUnits:
 
 
 COMPENSATOR_SLOTS = (*NAMES, "dv_p1", "dv_n1", "e_T", "inner", "stick")
+FEED_FORWARD_SLOTS = ("F_cp", "F_cn", "F_vp", "F_vn", "band", "m", "F_most")
 PID_SLOTS = ("k_R", "h_per_T_i", "T_d_per_eps", "exp_h_eps", "zone", "rule")
 LAW_TABLES = {
     "R": ("poly_R", "R of S F_ref = T r - R y, ascending powers of z^-1"),
@@ -55,6 +57,12 @@ LAW_TABLES = {
     "a_e": ("a_e", "denominator of the same"),
     "b_c": ("b_c", "F_compf: filter C of the compensator's force"),
     "a_c": ("a_c", "denominator of the same"),
+}
+OF_FEED_FORWARD = {
+    "b_v": ("b_v", "velocity of the reference"),
+    "b_e": ("b_a", "acceleration of the reference"),
+    "z_v": ("z_v", "state of the reference's velocity"),
+    "z_e": ("z_a", "state of its acceleration"),
 }
 STATE_ARRAYS: Mapping[str, tuple[str, str]] = {
     "x": ("x", "state of S F_ref = T r - R y in observer form"),
@@ -75,10 +83,18 @@ STATE_SLOTS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ("F_compf", "the same behind filter C"),
         ("v", "velocity, eq. (5)"),
     ),
+    "last of a feed-forward": (
+        ("F_ref", "what the position controller asks for"),
+        ("a_ref", "acceleration of the reference"),
+        ("F_ff", "force of the feed-forward"),
+        ("v_ref", "velocity of the reference"),
+    ),
     "held": (
         ("r_moved", "reference, moved at its limited speed"),
         ("integral", "sum of the force loop's error"),
         ("u_before", "command of the sample before, of which the motor's force is known"),
+        ("r_step", "what the reference moved in the sample before"),
+        ("r_before", "reference of the sample before, as it was given"),
     ),
     "turn": (("turn", "samples since the position controller had its turn"),),
 }
@@ -92,8 +108,11 @@ def controller_program(
     name: of the machine; k_a: of a motor [N per unit of the command], else 0. Raises BadModel
     where the servo has a dither, or another countermeasure than the compensator.
     """
-    if servo.dither is not None or not isinstance(servo.friction, Compensation | None):
+    if servo.dither is not None or not isinstance(
+        servo.friction, Compensation | FeedForward | None
+    ):
         raise BadModel("a program has no dither, and no friction observer; take it out")
+    ahead = isinstance(servo.friction, FeedForward)
     law = servo_law(servo, h, k_a)
     memory = servo_memory(servo, law, 1.0, 0.0)
     inputs = (
@@ -102,8 +121,8 @@ def controller_program(
         Signal("F_e", units.force, "measured force on the body"),
     )
     output = Signal("u", units.command, "command")
-    known = _named_law(law)
-    kept = _named_memory(memory)
+    known = _named_law(law, ahead)
+    kept = _named_memory(memory, ahead)
     taken = {one.name for one in (*known, *kept) if isinstance(one, NamedArray)}
     slots = {slot for one in (*known, *kept) if isinstance(one, NamedArray) for slot in one.slots}
     named = {one.name for one in known if isinstance(one, Constant)}
@@ -132,19 +151,26 @@ def controller_program(
             for one in known
             if isinstance(one, NamedArray) and one.name in names
         ),
-        states=tuple(one for one in _states(memory) if one.name in names),
+        states=tuple(one for one in _states(memory, ahead) if one.name in names),
         locals=tuple(one for one in reader.locals.values() if one.name != output.name),
         statements=statements,
     )
 
 
-def _named_law(law: Law) -> list[Any]:
-    """The law's values under the names of the program; what chooses between equations stays."""
+def _named_law(law: Law, ahead: bool) -> list[Any]:
+    """The law's values under the names of the program; what chooses between equations stays.
+
+    ahead: whether it has a feed-forward.
+    """
+    tables = {**LAW_TABLES, **OF_FEED_FORWARD} if ahead else LAW_TABLES
     found: list[Any] = []
     for field, value in law._asdict().items():
-        if field in LAW_TABLES:
-            name, meaning = LAW_TABLES[field]
+        if field in tables:
+            name, meaning = tables[field]
             found.append(NamedArray(name, len(value), meaning, tuple(value.tolist())))
+        elif field == "law" and ahead:
+            meaning = "F_ff: m a + friction of the reference's motion"
+            found.append(_slotted("feed_forward", value, FEED_FORWARD_SLOTS, meaning))
         elif field == "law" and len(value) > 1:
             meaning = "F_comp: friction compensator, eqs. (1), (3) and (4)"
             found.append(_slotted("compensator", value, COMPENSATOR_SLOTS, meaning))
@@ -161,25 +187,36 @@ def _slotted(name: str, value: Array, slots: tuple[str, ...], meaning: str) -> N
     return NamedArray(name, len(slots), meaning, tuple(value.tolist()), slots)
 
 
-def _named_memory(memory: Memory) -> list[Any]:
+def _state_names(ahead: bool) -> tuple[Mapping[str, tuple[str, str]], str]:
+    """Names of the states that are arrays, and the key of what the last sample left."""
+    if not ahead:
+        return STATE_ARRAYS, "last"
+    return {**STATE_ARRAYS, **OF_FEED_FORWARD}, "last of a feed-forward"
+
+
+def _named_memory(memory: Memory, ahead: bool) -> list[Any]:
+    arrays, last = _state_names(ahead)
     found: list[Any] = []
     for field, value in memory._asdict().items():
-        if field in STATE_ARRAYS:
-            name, meaning = STATE_ARRAYS[field]
+        if field in arrays:
+            name, meaning = arrays[field]
             found.append(NamedArray(name, len(value), meaning))
         else:
-            slots = tuple(name for name, _ in STATE_SLOTS.get(field, ()))
+            key = last if field == "last" else field
+            slots = tuple(name for name, _ in STATE_SLOTS.get(key, ()))
             found.append(NamedArray(field, len(value), "", (), slots, field == "turn"))
     return found
 
 
-def _states(memory: Memory) -> Iterator[State]:
+def _states(memory: Memory, ahead: bool) -> Iterator[State]:
     """The states that a program may have, at rest at position 1."""
+    arrays, last = _state_names(ahead)
     for field, value in memory._asdict().items():
-        if field in STATE_ARRAYS:
-            name, meaning = STATE_ARRAYS[field]
+        if field in arrays:
+            name, meaning = arrays[field]
             yield State(name, "real", tuple(value.tolist()), True, meaning)
-        for at, (name, meaning) in enumerate(STATE_SLOTS.get(field, ())):
+        key = last if field == "last" else field
+        for at, (name, meaning) in enumerate(STATE_SLOTS.get(key, ())):
             whole = np.issubdtype(value.dtype, np.integer)
             kind: Kind = "integer" if whole else "real"
             yield State(name, kind, (float(value[at]),), False, meaning)
@@ -212,5 +249,12 @@ def _constant_meanings(units: ProgramUnits) -> Mapping[str, tuple[str, str]]:
         "limit": (units.command, "largest command"),
         "force_limit": (force, "largest force reference"),
         "rate": (units.position, "what the reference moves in a sample at most"),
+        "acceleration": (units.position, "by how much that changes in a sample at most"),
+        "band": (
+            speed,
+            "speed of the reference from which Coulomb friction is fed forward in full",
+        ),
+        "m": (f"{force} s^2/{units.position}", "mass that is fed forward"),
+        "F_most": (force, "most that is fed forward"),
         "h": ("s", "period of the position controller"),
     }

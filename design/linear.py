@@ -52,19 +52,11 @@ def linear_plant(
         raise BadSpecification(f"m = {m:g} kg, f = {f:g} N s/m: need m > 0 and f >= 0")
     if actuator is None or force is None:
         body = np.array([[0.0, 1.0], [0.0, -f / m]])
-        step, entry = _held(body, np.array([0.0, 1.0 / m]), h)
-        return _transfer(step, entry)
-    step, entry = _force_loop(m, f, h / ratio, actuator, force)
-    loop, drive = np.eye(4), np.zeros(4)
-    for _ in range(ratio):
-        loop, drive = step @ loop, step @ drive + entry
-    worst = float(np.sort(np.abs(np.linalg.eigvals(loop)))[-2])
-    if worst >= 1:
-        raise BadSpecification(
-            f"the force loop k_i = {force.k_i:.3g} V/N, T_i = {force.T_i:.3g} s is unstable at"
-            f" {h / ratio:.3g} s (|z| = {worst:.3g}); lower k_i or sample faster"
-        )
-    return _transfer(loop, drive)
+        step, entry = held_step(body, np.array([0.0, 1.0 / m]), h)
+        return transfer(step, entry)
+    fast = h / ratio
+    step, entry = held_step(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), fast)
+    return transfer(*force_loop(step, entry, fast, force, ratio))
 
 
 def commanded_plant(m: float, f: float, h: float, actuator: Actuator) -> tuple[Array, Array]:
@@ -75,7 +67,8 @@ def commanded_plant(m: float, f: float, h: float, actuator: Actuator) -> tuple[A
     h = check_period(h)
     if not (m > 0 and f >= 0):
         raise BadSpecification(f"m = {m:g} kg, f = {f:g} N s/m: need m > 0 and f >= 0")
-    return _transfer(*_held(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), h))
+    entry = np.array([0.0, 0.0, actuator.k1])
+    return transfer(*held_step(_driven_body(m, f, actuator), entry, h))
 
 
 def _driven_body(m: float, f: float, actuator: Actuator) -> Array:
@@ -83,21 +76,36 @@ def _driven_body(m: float, f: float, actuator: Actuator) -> Array:
     return np.array([[0.0, 1.0, 0.0], [0.0, -f / m, 1.0 / m], [0.0, -actuator.k2, 0.0]])
 
 
-def _force_loop(
-    m: float, f: float, h: float, actuator: Actuator, force: ForceGains
+def force_loop(
+    step: Array, entry: Array, h: float, force: ForceGains, ratio: int
 ) -> tuple[Array, Array]:
-    """One sample of y, v, F and the integral of the force error, under a force reference."""
-    step, entry = _held(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), h)
-    error = np.array([0.0, 0.0, -1.0, 0.0])
-    command = force.k_i * (error + np.array([0.0, 0.0, 0.0, 1.0]))
-    loop = np.zeros((4, 4))
-    loop[:3, :3] = step
-    loop[:3] += np.outer(entry, command)
-    loop[3] = np.array([0.0, 0.0, 0.0, 1.0]) + h / force.T_i * error
-    return loop, np.append(entry * force.k_i, h / force.T_i)
+    """`ratio` samples of a machine (n, n) under its force loop, and what the reference enters by.
+
+    step, entry: of h [s], under a held command; the force is the last state. The integral of the
+    force error comes behind it. Raises BadSpecification where the loop is unstable.
+    """
+    n = len(entry)
+    error = np.zeros(n + 1)
+    error[n - 1] = -1.0
+    command = force.k_i * (error + np.eye(n + 1)[n])
+    one = np.zeros((n + 1, n + 1))
+    one[:n, :n] = step
+    one[:n] += np.outer(entry, command)
+    one[n] = np.eye(n + 1)[n] + h / force.T_i * error
+    enters = np.append(entry * force.k_i, h / force.T_i)
+    loop, drive = np.eye(n + 1), np.zeros(n + 1)
+    for _ in range(ratio):
+        loop, drive = one @ loop, one @ drive + enters
+    worst = float(np.sort(np.abs(np.linalg.eigvals(loop)))[-2])
+    if worst >= 1:
+        raise BadSpecification(
+            f"the force loop k_i = {force.k_i:.3g} V/N, T_i = {force.T_i:.3g} s is unstable at"
+            f" {h:.3g} s (|z| = {worst:.3g}); lower k_i or sample faster"
+        )
+    return loop, drive
 
 
-def _held(a: Array, b: Array, h: float) -> tuple[Array, Array]:
+def held_step(a: Array, b: Array, h: float) -> tuple[Array, Array]:
     """Step of x' = a x + b u over h with u held."""
     n = len(b)
     block = np.zeros((n + 1, n + 1))
@@ -106,11 +114,10 @@ def _held(a: Array, b: Array, h: float) -> tuple[Array, Array]:
     return exact[:n, :n], exact[:n, n]
 
 
-def _transfer(step: Array, entry: Array) -> tuple[Array, Array]:
-    """(A, B) of the first state, in ascending powers of z^-1."""
+def transfer(step: Array, entry: Array, out: Array | None = None) -> tuple[Array, Array]:
+    """(A, B) of y = out x, by default the first state, in ascending powers of z^-1."""
     a = np.real(np.poly(step))
-    out = np.zeros((1, len(entry)))
-    out[0, 0] = 1.0
-    b = np.real(np.poly(step - np.outer(entry, out[0]))) - a
+    seen = np.eye(1, len(entry)) if out is None else out[np.newaxis]
+    b = np.real(np.poly(step - np.outer(entry, seen[0]))) - a
     b[0] = 0.0
     return a, trim(b, 1e-14)

@@ -4,13 +4,14 @@ Figures 2, 4, 5 and 10 of the paper; figure 1 with a motor. The plant may have e
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from design.compensator import Compensator
 from design.drive_law import forgetting
+from design.feed_forward import FeedForward
 from design.filters import PASS, CompensatorFilters, Sampled, sampled, settled
 from design.loop import Cascade, ForcePI, LoopNoise, LoopRun, observer_form, prepared_loop
 from design.loop_signals import Signals, command_delay, effect_signals
@@ -19,6 +20,7 @@ from design.rst import RST
 from design.servo_kernels import (
     COMPENSATOR,
     DISTURBANCE,
+    FEED_FORWARD,
     KALMAN,
     NO_COUNTERMEASURE,
     PID_LAW,
@@ -43,8 +45,34 @@ class Compensation:
     filters: CompensatorFilters
 
 
+STEPS_PER_RADIAN = 20.0  # in which a load's swinging is followed
+
+
+@dataclass(frozen=True)
+class SecondMass:
+    """A load behind a spring: mass [kg], stiffness [N/m] and damping [N s/m] of the spring."""
+
+    mass: float
+    stiffness: float
+    damping: float
+
+    @classmethod
+    def of(
+        cls, frequency: float, anti_resonance: float, damping: float, mass: float
+    ) -> "SecondMass":
+        """By resonance and anti-resonance [Hz], damping of the resonance, and the load's mass."""
+        k = mass * (2.0 * math.pi * anti_resonance) ** 2
+        return cls(mass, k, 2.0 * damping * k / (2.0 * math.pi * frequency))
+
+    def of_body(self, first: float, h: float) -> Array:
+        """As the kernels take it, (4,), behind a body of its own mass [kg], sampled every h [s]."""
+        w = math.sqrt(self.stiffness * (1.0 / first + 1.0 / self.mass))
+        steps = max(1.0, math.ceil(STEPS_PER_RADIAN * w * h))
+        return np.array([self.mass, self.stiffness, self.damping, steps])
+
+
 DIRECT = ForcePI(0.0, 1.0)  # as the kernels take it that there is no force loop
-Countermeasure = Compensation | DisturbanceObserver | FrictionObserver
+Countermeasure = Compensation | DisturbanceObserver | FrictionObserver | FeedForward
 
 
 @dataclass(frozen=True)
@@ -59,7 +87,9 @@ class Servo:
     its sum while it would drive the command further out. W: in place of anti_windup, that of a
     `DriveLaw`. k_a: by which the friction's force becomes a command, None: the motor's own.
     direct: an actuator takes the position controller's output as its command, without a force loop.
-    rate: the reference is moved at most at this speed [m/s], None: at any.
+    rate: the reference is moved at most at this speed [m/s], None: at any; acceleration: and with
+    at most this [m/s^2], so that it stops where it should, None: with any; it needs a rate, and
+    leaves a reference that is a path already as it is.
 
     Source: Astrom & Wittenmark, Computer-Controlled Systems, section 9.4 (anti-windup).
     """
@@ -75,8 +105,11 @@ class Servo:
     k_a: float | None = None
     rate: float | None = None
     direct: bool = False
+    acceleration: float | None = None
 
     def __post_init__(self) -> None:
+        if self.acceleration is not None and (self.rate is None or not self.acceleration > 0):
+            raise BadModel("a reference of limited acceleration needs one > 0, and a rate")
         if self.direct and (self.force is not None or self.friction is not None):
             raise BadModel(
                 "a command without a force loop takes no force of a loop or a countermeasure"
@@ -132,8 +165,11 @@ def simulate_servo(
     noise: LoopNoise | None = None,
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     signals: Signals | None = None,
+    load: SecondMass | None = None,
 ) -> ServoRun:
     """One run along the reference r [m], (n,); the force loop runs every h [s]; see `Servo`.
+
+    load: of the plant's mass, that swings behind the body which is measured and rubs.
 
     start: y [m], v [m/s], F [N] at the first sample, before which the servo stood at y. signals:
     those that the plant's effects use, by name, each (n,) or `OfForce`, of the plant's own force at
@@ -142,6 +178,10 @@ def simulate_servo(
     Raises BadModel where the parts do not fit together, a needed signal is missing or the run
     cannot be followed.
     """
+    swinging = np.zeros(4)
+    if load is not None:
+        plant = _without_load(plant, load)
+        swinging = load.of_body(plant.friction.m, h)
     ratio = max(1, round(servo.linear.h / h))
     cascade = Cascade(servo.linear, DIRECT if servo.direct else servo.force, servo.control_limit)
     loop, p = prepared_loop([plant], cascade, reference, h, noise, start, ratio)
@@ -159,11 +199,11 @@ def simulate_servo(
     out, modes = np.empty((SERVO_ROWS, n)), np.empty(n, dtype=np.int64)
     y_noise, f_noise = (np.ascontiguousarray(one[:, 0]) for one in (loop.noise.y, loop.noise.F))
     around = (law, memory, loop.reference, shake, y_noise, f_noise, loop.start, out, modes)
-    if plant.effects:
+    if plant.effects or load is not None:
         history = np.zeros(n + math.ceil(late) + 1)
         servo_kernel(
             p, h, pieces(table, h), codes, table.addresses, table.p, base, gain, history, late,
-            *around,
+            swinging, *around,
         )  # fmt: skip
     else:
         plain_servo_kernel(p, h, *around)
@@ -174,6 +214,16 @@ def simulate_servo(
             " check the controller's gains and the effects' parameters"
         )
     return ServoRun(t, loop.reference, y, v, F, measured, F + f_noise, u, modes, *inside)
+
+
+def _without_load(plant: Plant, load: SecondMass) -> Plant:
+    """The plant with the mass of its body alone."""
+    left = plant.friction.m - load.mass
+    if not left > 0.0:
+        raise BadModel(
+            f"a load of {load.mass:g} kg is not less than the whole mass of {plant.friction.m:g} kg"
+        )
+    return replace(plant, friction=replace(plant.friction, m=left))
 
 
 def friction_law(what: Countermeasure | None, h: float) -> Law:
@@ -191,11 +241,14 @@ def friction_law(what: Countermeasure | None, h: float) -> Law:
             first, second = (sampled(one) for one in what.filters(h))
         case FrictionObserver(m, F_vp, F_vn, q_v, q_F, r_y):
             kind, kalman = KALMAN, np.array([m, F_vp, F_vn, q_v, q_F, r_y])
+        case FeedForward():
+            kind, law = FEED_FORWARD, what.law
+            first, second = (sampled(one) for one in what.filters(h))
     return Law(
         position=RST_LAW, R=none, S=none, W=none, b_r=pass_.b, a_r=pass_.a, pid=none,
         friction=kind, law=law, b_v=first.b, a_v=first.a, b_e=second.b, a_e=second.a,
         b_c=third.b, a_c=third.a, kalman=kalman, h=h, k_i=0.0, k_int=0.0, k_a=0.0,
-        limit=math.inf, force_limit=math.inf, rate=math.inf, ratio=1,
+        limit=math.inf, force_limit=math.inf, rate=math.inf, acceleration=math.inf, ratio=1,
     )  # fmt: skip
 
 
@@ -211,7 +264,7 @@ def friction_memory(law: Law, y_0: float, F_0: float) -> Memory:
         x=np.zeros(1), pid=np.zeros(3), z_r=settled(Sampled(law.b_r, law.a_r), y_0),
         z_v=settled(Sampled(law.b_v, law.a_v), first), z_e=settled(Sampled(law.b_e, law.a_e), y_0),
         z_c=np.zeros(law.b_c.size), kalman=kalman, last=np.zeros(4),
-        held=np.array([y_0, 0.0, 0.0]), turn=np.zeros(1, dtype=np.int64),
+        held=np.array([y_0, 0.0, 0.0, 0.0, y_0]), turn=np.zeros(1, dtype=np.int64),
     )  # fmt: skip
 
 
@@ -219,13 +272,13 @@ def servo_law(servo: Servo, h: float, k_a: float = 0.0) -> Law:
     """The servo as the kernels take it; its force loop runs every h [s], k_a [N/V] of a motor."""
     ratio = max(1, round(servo.linear.h / h))
     k_i, T_i = (servo.force.k_i, servo.force.T_i) if servo.force else (0.0, 1.0)
-    limit, force_limit, rate = (
+    limit, force_limit, rate, acceleration = (
         math.inf if one is None else one
-        for one in (servo.control_limit, servo.force_limit, servo.rate)
+        for one in (servo.control_limit, servo.force_limit, servo.rate, servo.acceleration)
     )
     law = friction_law(servo.friction, ratio * h)._replace(
         k_i=k_i, k_int=k_i * h / T_i, k_a=k_a, limit=limit, force_limit=force_limit,
-        rate=rate * h, ratio=ratio,
+        rate=rate * h, acceleration=acceleration * h * h, ratio=ratio,
     )  # fmt: skip
     if isinstance(servo.position, RST):
         R, S, _ = observer_form(servo.position, 0.0)

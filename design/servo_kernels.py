@@ -11,13 +11,14 @@ from typing import NamedTuple
 import numpy as np
 
 from design.compensator import compensation_force
+from design.feed_forward import feed_forward_force
 from design.filters import filtered
 from design.loop_kernels import force_command, shift
 from identification.arrays import Array, IntArray
 from identification.compiled import compiled, compiled_exact
 
 RST_LAW, PID_LAW = range(2)
-NO_COUNTERMEASURE, COMPENSATOR, DISTURBANCE, KALMAN = range(4)
+NO_COUNTERMEASURE, COMPENSATOR, DISTURBANCE, KALMAN, FEED_FORWARD = range(5)
 PLAIN_INTEGRAL, DEAD_ZONE, RESET = range(3)
 # A PID's constants, and its memory.
 K_R, PER_SUM, PER_DIFFERENCE, POLE, ZONE, RULE = range(6)
@@ -26,7 +27,10 @@ SUM, SLOPE, ERROR = range(3)
 K_M, K_FVP, K_FVN, K_QV, K_QF, K_R_Y = range(6)
 # What one sample leaves besides the command, then what the next one needs.
 WANTED, RAW, ADDED, SPEED = range(4)
-R_MOVED, INTEGRAL_SUM, U_BEFORE = range(3)
+# A reference within so many times its speed is a path, and no step; one that got ahead is caught
+# up with by so many times the acceleration.
+PATH_SPEED, PATH_ACCELERATION = 3.0, 4.0
+R_MOVED, INTEGRAL_SUM, U_BEFORE, R_STEP, R_BEFORE = range(5)
 
 
 class Law(NamedTuple):
@@ -35,13 +39,15 @@ class Law(NamedTuple):
     position: RST_LAW with R, S and W, or PID_LAW with pid (6,). W, of the length of S: how what a
     clipped command did not carry out is forgotten, W u = T r - R y + (W - S) taken. b_r, a_r: the
     filter T B_m/A_m of the reference. friction: NO_COUNTERMEASURE, COMPENSATOR with law (14,),
-    DISTURBANCE or KALMAN with kalman (6,), period h [s]; b_v ... a_c: the filters of velocity (of
-    the force, DISTURBANCE), error (of the position, DISTURBANCE) and C.
+    DISTURBANCE, KALMAN with kalman (6,), or FEED_FORWARD with law (7,); period h [s]; b_v ... a_c:
+    the filters of velocity (of the force, DISTURBANCE; of the reference, FEED_FORWARD), error (of
+    the position, DISTURBANCE; acceleration of the reference, FEED_FORWARD) and C.
 
     k_i, k_int: gains of the force error [V/N] and of its sum; k_a: of a motor, whose position
     controller wants volts, or 0; limit: of the command [V]; force_limit: of the force reference
-    [N]; rate: what the reference may move in a sample [m]; each may be infinite. ratio: samples of
-    the force loop in one of the position controller.
+    [N]; rate: what the reference may move in a sample [m], acceleration: by how much that may
+    change from one to the next, with which goes a finite rate; each may be infinite. ratio: samples
+    of the force loop in one of the position controller.
     """
 
     position: int
@@ -67,13 +73,15 @@ class Law(NamedTuple):
     limit: float
     force_limit: float
     rate: float
+    acceleration: float
     ratio: int
 
 
 class Memory(NamedTuple):
     """A servo's state: controller, PID (3,), filters of reference, velocity, error and C, Kalman
-    filter (12,), what the last sample left (4,), reference moved, sum of the force error and a
-    motor's command (3,), the force loop's samples since the position controller's turn (1,)."""
+    filter (12,), what the last sample left (4,), reference moved, sum of the force error, a motor's
+    command, the reference's last step and the reference itself (5,), the force loop's samples since
+    the position controller's turn (1,)."""
 
     x: Array
     pid: Array
@@ -125,7 +133,41 @@ def friction_force(c: Law, s: Memory, r: float, y: float, F: float) -> float:
     elif c.friction == KALMAN:
         kalman_step(c.kalman, s.kalman, c.h, y, F)
         last[SPEED], last[RAW], last[ADDED] = s.kalman[1], s.kalman[2], s.kalman[2]
+    elif c.friction == FEED_FORWARD:
+        last[SPEED] = filtered(c.b_v, c.a_v, s.z_v, r)
+        last[RAW] = filtered(c.b_e, c.a_e, s.z_e, r)
+        last[ADDED] = feed_forward_force(c.law, last[SPEED], last[RAW])
     return float(last[ADDED])
+
+
+@compiled_exact
+def profiled(rate: float, acceleration: float, held: Array, r: float) -> float:
+    """The reference [m] moved towards r within its speed and acceleration, so that it stops there.
+
+    One that goes on as a path, within some times of the speed, is taken as it is; one that has got
+    ahead is caught up with. From a speed v the way to a stop is v^2/(2 a) at most.
+    """
+    left, step = r - held[R_MOVED], held[R_STEP]
+    behind, pace = held[R_BEFORE] - held[R_MOVED], r - held[R_BEFORE]
+    held[R_BEFORE] = r
+    most, change = PATH_SPEED * rate, PATH_ACCELERATION * acceleration
+    path = behind == 0.0 and abs(pace) <= most
+    if pace == 0.0 or abs(pace) > most:  # it rests, perhaps after a step
+        pace, most, change = 0.0, rate, acceleration
+    if path or (abs(left) <= most and abs(left - step) <= change):
+        held[R_STEP] = left
+        held[R_MOVED] = r
+    else:
+        way = 1.0 if left >= 0.0 else -1.0
+        ahead, speed = abs(left), way * (step - pace)
+        faster = speed + change
+        if faster > 0.0 and ahead - faster < faster * faster / (2.0 * change):
+            faster = speed
+            if speed > 0.0 and ahead - speed < speed * speed / (2.0 * change):
+                faster = speed - change
+        held[R_STEP] = min(max(pace + way * faster, -most), most)
+        held[R_MOVED] += held[R_STEP]
+    return float(held[R_MOVED])
 
 
 @compiled_exact
@@ -166,13 +208,17 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
     is the force reference that gives it.
     """
     aim = r
-    if c.rate < math.inf:
+    if c.acceleration < math.inf:
+        aim = profiled(c.rate, c.acceleration, s.held, r)
+    elif c.rate < math.inf:
         aim = s.held[R_MOVED] + min(max(r - s.held[R_MOVED], -c.rate), c.rate)
         s.held[R_MOVED] = aim
     acts = c.ratio == 1 or s.turn[0] == 0
     asked = position_force(c, s, aim, y) if acts else s.last[WANTED]
     added = 0.0
-    if c.friction != NO_COUNTERMEASURE:
+    if c.friction == FEED_FORWARD:
+        added = friction_force(c, s, aim, y, 0.0) if acts else s.last[ADDED]
+    elif c.friction != NO_COUNTERMEASURE:
         force = c.k_a * s.held[U_BEFORE] if c.k_a != 0.0 else F
         added = friction_force(c, s, aim, y, force) if acts else s.last[ADDED]
     if c.k_a != 0.0 or c.k_i == 0.0:
@@ -193,7 +239,7 @@ def servo_step(c: Law, s: Memory, r: float, y: float, F: float, shake: float) ->
         u = min(max(u + shake, -c.limit), c.limit)
     if acts:
         position_moved(c, s, y, asked, taken)
-    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE:
+    if c.k_a != 0.0 and c.friction != NO_COUNTERMEASURE and c.friction != FEED_FORWARD:
         s.held[U_BEFORE] = u
     if c.ratio > 1:
         s.turn[0] = s.turn[0] + 1 if s.turn[0] + 1 < c.ratio else 0

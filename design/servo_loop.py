@@ -26,6 +26,8 @@ from identification.simulation.karnopp_step import (
 )
 
 SERVO_ROWS = 9
+# A load behind a spring: its mass [kg] (0: none), stiffness [N/m], damping [N s/m], sub-steps.
+LOAD_MASS, LOAD_STIFFNESS, LOAD_DAMPING, LOAD_STEPS = range(4)
 
 
 @compiled
@@ -40,6 +42,7 @@ def servo_kernel(
     gain: Array,
     history: Array,
     late: float,
+    load: Array,
     law: Law,
     memory: Memory,
     reference: Array,
@@ -55,16 +58,20 @@ def servo_kernel(
     Rows of out: y, v, F, u, position measured, then the position controller's force reference,
     F_comp, F_compf and its velocity. codes (k,), addresses (k, 3), q (k, P): the effects; signals
     base (k, n, S) + gain (k, S) F; history: the command after the dead zone, preceded by what it
-    was before the start; late: delay in samples; the rest as in `servo_step`.
+    was before the start; late: delay in samples; the rest as in `servo_step`. load (4,): a second
+    mass that the body, of its own mass alone, takes along by a spring (leapfrog steps).
     """
     plant = parameters(p, 0)
     y, v, F = start
+    steps = int(load[LOAD_STEPS]) if load[LOAD_MASS] > 0.0 else 1
+    dt = h / steps
     z, spare = np.zeros(len(codes)), np.zeros(len(codes))
     past = len(history) - len(modes)
     bristle = place_of(codes, ON_BRISTLE)
     motor = law.k_a != 0.0
     mode = STUCK if motor and v == 0.0 else settled_mode(plant, v, F)
     a, u = 0.0, 0.0
+    y_load, v_load = start[0], start[1]
     for k in range(len(modes)):
         now, s = k * h, base[:, k] + gain * F
         if k == 0:
@@ -80,10 +87,21 @@ def servo_kernel(
         out[0, k], out[1, k], out[2, k], out[3, k], out[4, k] = y, v, F, u, measured
         out[5, k], out[6, k] = memory.last[WANTED], memory.last[RAW]
         out[7, k], out[8, k] = memory.last[ADDED], memory.last[SPEED]
-        state = effect_step(
-            plant, count, codes, addresses, q, s, z, spare, bristle, now, (y, v, F, mode, a), u, g,
-            h,
-        )  # fmt: skip
+        state = (y, v, F, mode, a)
+        for j in range(steps):
+            pull = 0.0
+            if load[LOAD_MASS] > 0.0:
+                apart = state[0] - y_load + 0.5 * dt * (state[1] - v_load)
+                pull = load[LOAD_STIFFNESS] * apart + load[LOAD_DAMPING] * (state[1] - v_load)
+                gained = dt * pull / load[LOAD_MASS]
+                y_load += dt * (v_load + 0.5 * gained)
+                v_load += gained
+            held = (state[0], state[1], state[2] - pull, state[3], state[4])
+            moved = effect_step(
+                plant, count, codes, addresses, q, s, z, spare, bristle, now + j * dt, held, u, g,
+                dt,
+            )  # fmt: skip
+            state = (moved[0], moved[1], moved[2] + pull, moved[3], moved[4])
         # A body at rest that the new force moves has left at once.
         modes[k] = mode if v == 0.0 or mode != STUCK else state[3]
         y, v, F, mode, a = state

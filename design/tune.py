@@ -8,7 +8,7 @@ then chooses T.
 
 import math
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache, partial
 
 import numpy as np
@@ -48,6 +48,8 @@ SLOWEST_ZERO = 0.9995  # a plant zero nearer to 1 would never decay
 SAME_AS_ZERO = 1e-4  # between a pole and the zero it was placed on
 SURELY = 0.97  # of a goal, below which a quick look at the margins settles that it is missed
 NEAREST = 12  # loops that miss a goal, of which the margins are known where none keeps all
+SWINGING = 0.15  # damping below which a pole or zero of a plant is that of an elastic part
+SWINGS_ON = 0.5  # of its decay without a loop, that an elastic part may decay with in one
 USUAL_DEMAND = Demand()
 
 
@@ -67,11 +69,16 @@ class Goals:
 
 @dataclass(frozen=True)
 class Asked:
-    """A specification by hand: dominant (w_n [rad/s], zeta), auxiliary poles z; None: searched."""
+    """A specification by hand: dominant (w_n [rad/s], zeta), auxiliary poles z; None: searched.
+
+    whole: the machine's plant (A, B), whose margins count, where poles are placed on its body
+    alone.
+    """
 
     dominant: tuple[float, float] | None = None
     auxiliary: tuple[complex, ...] | None = None
     integrator: bool = True
+    whole: tuple[Array, Array] | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +139,7 @@ def tune_rst(
 
     free = A.size - 1 + B.size - 1 + len(H_S) - 1 - 2
     others = _auxiliary(A, h, max(free, 0))
-    plants = ((A, B), *corners)
+    plants = (asked.whole or (A, B), *corners)
     holds = _inside(plants, goals, drawn)
     found = _best(plants, h, asked, goals, design, others, holds)
     slow = _slow_zeros(B)[:free]
@@ -176,7 +183,7 @@ def tune_pid(
         return found.rst, found
 
     others = _auxiliary(A, h, min(A.size - 1, 2))
-    plants = ((A, B), *corners)
+    plants = (asked.whole or (A, B), *corners)
     found = _best(plants, h, asked, goals, design, others, _inside(plants, goals, drawn))
     if found.pid is not None and found.pid.gains is not None:
         candidates = pid_candidates(found.pid.gains, h)
@@ -317,7 +324,7 @@ def _judged(
     margin = margins(A, B, controller)
     missed = goals_missed(margin, goals, integrates(A, controller))
     if search:
-        missed = (*missed, *_laggards(margin, poles[0], slow))
+        missed = (*missed, *_laggards(margin, poles[0], slow, swinging_decay(A, B, controller.h)))
     worst: float | None = margin.modulus
     if not missed:
         worst, missed = inside(controller, margin.modulus)
@@ -358,13 +365,35 @@ def _worst_missed(worst: float | None, goals: Goals) -> tuple[str, ...]:
     return ()
 
 
+def swinging_decay(A: Array, B: Array, h: float) -> float:
+    """How slowly a plant's own swinging decays [1/s]: the least of its poles and zeros that swing,
+    which a loop moves from the ones to the others; infinite where none does."""
+    every = [complex(z) for c in (A, trim(B[np.flatnonzero(B)[0] :])) for z in roots(c)]
+    return min((-math.log(abs(z)) / h for z in every if _swings(z, h)), default=math.inf)
+
+
+def _swings(z: complex, h: float) -> bool:
+    """Whether a pole or zero is that of an elastic part."""
+    if not (1e-6 < abs(z) < 1.0 and abs(z.imag) > 1e-9):
+        return False
+    return frequency_and_damping(z, h)[1] < SWINGING
+
+
 def _laggards(
-    found: Margins, dominant: tuple[float, float], slow: tuple[complex, ...]
+    found: Margins, dominant: tuple[float, float], slow: tuple[complex, ...], swinging: float
 ) -> tuple[str, ...]:
-    """Whether a pole is so slow that the dominant ones do not dominate, in words."""
-    moving = [
-        abs(z) for z in found.poles.tolist() if all(abs(z - one) > SAME_AS_ZERO for one in slow)
-    ]
+    """Whether a pole is so slow that the dominant ones do not dominate, in words.
+
+    swinging: decay [1/s] of an elastic part, which no loop hastens that leaves it alone.
+    """
+    h = found.h
+
+    def waited_for(z: complex) -> bool:
+        if any(abs(z - one) <= SAME_AS_ZERO for one in slow):
+            return False
+        return not (_swings(z, h) and -math.log(abs(z)) / h > SWINGS_ON * swinging)
+
+    moving = [abs(z) for z in found.poles.tolist() if waited_for(complex(z))]
     slowest = -math.log(max(*moving, 1e-12)) / found.h
     asked = -math.log(float(np.abs(pole_pair(*dominant, found.h)).max())) / found.h
     if slowest >= LAGGARD * asked:

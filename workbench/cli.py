@@ -37,7 +37,7 @@ COMMANDS = {
     "axis-test": "Test an axis by one log: green, yellow or red, on one page.",
     "response": "Show the machine over frequency: Bode, resonances, margins.",
     "predict": "Predict force and position of a log by a model.",
-    "design": "Design PID and RST controllers for a model.",
+    "design": "Design PID, RST and P-PI controllers for a model.",
     "experiment": "Find the run to make next: the reference that tells most.",
     "validate": "Check a design on a plant in simulation.",
     "export": "Write a design as code, a model as tables for its control.",

@@ -21,7 +21,7 @@ from workbench.output import OutputFolder, emit, output_options, progress
 
 if TYPE_CHECKING:
     from design.tune import Asked
-    from workbench.documents.design import From
+    from workbench.documents.design import From, Structure
     from workbench.documents.model import Model
     from workbench.steps.loop_figures import Limits
     from workbench.steps.robust.robust import RobustAsked
@@ -31,9 +31,10 @@ ROBUST_ONLY = (
     "draws", "probability", "staircase", "standstill", "tracking", "overshoot", "force", "machine",
     "where", "seed",
 )  # fmt: skip
+NOT_WITH_ROBUST = ("structures", "response_file")
 NOT_FOR_VELOCITY = (
     *(name for name in ROBUST_ONLY if name != "overshoot"),
-    "robust", "poles", "auxiliary", "source", "card", "effects",
+    "robust", "poles", "auxiliary", "source", "card", "effects", *NOT_WITH_ROBUST,
 )  # fmt: skip
 
 
@@ -50,6 +51,16 @@ NOT_FOR_VELOCITY = (
     "searched]",
 )  # fmt: skip
 @click.option("--integrator/--no-integrator", default=True, show_default=True)
+@click.option(
+    "--structure", "structures", type=click.Choice(["rst", "pid", "p-pi"]), multiple=True,
+    help="Controllers to design; may be given several times.  [default: rst and pid; p-pi too where"
+    " two masses swing or the machine has one now]",
+)  # fmt: skip
+@click.option(
+    "--response", "response_file", type=click.Path(path_type=Path), metavar="FILE",
+    help="response.json whose lowest anti-resonance and resonance the plant has.  [default: the"
+    " model's own]",
+)  # fmt: skip
 @click.option(
     "--from",
     "source",
@@ -102,6 +113,8 @@ def command(
     poles: str | None,
     auxiliary: str | None,
     integrator: bool,
+    structures: "tuple[Structure, ...]",
+    response_file: Path | None,
     source: Literal["physical", "arx"] | None,
     design_period: float | None,
     modulus: float,
@@ -122,10 +135,10 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> int:
-    """Design PID and RST controllers by pole placement, with margins and the compensator.
+    """Design PID and RST controllers by pole placement, and P-PI cascades, with their margins.
 
     Writes design.json and report.html. Where no poles are asked, the fastest loop is searched that
-    keeps the margins.
+    keeps the margins; against a resonance the cascade gets a notch or a low-pass where that pays.
 
     With --robust: the poles, the integrator and the compensator that do best over the machines that
     the model's errors (and the machine's drift so far) allow; robust.json holds what that promises.
@@ -145,6 +158,7 @@ def command(
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
+    _refuse_beside(click.get_current_context(), robust, "p-pi" in structures and not integrator)
     if robust:
         from workbench.steps.robust.robust import RobustAsked
 
@@ -152,16 +166,21 @@ def command(
         wanted = RobustAsked(draws, probability, limits, staircase, seen, seed)
         return _robust(model, model_file, wanted, asked, (source, design_period), as_json, out)
     _only_robust(click.get_current_context())
-    kept = _kept(integrator, source, design_period, card, effects)
-    plant = (source, design_period)
+    from workbench.steps.elastic import with_response
+
+    model = with_response(model, response_file)
+    kept = _kept(integrator, source, design_period, card, effects, structures, response_file)
+    plant = (source, design_period, structures)
     return _nominal(model, (model_file, card, kept), limits, asked, plant, as_json, out)
 
 
 def _nominal(
     model: "Model", given: tuple[Path, str | None, tuple[str, ...]], limits: "Limits",
-    asked: "Asked", plant: "tuple[From | None, float | None]", as_json: bool, out: Path | None,
+    asked: "Asked", plant: "tuple[From | None, float | None, tuple[Structure, ...]]",
+    as_json: bool, out: Path | None,
 ) -> int:  # fmt: skip
-    """given: model file and card, and the options that another try keeps."""
+    """given: model file and card, and the options that another try keeps; plant: what it is taken
+    from, the period, and the structures."""
     from design.tune import Goals
     from workbench.documents.design_file import design_document
     from workbench.report.design_tables import design_view
@@ -169,14 +188,17 @@ def _nominal(
     from workbench.report.reports import design_report
     from workbench.steps.design import design, effort_limit
 
-    (model_file, card, kept), (source, period) = given, plant
+    (model_file, card, kept), (source, period, structures) = given, plant
     goals = Goals(limits.modulus, limits.delay, effort_limit(model))
     with (
         refused_with(without_design(model, card)),
         OutputFolder("design", out, now=datetime.now()) as folder,
     ):
         with progress("designing", as_json=as_json):
-            found = design(model, asked, goals=goals, source=source, period=period)
+            found = design(
+                model, asked, goals=goals, source=source, period=period,
+                structures=structures or None,
+            )  # fmt: skip
         document = design_document(found)
         folder.write_json("design.json", document)
         folder.write_text("report.html", design_report(found, model.rotary))
@@ -225,6 +247,20 @@ def _only_robust(context: click.Context) -> None:
             raise click.UsageError(
                 f"{option.opts[0]} has no meaning without --robust; add it, or leave it out."
             )
+
+
+def _refuse_beside(context: click.Context, robust: bool, without_integrator: bool) -> None:
+    """Raises a usage error where options are given that do not go together."""
+    if without_integrator:
+        raise click.UsageError("a P-PI cascade has an integrator; leave out --no-integrator.")
+    for option in context.command.params:
+        given = context.get_parameter_source(option.name or "")
+        if (
+            robust
+            and option.name in NOT_WITH_ROBUST
+            and given is click.core.ParameterSource.COMMANDLINE
+        ):
+            raise click.UsageError(f"{option.opts[0]} has no meaning with --robust; leave it out.")
 
 
 def _robust(
@@ -280,9 +316,13 @@ def _kept(
     period: float | None,
     card: str | None,
     effects: tuple[Path, ...],
+    structures: "tuple[Structure, ...]",
+    response_file: Path | None,
 ) -> tuple[str, ...]:
     """The options that another try keeps."""
     return (
+        *(word for one in structures for word in ("--structure", one)),
+        *(("--response", str(response_file)) if response_file else ()),
         *(() if integrator else ("--no-integrator",)),
         *(("--from", source) if source else ()),
         *(("--design-period", f"{period:g}") if period else ()),

@@ -49,14 +49,14 @@ WHAT_NEXT = {
 )
 @click.option(
     "--controller",
-    type=click.Choice(["rst", "pid", "present"]),
+    type=click.Choice(["rst", "pid", "p-pi", "present"]),
     help="Which one; 'present' is the machine's own, of its card.  [default: the recommended one]",
 )
 @click.option(
     "--compensator/--no-compensator",
     default=None,
     help="With the friction compensator beside it.  [default: as recommended; of another"
-    " controller with, of the present one without]",
+    " controller with, of the present one and of a P-PI, which feeds friction forward, without]",
 )
 @click.option(
     "--precision",

@@ -11,13 +11,16 @@ from typing import Literal
 
 import numpy as np
 
+from design.cascade import CascadeGains
 from design.compensator import Compensator
 from design.drive_law import DriveLaw, drive_law
+from design.feed_forward import FeedForward
 from design.filters import CompensatorFilters
 from design.loop_frequencies import LoopFrequencies
 from design.margins import Margins
 from design.pid import PIDGains
 from design.rst import RST
+from design.series_filters import SeriesFilter
 from identification.errors import BadModel
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES, Karnopp
@@ -26,14 +29,16 @@ from workbench.documents.drive import Command, ForceLoop, Output, Present
 from workbench.documents.model import used
 
 From = Literal["physical", "arx"]
-Recommended = Literal["rst", "pid", "none"]
+Structure = Literal["rst", "pid", "p-pi"]
+DESIGNED_STRUCTURES: tuple[Structure, ...] = ("rst", "pid", "p-pi")
+Recommended = Literal["rst", "pid", "p-pi", "none"]
 
 
 @dataclass(frozen=True)
 class Linear:
     """The sampled plant a design rests on, force reference [N] to position [m], and why this one.
 
-    m [kg], F_v [N s/m] are None for an ARX plant.
+    m [kg], F_v [N s/m] are None for an ARX plant. resonance: that of two masses, as a model has it.
     """
 
     source: From
@@ -43,6 +48,7 @@ class Linear:
     h: float
     m: Estimate | None
     F_v: Estimate | None
+    resonance: Mapping[str, Estimate] | None = None
 
 
 @dataclass(frozen=True)
@@ -78,7 +84,9 @@ class Controller:
     dominant: (w_n [rad/s], zeta); auxiliary: poles z as (re, im). rate: the reference is moved at
     most at this speed [m/s], None for any; lag [s] and overshoot [-] as `design.tracking` has
     them. missed: goals not kept. gains: of a PID in parallel form. W: its anti-windup as
-    `design.drive_law` has it, None in older files.
+    `design.drive_law` has it, None in older files. Of a P-PI cascade: its gains, the notch or
+    low-pass that R, S and T hold too, what is fed forward beside it, and the acceleration [m/s^2]
+    with which the reference is moved at most.
     """
 
     R: tuple[float, ...]
@@ -95,6 +103,10 @@ class Controller:
     gains: PIDGains | None = None
     note: str | None = None
     W: tuple[float, ...] | None = None
+    cascade: CascadeGains | None = None
+    series: SeriesFilter | None = None
+    feed_forward: FeedForward | None = None
+    acceleration: float | None = None
 
     @property
     def rst(self) -> RST:
@@ -146,11 +158,15 @@ class CompensatorValues:
 
 @dataclass(frozen=True)
 class Recommendation:
-    """Which controller, with or without the compensator, and why, in one line with numbers."""
+    """Which controller, with or without the compensator, and why, in one line with numbers.
+
+    keep_present: whether the controller that the machine has now is as good, and may stay.
+    """
 
     controller: Recommended
     compensator: bool
     why: str
+    keep_present: bool = False
 
 
 @dataclass(frozen=True)
@@ -178,11 +194,13 @@ class Design:
     present: Present | None = None
     recommendation: Recommendation | None = None
     read: tuple[str, ...] = field(default=(), compare=False)
+    p_pi: Controller | None = None
 
     @property
     def controllers(self) -> dict[str, Controller]:
         """The controllers that exist, by name."""
-        return {k: c for k, c in (("rst", self.rst), ("pid", self.pid)) if c is not None}
+        every = (self.rst, self.pid, self.p_pi)
+        return {k: c for k, c in zip(DESIGNED_STRUCTURES, every, strict=True) if c is not None}
 
     @property
     def output(self) -> Output:

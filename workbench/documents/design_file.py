@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from design.cascade import CascadeGains
 from design.pid import PIDGains
+from design.series_filters import FilterKind, SeriesFilter
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import friction_units, shown
 from workbench.cards.units import Motion
@@ -47,6 +49,7 @@ class _LinearFile:
     h: Estimate
     m: Estimate | None
     F_v: Estimate | None
+    resonance: Mapping[str, Estimate] | None = None
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,45 @@ class GainsFile:
     eps: Estimate
     b: Estimate
     c: Estimate
+
+
+@dataclass(frozen=True)
+class CascadeFile:
+    """`CascadeGains` as a result has them, and k_p in the unit of the drive's command."""
+
+    k_v: Estimate
+    k_p: Estimate
+    T_n: Estimate
+    eps: Estimate
+    v_ff: Estimate
+    k_p_command: Estimate | None = None
+
+
+@dataclass(frozen=True)
+class SeriesFile:
+    """`SeriesFilter` as a result has it, its width at -3 dB and depth, and b/a in z^-1."""
+
+    kind: FilterKind
+    frequency: Estimate
+    numerator: Estimate
+    denominator: Estimate
+    width: Estimate
+    depth_db: float | None
+    b: tuple[float, ...]
+    a: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class FeedForwardFile:
+    """`FeedForward` as a result has it."""
+
+    F_cp: Estimate
+    F_cn: Estimate
+    F_vp: Estimate
+    F_vn: Estimate
+    band: Estimate
+    m: Estimate
+    most: Estimate
 
 
 @dataclass(frozen=True)
@@ -81,6 +123,10 @@ class ControllerFile:
     gains: GainsFile | None = None
     note: str | None = None
     law: LawFile | None = None
+    cascade: CascadeFile | None = None
+    filter: SeriesFile | None = None
+    feed_forward: FeedForwardFile | None = None
+    reference_acceleration: Estimate | None = None
 
 
 @dataclass(frozen=True)
@@ -110,6 +156,7 @@ class DesignFile:
     command: CommandFile | None = None
     present: PresentFile | None = None
     recommendation: Recommendation | None = None
+    p_pi: ControllerFile | None = None
     schema: Literal["design/2"] = "design/2"
 
 
@@ -156,10 +203,11 @@ def as_file(found: Design, units: FileUnits) -> DesignFile:
     return DesignFile(
         card=found.card,
         motion=found.motion,
-        plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v),
+        plant=_LinearFile(p.source, p.why, p.A, p.B, Estimate(p.h, "s"), p.m, p.F_v, p.resonance),
         force=None if found.force is None else force_file(found.force, limit, drive),
         rst=controller(found.rst),
         pid=controller(found.pid),
+        p_pi=controller(found.p_pi),
         refused=found.refused,
         recommended=found.recommended,
         compensator=_CompensatorFile(
@@ -203,7 +251,50 @@ def _controller_file(
         gains=None if one.gains is None else _gains_file(one.gains, units),
         note=one.note,
         law=law_file(one.law(command), output, command.limit, units.drive) if command else None,
-    )
+        cascade=None if one.cascade is None else _cascade_file(one.cascade, command, units),
+        filter=None if one.series is None else _series_file(one.series),
+        feed_forward=None if one.feed_forward is None else FeedForwardFile(
+            **{name: Estimate(getattr(one.feed_forward, name), unit)
+               for name, unit in feed_forward_units(units)}
+        ),
+        reference_acceleration=None if one.acceleration is None else Estimate(
+            one.acceleration, f"{units.length}/s^2"
+        ),
+    )  # fmt: skip
+
+
+def _cascade_file(gains: CascadeGains, command: Command | None, units: FileUnits) -> CascadeFile:
+    per = command.force_per_command if command else None
+    values = {name: Estimate(getattr(gains, name), unit) for name, unit in cascade_units(units)}
+    own = None
+    if command and per and command.unit != units.drive.force:
+        unit = f"{command.unit} s/{units.length}"
+        own = Estimate(gains.k_p / per, unit)
+    return CascadeFile(**values, k_p_command=own)
+
+
+def _series_file(one: SeriesFilter) -> SeriesFile:
+    made = one.filter
+    return SeriesFile(
+        one.kind, Estimate(one.frequency, "Hz"), Estimate(one.numerator, "1"),
+        Estimate(one.denominator, "1"), Estimate(one.width, "Hz"), one.depth_db, made.b, made.a,
+    )  # fmt: skip
+
+
+def cascade_units(units: FileUnits) -> list[tuple[str, str]]:
+    """Names and units of a cascade's gains."""
+    per_speed = f"{units.drive.force} s/{units.length}"
+    return [("k_v", "1/s"), ("k_p", per_speed), ("T_n", "s"), ("eps", "s"), ("v_ff", "1")]
+
+
+def feed_forward_units(units: FileUnits) -> list[tuple[str, str]]:
+    """Names and units of a feed-forward's numbers."""
+    force, friction = units.drive.force, units.friction
+    viscous = [(name, friction[name]) for name in ("F_vp", "F_vn")]
+    return [
+        ("F_cp", force), ("F_cn", force), *viscous, ("band", units.speed), ("m", friction["m"]),
+        ("most", force),
+    ]  # fmt: skip
 
 
 def gain_units(units: FileUnits) -> list[tuple[str, str]]:

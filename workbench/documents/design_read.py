@@ -6,19 +6,27 @@ from pathlib import Path
 
 import numpy as np
 
+from design.cascade import CascadeGains
+from design.feed_forward import FeedForward
 from design.pid import PIDGains
+from design.series_filters import SeriesFilter
 from identification.errors import BadModel, BadSpecification
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import converted, in_unit
 from workbench.documents.contradictions import refuse_apart, refuse_unequal
-from workbench.documents.design import CompensatorValues, Controller, Design, Linear
+from workbench.documents.design import CompensatorValues, Controller, Design, Linear, Structure
 from workbench.documents.design_file import (
     DESIGN_SCHEMA,
+    CascadeFile,
     ControllerFile,
     DesignFile,
+    FeedForwardFile,
     FileUnits,
     GainsFile,
+    SeriesFile,
     as_file,
+    cascade_units,
+    feed_forward_units,
     gain_units,
     units_of,
 )
@@ -80,14 +88,18 @@ def _refuse_changed_units(pairs: tuple[tuple[str, Estimate, Estimate], ...], fou
         refuse_unequal("[plant.m]", one, ours, used(same), f"[{start}m]")
         refuse_unequal(f"[{start}m]", other, same, used(ours), "[plant.m]")
     for name in found.controllers:
-        (one, ours), (other, same) = at[f"{name}.h"], at["plant.h"]
-        refuse_unequal(f"[{name}.h]", one, ours, used(same), "[plant.h]")
-        refuse_unequal("[plant.h]", other, same, used(ours), f"[{name}.h]")
+        place = name.replace("-", "_")
+        (one, ours), (other, same) = at[f"{place}.h"], at["plant.h"]
+        refuse_unequal(f"[{place}.h]", one, ours, used(same), "[plant.h]")
+        refuse_unequal("[plant.h]", other, same, used(ours), f"[{place}.h]")
 
 
 def _refuse_other_laws(written: DesignFile, found: Design, units: FileUnits) -> None:
     """Raises BadModel where a law is not the controller beside it."""
-    for name, one in (("rst", written.rst), ("pid", written.pid)):
+    every: tuple[tuple[Structure, ControllerFile | None], ...] = (
+        ("rst", written.rst), ("pid", written.pid), ("p-pi", written.p_pi),
+    )  # fmt: skip
+    for name, one in every:
         if one is None or one.law is None:
             continue
         if found.command is None:
@@ -117,10 +129,12 @@ def _from_file(found: DesignFile, units: FileUnits) -> Design:
             positive(p.h, "s", "plant.h"),
             None if p.m is None else in_unit(p.m, mass, "[plant.m]"),
             None if p.F_v is None else in_unit(p.F_v, viscous, "[plant.F_v]"),
+            p.resonance,
         ),
         force=None if found.force is None else force_of(found.force, drive, "force"),
         rst=None if found.rst is None else _controller(found.rst, units, "rst"),
         pid=None if found.pid is None else _controller(found.pid, units, "pid"),
+        p_pi=None if found.p_pi is None else _controller(found.p_pi, units, "p_pi"),
         refused=found.refused,
         recommended=found.recommended,
         compensator=CompensatorValues(
@@ -162,7 +176,50 @@ def _controller(one: ControllerFile, units: FileUnits, where: str) -> Controller
         gains=None if one.gains is None else _gains(one.gains, units, f"{where}.gains"),
         note=one.note,
         W=None if one.law is None else one.law.W,
+        cascade=None if one.cascade is None else _cascade(one.cascade, units, f"{where}.cascade"),
+        series=None if one.filter is None else _series(one.filter, one.h, f"{where}.filter"),
+        feed_forward=None if one.feed_forward is None else _feed_forward(
+            one.feed_forward, units, f"{where}.feed_forward"
+        ),
+        acceleration=None if one.reference_acceleration is None else positive(
+            one.reference_acceleration, f"{units.length}/s^2", f"{where}.reference_acceleration"
+        ),
+    )  # fmt: skip
+
+
+def _cascade(found: CascadeFile, units: FileUnits, where: str) -> CascadeGains:
+    values = {
+        name: number(getattr(found, name), unit, f"{where}.{name}")
+        for name, unit in cascade_units(units)
+    }
+    return CascadeGains(**values)
+
+
+def _series(found: SeriesFile, h: Estimate, where: str) -> SeriesFilter:
+    """The filter; raises BadModel where its coefficients are not those of its numbers."""
+    one = SeriesFilter(
+        found.kind,
+        positive(found.frequency, "Hz", f"{where}.frequency"),
+        number(found.numerator, "1", f"{where}.numerator"),
+        positive(found.denominator, "1", f"{where}.denominator"),
+        positive(h, "s", f"{where}.h"),
     )
+    made = one.filter
+    for key, ours, theirs in (("b", made.b, found.b), ("a", made.a, found.a)):
+        if len(ours) != len(theirs) or not np.allclose(ours, theirs, rtol=1e-9, atol=1e-12):
+            raise BadModel(
+                f"[{where}] {key} is not the {found.kind} of its numbers; run 'workbench design'"
+                " again"
+            )
+    return one
+
+
+def _feed_forward(found: FeedForwardFile, units: FileUnits, where: str) -> FeedForward:
+    values = {
+        name: number(getattr(found, name), unit, f"{where}.{name}")
+        for name, unit in feed_forward_units(units)
+    }
+    return FeedForward(**values)
 
 
 def _gains(found: GainsFile, units: FileUnits, where: str) -> PIDGains:

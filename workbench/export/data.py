@@ -1,10 +1,12 @@
 """A controller as values: JSON with the program itself, MAT with what a MATLAB model needs."""
 
 import io
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from design.feed_forward import FeedForward
 from design.program import (
     Assign,
     Choice,
@@ -18,6 +20,7 @@ from design.program import (
     Statement,
     Variable,
 )
+from design.servo import Compensation
 from identification.model.karnopp import NAMES
 from identification.signals.filters import slope_filter
 from workbench.export.exported import Exported
@@ -81,6 +84,7 @@ def values_of(what: Exported) -> dict[str, Any]:
     """
     loop, units = what.loop, what.program
     law, force, compensation = loop.law, loop.force, loop.compensation
+    own = what.design.p_pi if what.controller == "p-pi" else None
     return {
         "law": {"R": law.R, "S": law.S, "T": law.T, "W": law.W, "h": law.h},
         "force": None if force is None else {"k_i": force.k_i, "T_i": force.T_i, "h": force.h},
@@ -89,13 +93,20 @@ def values_of(what: Exported) -> dict[str, Any]:
         "rate": loop.rate,
         "k_a": loop.k_a,
         "units": {one.name: one.unit for one in (*units.inputs, units.output)},
-        "compensator": None if compensation is None else _compensator(what),
-    }
+        "compensator": _compensator(what),
+        "feed_forward": asdict(compensation) if isinstance(compensation, FeedForward) else None,
+        "acceleration": loop.acceleration,
+        "cascade": None if own is None or own.cascade is None else asdict(own.cascade),
+        "filter": None if own is None or own.series is None else {
+            **asdict(own.series), "b": own.series.filter.b, "a": own.series.filter.a,
+        },
+    }  # fmt: skip
 
 
-def _compensator(what: Exported) -> dict[str, Any]:
-    """The compensator (4) and its filters, each as b, a in z^-1."""
-    assert what.loop.compensation is not None
+def _compensator(what: Exported) -> dict[str, Any] | None:
+    """The compensator (4) and its filters, each as b, a in z^-1; None where there is none."""
+    if not isinstance(what.loop.compensation, Compensation):
+        return None
     own, filters = what.loop.compensation.compensator, what.loop.compensation.filters
     parts = {
         "A": filters.velocity,

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from design.controller_program import ProgramUnits, controller_program
+from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.program import Program
 from design.program_run import SelfTest, self_test
@@ -16,6 +17,7 @@ from design.servo import Compensation
 from identification.errors import BadModel
 from workbench.cards.parameter_units import shown
 from workbench.documents.design import Design
+from workbench.steps.cascade import filter_words
 from workbench.steps.closed_loop import DrivenLoop
 
 Precision = Literal["double", "single"]
@@ -56,9 +58,10 @@ def exported(
 ) -> Exported:
     """The controller of the design, by default the recommended one, as a program.
 
-    controller: "rst", "pid" or "present". compensated: with the friction compensator, by default
-    as recommended, and beside all others but the present one. Raises BadModel where the design has
-    no such controller, recommends none, or is of a version that does not say what the drive runs.
+    controller: "rst", "pid", "p-pi" or "present". compensated: with the friction compensator, by
+    default as recommended, and beside all others but the present one and a P-PI. Raises BadModel
+    where the design has no such controller, recommends none, or is of a version that does not say
+    what the drive runs.
     """
     chosen = controller or found.recommended
     if chosen == "none":
@@ -67,6 +70,8 @@ def exported(
     loop = _loop_of(found, chosen)
     if compensated is None:
         compensated = _compensated(found, chosen)
+    if compensated and isinstance(loop.compensation, FeedForward):
+        raise BadModel("a P-PI cascade feeds friction forward, and takes no compensator beside it")
     if compensated:
         if loop.direct:
             raise BadModel("a command without a force loop takes no compensator beside it")
@@ -89,7 +94,7 @@ def _compensated(found: Design, chosen: str) -> bool:
     told = found.recommendation
     if told is not None and told.controller == chosen:
         return told.compensator
-    return chosen != "present"
+    return chosen not in ("present", "p-pi")
 
 
 def _loop_of(found: Design, chosen: str) -> DrivenLoop:
@@ -108,7 +113,10 @@ def _loop_of(found: Design, chosen: str) -> DrivenLoop:
     if one is None:
         reason = found.refused.get(chosen, "it is not there")
         raise BadModel(f"the design has no controller {chosen!r}: {reason}")
-    return DrivenLoop(one.law(found.command), found.force, one.rate, limit, None, k_a)
+    return DrivenLoop(
+        one.law(found.command), found.force, one.rate, limit, one.feed_forward, k_a,
+        acceleration=one.acceleration,
+    )  # fmt: skip
 
 
 def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
@@ -118,7 +126,9 @@ def _remarks(found: Design, chosen: str, loop: DrivenLoop) -> tuple[str, ...]:
     if chosen not in (found.recommended, "present"):
         out.append(f"the design recommends {found.recommended!r}, not this controller")
     told = found.recommendation
-    beside = loop.compensation is not None
+    if (one := found.p_pi) is not None and chosen == "p-pi" and one.series is not None:
+        out.append(f"R, S and T hold the {filter_words(one.series)}")
+    beside = isinstance(loop.compensation, Compensation)
     if told is not None and told.controller == chosen and told.compensator != beside:
         out.append(
             f"the design recommends it {'with' if told.compensator else 'without'} the compensator"

@@ -5,6 +5,7 @@ from functools import cache
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
+from design.feed_forward import FeedForward
 from workbench.export.exported import Exported
 
 if TYPE_CHECKING:
@@ -48,8 +49,10 @@ def rows(values: Iterable[str]) -> list[str]:
 
 def title_of(what: Exported) -> str:
     """One line that says what a file is."""
-    kind = {"rst": "RST", "pid": "PID", "present": "present"}[what.controller]
+    kind = {"rst": "RST", "pid": "PID", "p-pi": "P-PI", "present": "present"}[what.controller]
     beside = " with friction compensator" if what.loop.compensation else ""
+    if isinstance(what.loop.compensation, FeedForward):
+        beside = " with feed-forward of acceleration and friction"
     return f"{what.design.card}: {kind} controller{beside}"
 
 

@@ -31,7 +31,7 @@ from identification.errors import BadCard, BadModel
 from workbench.cards.card import Card, load_card
 from workbench.cards.own_effects import library
 from workbench.course import Course, moving, watched
-from workbench.documents.design import Design
+from workbench.documents.design import Design, Structure
 from workbench.documents.design_read import read_design
 from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
@@ -145,13 +145,14 @@ def design(
     model: ModelLike, *, poles: tuple[float, float] | None = None,
     auxiliary: Sequence[complex] | None = None, integrator: bool = True,
     source: "Literal['physical', 'arx'] | None" = None, period: float | None = None,
-    goals: "Goals | None" = None,
+    goals: "Goals | None" = None, structures: "Sequence[Structure] | None" = None,
 ) -> DesignResult:  # fmt: skip
-    """PID and RST for a model by pole placement, as `workbench design`.
+    """PID and RST for a model by pole placement, and P-PI cascades, as `workbench design`.
 
     poles: w_n [rad/s] and damping of the dominant pair, auxiliary: the others, values of z; both
     searched where not given. source: the plant to design on; period: of the position loop [s];
-    goals: margins to keep, by default those of the command. Raises BadSpecification where the poles
+    goals: margins to keep, by default those of the command; structures: of "rst", "pid", "p-pi".
+    Raises BadSpecification where the poles
     cannot be placed, NotIdentifiable where the model carries no design.
     """
     from design.tune import Asked
@@ -161,7 +162,9 @@ def design(
     asked = Asked(poles, None if auxiliary is None else tuple(auxiliary), integrator)
     wanted = goals or DesignGoals(effort=effort_limit(known))
     with _bar("designing"):
-        found = design_of_model(known, asked, goals=wanted, source=source, period=period)
+        found = design_of_model(
+            known, asked, goals=wanted, source=source, period=period, structures=structures
+        )
     return DesignResult(found, known)
 
 

@@ -43,22 +43,23 @@ class DesignResult(Result):
 
     @property
     def recommended(self) -> str:
-        """ "rst", "pid", or "none" where no controller keeps every goal."""
+        """ "rst", "pid", "p-pi", or "none" where no controller keeps every goal."""
         return self.design.recommended
 
     def to_control(self, name: str | None = None) -> ControlLoop:
         """Plant and controller as transfer functions of python-control, for loops and Bode plots.
 
-        name: "rst" or "pid", by default the recommended. Raises BadModel where there is no such.
+        name: "rst", "pid" or "p-pi", by default the recommended. Raises BadModel where there is
+        none of that name.
         """
         from design.convert import controller_to_control, to_control
 
         wanted = name or self.design.recommended
-        if wanted not in self.design.controllers:
-            there = ", ".join(self.design.controllers)
-            raise BadModel(f"no controller {wanted!r}; name one that is there ({there})")
+        there = self.design.controllers
+        if wanted not in there:
+            raise BadModel(f"no controller {wanted!r}; name one that is there ({', '.join(there)})")
         plant = self.design.plant
-        feedback, forward = controller_to_control(self.design.controllers[wanted].rst)
+        feedback, forward = controller_to_control(there[wanted].rst)
         return ControlLoop(to_control(plant.A, plant.B, plant.h), feedback, forward)
 
     def report(self) -> str:

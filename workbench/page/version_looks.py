@@ -1,7 +1,7 @@
 """What the page asks of a version's documents, as functions that run in a process of their own."""
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -10,6 +10,8 @@ from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from identification.errors import UserError
+
+LOOKS_OF: "Mapping[str, Look]" = {"rst": "line", "pid": "dashed", "p-pi": "dotted"}
 
 if TYPE_CHECKING:
     from workbench.documents.design import Design
@@ -72,7 +74,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
                 for name, one in found.controllers.items():
                     t, y = linear_step(found, one)
                     colour: Colour = "reference" if place else "model"
-                    look: Look = "line" if name == "rst" else "dashed"
+                    look = LOOKS_OF[name]
                     lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
                 if found.recommendation:
                     said.append(f"version {number}: {found.recommendation.why}")

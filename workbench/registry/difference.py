@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 MODEL_PARTS = ("friction", "actuator", "effects")
-DESIGN_PARTS = ("recommended", "force", "rst", "pid", "compensator")
+DESIGN_PARTS = ("recommended", "force", "rst", "pid", "p_pi", "compensator")
 LEFT_OUT = ("compensator.friction",)  # the model's own nine
 
 

@@ -2,13 +2,16 @@
 
 from pathlib import Path
 
+from design.drive_law import DriveLaw
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number
 from workbench.documents.design import Controller, Design
-from workbench.documents.drive import DriveUnits, equation_lines, force_lines
+from workbench.documents.drive import DriveUnits, Output, equation_lines, force_lines
 from workbench.output import Row, next_step, written
 from workbench.report.notes import notes
 from workbench.screen import Part, Screen, instead, listed, more, screen, tabled
+from workbench.steps.cascade import filter_words
+from workbench.steps.loop_figures import takes_compensator
 from workbench.steps.recommend import other_figures, own_figures
 
 DESIGN_HEAD = (
@@ -26,6 +29,7 @@ DESIGN_HEAD = (
 IN_DRIVES_HEAD = (
     "in a drive's words", "crossover", "bandwidth", "gain margin", "phase margin", "delay margin",
 )  # fmt: skip
+METRES_PER_MINUTE = 0.06  # of a Kv of 1/s, in m/min/mm
 MARGINS_SAID = (
     "modulus, gain, phase, delay: the margins, how much more of each the loop bears; worst: the"
     " least modulus margin inside the parameters' intervals; periods: the delay margin in sampling"
@@ -104,12 +108,46 @@ def loop_lines(found: Design, rotary: bool = False) -> list[str]:
             f"PID: k_R = {g.k_R:.5g} {units.stiffness}, T_i = {g.T_i:.4g} s, T_d = {g.T_d:.4g} s,"
             f" eps = {g.eps:.4g} s"
         )
+    lines += cascade_lines(found, rotary)
+    if not any(takes_compensator(found, name) for name in found.controllers):
+        return lines
     pushed = "what breakaway needs beyond sliding" if c.excess else "the whole breakaway force"
     return [
         *lines,
         f"compensator: pushes with {pushed} at a position error of"
         f" {length(c.e_T, rotary)} (e_T), in the stick band over {c.N_c:g} (N_c)",
     ]
+
+
+def cascade_lines(found: Design, rotary: bool = False) -> list[str]:
+    """The P-PI cascade in the units of a drive's parameter list, its filter and feed-forward."""
+    one = found.p_pi
+    if one is None or one.cascade is None:
+        return []
+    g, units, command = one.cascade, shown(rotary), found.command
+    k_v = f"{number(g.k_v)} 1/s"
+    if not rotary:
+        k_v += f" ({number(METRES_PER_MINUTE * g.k_v)} m/min/mm)"
+    k_p = f"{number(g.k_p)} {units.force} s/{units.position}"
+    per = command.force_per_command if command else None
+    if command and per and command.unit != units.force:
+        k_p += f" ({number(g.k_p / per)} {command.unit} s/{units.position})"
+    lines = [
+        f"P-PI: Kv = {k_v}, Kp = {k_p}, Tn = {number(1e3 * g.T_n)} ms, speed behind a filter of"
+        f" {number(1e3 * g.eps)} ms, {100 * g.v_ff:.0f} % of the reference's speed fed forward"
+    ]
+    if one.series is not None:
+        lines.append(f"P-PI: {filter_words(one.series)}, in R, S and T")
+    if one.feed_forward is not None:
+        f = one.feed_forward
+        mass = "kg m^2" if rotary else "kg"
+        lines.append(
+            f"P-PI: fed forward {number(f.m)} {mass} of acceleration, friction of {number(f.F_cp)}"
+            f" and {number(f.F_cn)} {units.force}, {number(f.F_vp)} and {number(f.F_vn)}"
+            f" {units.force} s/{units.position}; the reference moved with at most"
+            f" {number(one.acceleration or 0.0)} {units.position}/s^2"
+        )
+    return lines
 
 
 def refused_lines(found: Design) -> list[str]:
@@ -174,7 +212,9 @@ def drive_lines(found: Design, only: str | None = None) -> list[str]:
         return []
     units, limit = DriveUnits(found.motion, found.command.unit), found.command.limit
     out = []
-    laws = {n: (c.law(found.command), found.output) for n, c in found.controllers.items()}
+    laws: dict[str, tuple[DriveLaw, Output]] = {
+        name: (one.law(found.command), found.output) for name, one in found.controllers.items()
+    }
     if found.present:
         laws[f"present {found.present.kind}"] = found.present.law, found.present.output
     laws = {name: law for name, law in laws.items() if only in (None, name)}

@@ -15,7 +15,9 @@ from workbench.report.validation_tables import validation_head, validation_lines
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Traces
 from workbench.steps.validate import Validation
 
-LOOP_COLOURS: dict[str, Colour] = {"rst": "reference", "pid": "model", PRESENT: "before"}
+LOOP_COLOURS: dict[str, Colour] = {
+    "rst": "reference", "pid": "model", "p-pi": "measured", PRESENT: "before",
+}  # fmt: skip
 ERRORS_SHOWN: tuple[tuple[Literal["step", "smooth"], str], ...] = (
     ("smooth", "along the smooth reference"),
     ("step", "at rest, last step"),

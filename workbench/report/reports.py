@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 
 from workbench.documents.design import Design
+from workbench.report.bode import bode_section
 from workbench.report.controllers import (
     coefficients,
     controllers,
@@ -56,6 +57,7 @@ def design_report(found: Design, rotary: bool = False) -> str:
     sections = (
         step_response(found),
         controllers(found, rotary),
+        *bode_section(found),
         sensitivity_section(found, rotary),
         coefficients(found),
         drive_section(found),

@@ -6,10 +6,11 @@ import numpy as np
 
 from design.compensator import Compensator
 from design.drive_law import DriveLaw
+from design.feed_forward import FeedForward
 from design.filters import filters_at
 from design.loop import ForcePI, LoopNoise, LoopRun
 from design.loop_signals import OfForce, pressures
-from design.servo import Compensation, Servo, ServoRun, simulate_servo
+from design.servo import Compensation, SecondMass, Servo, ServoRun, simulate_servo
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import BadModel
@@ -17,7 +18,7 @@ from identification.log import Rig
 from identification.model.plant import Actuator, Motor, Plant
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import ForceLoop, Present
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 from workbench.steps.linear_loop import command_of
 
 
@@ -26,17 +27,19 @@ class DrivenLoop:
     """A law in the loop that it closes: what stands between the sensors and the machine.
 
     force: the loop below it, None where its output is the command. rate: the reference is moved at
-    most at this speed [m/s]. limit: of the command, in its unit. k_a: by which the compensation's
-    force becomes a command; None: the motor's own. direct: an actuator takes the law's output.
+    most at this speed [m/s], and with this acceleration [m/s^2]. limit: of the command, in its
+    unit. compensation: of friction, or a feed-forward. k_a: by which its force becomes a command;
+    None: the motor's own. direct: an actuator takes the law's output.
     """
 
     law: DriveLaw
     force: ForceLoop | None = None
     rate: float | None = None
     limit: float | None = None
-    compensation: Compensation | None = None
+    compensation: Compensation | FeedForward | None = None
     k_a: float | None = None
     direct: bool = False
+    acceleration: float | None = None
 
     @property
     def h(self) -> float:
@@ -55,6 +58,7 @@ class DrivenLoop:
             k_a=self.k_a,
             direct=self.direct,
             rate=self.rate,
+            acceleration=self.acceleration,
         )
 
 
@@ -64,13 +68,15 @@ def driven_loop(
     """A design's controller as its drive runs it; of an older file as it is run on the machine."""
     command = found.command or command_of(machine, found.force)
     filters = found.compensator.filters or filters_at(one.h)
+    beside = None if compensator is None else Compensation(compensator, filters)
     return DrivenLoop(
         law=one.law(command),
         force=found.force,
         rate=one.rate,
         limit=command.limit,
-        compensation=None if compensator is None else Compensation(compensator, filters),
+        compensation=one.feed_forward if beside is None else beside,
         k_a=command.force_per_command,
+        acceleration=one.acceleration,
     )
 
 
@@ -133,7 +139,21 @@ def run_plant(
         r,
         noise,
         chambers(machine.rig),
+        load_of(machine),
     )
+
+
+def load_of(machine: Model) -> SecondMass | None:
+    """The load that swings behind the machine's body; None where it shows none.
+
+    Of a mass that the log does not tell, its share of the mass that simulations use.
+    """
+    two = machine.resonance
+    if two is None:
+        return None
+    f_r, f_a = used(two["frequency"]), used(two["anti_resonance"])
+    mass = machine.karnopp.m * (1.0 - (f_a / f_r) ** 2)
+    return SecondMass.of(f_r, f_a, used(two["damping"]), mass) if mass > 0.0 else None
 
 
 def servo_run(
@@ -143,10 +163,12 @@ def servo_run(
     r: Array,
     noise: LoopNoise | None,
     chambers: dict[str, OfForce],
+    load: SecondMass | None = None,
 ) -> ServoRun:
     """One reference r [m], (n,) every loop.h, through the loop around a plant that stands at r[0].
 
-    limit: of the command, in its unit; chambers: the pressures by the force, by name.
+    limit: of the command, in its unit; chambers: the pressures by the force, by name; load: that
+    swings behind the body.
     """
     return simulate_servo(
         plant,
@@ -156,6 +178,7 @@ def servo_run(
         noise=noise,
         start=(float(r[0]), 0.0, 0.0),
         signals=chambers,
+        load=load,
     )
 
 

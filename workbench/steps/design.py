@@ -1,12 +1,13 @@
-"""Model -> Design: PID and RST by pole placement, compensator, margins."""
+"""Model -> Design: PID and RST by pole placement, P-PI cascade, compensator, margins."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from design.cascade import TunedCascade
 from design.drawn_loops import DrawnPlants
 from design.drive_law import drive_law
 from design.filters import filters_at
@@ -25,14 +26,24 @@ from workbench.documents.design import (
     From,
     Linear,
     Recommendation,
+    Structure,
     margin_values,
 )
 from workbench.documents.drive import ForceLoop
 from workbench.documents.model import Model, used
 from workbench.documents.plausible import bandwidth_remarks, stored_remarks
 from workbench.documents.versions import versions
+from workbench.steps.cascade import beside_resonance, cascade_controller, tuned_cascade
 from workbench.steps.identify import check_period
-from workbench.steps.linear_loop import command_of, corners, linear_of, periods, unknown_viscous
+from workbench.steps.linear_loop import (
+    command_of,
+    corners,
+    linear_of,
+    periods,
+    stiff_body,
+    swings_of,
+    unknown_viscous,
+)
 from workbench.steps.recommend import recommended
 
 FINEST = 20  # times faster than its logs that a controller may be designed
@@ -42,9 +53,9 @@ LARGEST_STEP = 0.5  # of the travel seen in the logs, that a reference may take 
 SLOWED = 4  # times that a controller is made slower for the sake of its reference
 ENOUGH = 0.95  # of the w_n that would just do
 SLOWEST_CUT = 0.3  # of its w_n that is left at once, at least
-WELL_BELOW = 4.0  # times its poles' frequency, at least, that a resonance lies above them
 OVERSHOOT = 0.05  # of a step, in the linear loop
 NOISE_SHARE = 0.05  # of the Coulomb force that the position's noise may ask for
+POLES_PLACED: tuple[Structure, ...] = ("rst", "pid")
 
 
 def design(
@@ -54,16 +65,31 @@ def design(
     goals: Goals | None = None,
     source: From | None = None,
     period: float | None = None,
+    structures: Sequence[Structure] | None = None,
 ) -> Design:
-    """PID and RST for a model, by pole placement, with margins; poles searched where not asked.
+    """Controllers for a model with margins; poles searched where not asked.
 
-    source: the linear plant to design on, by default the sounder. period: of the position
-    controller [s], by default the shortest of `periods` at which a controller keeps every goal.
+    structures: RST and PID by pole placement, a P-PI cascade; by default the first two, and the
+    cascade where the machine swings or has one now. source: the linear plant to design on, by
+    default the sounder. period: of the position controller [s], by default the shortest of
+    `periods` at which a controller keeps every goal.
     Raises BadSpecification where no controller meets what was asked, NotIdentifiable where the
     model carries no design.
     """
-    first = placed_design(model, asked, goals=goals, source=source, period=period)
+    structures = structures or usual_structures(model, asked)
+    first = placed_design(
+        model, asked, goals=goals, source=source, period=period, structures=structures
+    )
     return with_choice(model, first, recommended(model, first))
+
+
+def usual_structures(model: Model, asked: Asked | None) -> tuple[Structure, ...]:
+    """The structures that are designed where nobody says; poles that are asked for have no P-PI."""
+    by_hand = asked is not None and (asked.dominant is not None or asked.auxiliary is not None)
+    now = model.present
+    cascade = model.resonance is not None or (now is not None and now.kind == "P-PI")
+    asks_none = asked is not None and not asked.integrator
+    return POLES_PLACED if by_hand or asks_none or not cascade else (*POLES_PLACED, "p-pi")
 
 
 def with_choice(model: Model, first: Design, chosen: Recommendation) -> Design:
@@ -87,6 +113,7 @@ def placed_design(
     source: From | None = None,
     period: float | None = None,
     drawn: DrawnFor | None = None,
+    structures: Sequence[Structure] = POLES_PLACED,
 ) -> Design:
     """The controllers of `design`, of which none is recommended yet.
 
@@ -96,12 +123,14 @@ def placed_design(
     asked = asked or Asked()
     _check_period(period, model)
     goals = goals or Goals(effort=effort_limit(model))
-    found = _placed(model, asked, goals, (source, period), drawn)
+    found = _placed(model, asked, goals, (source, period), drawn, structures)
     command = command_of(model, found.force)
-    controllers = {
+    controllers: dict[Structure, Controller] = {
         name: _controller(tuned, found.plant, shown(model.rotary))
         for name, tuned in found.tuned.items()
     }
+    if found.cascade is not None:
+        controllers["p-pi"] = cascade_controller(model, found.plant, found.force, found.cascade)
     return Design(
         card=model.card,
         motion=model.rig.motion,
@@ -109,6 +138,7 @@ def placed_design(
         force=found.force,
         rst=controllers.get("rst"),
         pid=controllers.get("pid"),
+        p_pi=controllers.get("p-pi"),
         refused=found.refused,
         recommended="none",
         compensator=_compensator(model, found.plant.h),
@@ -129,19 +159,21 @@ class _Placed(NamedTuple):
 
     plant: Linear
     force: ForceLoop | None
-    tuned: Mapping[str, Tuned]
+    tuned: Mapping[Structure, Tuned]
     refused: Mapping[str, str]
     slower: tuple[str, ...] = ()
+    cascade: TunedCascade | None = None
 
     @property
-    def misses(self) -> int:
-        """The fewest goals that a controller misses."""
-        return min(len(one.missed) for one in self.tuned.values())
+    def missed(self) -> tuple[str, ...]:
+        """What the controller misses that misses the fewest goals."""
+        every = [one.missed for one in self.tuned.values()]
+        return min([*every, *([self.cascade.missed] if self.cascade else [])], key=len)
 
 
 def _placed(
     model: Model, asked: Asked, goals: Goals, where: tuple[From | None, float | None],
-    drawn: DrawnFor | None,
+    drawn: DrawnFor | None, structures: Sequence[Structure],
 ) -> _Placed:  # fmt: skip
     """The controllers at the period, or the first of `periods` at which one keeps every goal.
 
@@ -155,19 +187,19 @@ def _placed(
     every = (first.h,) if period is not None or first.source == "arx" else periods(model)
     for h in every:
         try:
-            found = _placed_at(model, asked, goals, linear_of(model, source, h), drawn)
+            linear = linear_of(model, source, h)
+            found = _placed_at(model, asked, goals, linear, drawn, structures)
         except BadSpecification as error:
             refusal = refusal or error
             said.append(f"not every {1e3 * h:.4g} ms: {error}")
             continue
-        if not found.misses:
+        if not found.missed:
             return found._replace(slower=tuple(said))
         tried.append(found)
-        missed = min((one.missed for one in found.tuned.values()), key=len)
-        said.append(f"not every {1e3 * h:.4g} ms: {', '.join(missed)}")
+        said.append(f"not every {1e3 * h:.4g} ms: {', '.join(found.missed)}")
     if not tried:
         raise refusal or BadSpecification("no sampling period to try; give --design-period")
-    return min(tried, key=lambda one: one.misses)
+    return min(tried, key=lambda one: len(one.missed))
 
 
 def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -> Tuned:
@@ -194,32 +226,53 @@ def _followable(tune: Callable[..., Tuned], goals: Goals, speed: float | None) -
 
 def _placed_at(
     model: Model, asked: Asked, goals: Goals, linear: tuple[Linear, ForceLoop | None],
-    drawn: DrawnFor | None,
+    drawn: DrawnFor | None, structures: Sequence[Structure],
 ) -> _Placed:  # fmt: skip
     plant, force = linear
     machines = None if drawn is None else drawn(plant, force)
-    found: dict[str, Tuned] = {}
+    found: dict[Structure, Tuned] = {}
     refused: dict[str, str] = {}
-    a, b = np.array(plant.A), np.array(plant.B)
+    a, b = stiff_body(model, plant, force)
+    whole = (np.array(plant.A), np.array(plant.B)) if swings_of(model) else None
     others, demand = corners(model, plant, force), reference_demand(model, force)
-    for name, tune in (("rst", tune_rst), ("pid", tune_pid)):
+    for name, tune in _POLE_PLACERS.items():
+        if name not in structures:
+            continue
         if name == "pid" and not asked.integrator:
             refused[name] = "a PID has an integrator; asked for none"
             continue
-        wanted = asked
+        wanted = replace(asked, whole=whole)
         if name == "pid" and asked.auxiliary is not None:
-            wanted = Asked(asked.dominant, None, asked.integrator)
+            wanted = replace(wanted, auxiliary=None)
         try:
             tuned = partial(
                 tune, a, b, plant.h, wanted, corners=others, demand=demand, drawn=machines
             )
-            found[name] = _followable(tuned, goals, None if wanted.dominant else model.speed)
+            slower = _below_resonance_of(model, goals)
+            found[name] = _followable(tuned, slower, None if wanted.dominant else model.speed)
         except BadSpecification as error:
             refused[name] = str(error)
+    cascade = None
+    if "p-pi" in structures:
+        try:
+            cascade = tuned_cascade(model, plant, others, goals)
+        except BadSpecification as error:
+            refused["p-pi"] = str(error)
     by_hand = asked.dominant is not None or asked.auxiliary is not None
-    if not found or ("rst" in refused and by_hand):
-        raise BadSpecification(refused["rst"])
-    return _Placed(plant, force, found, refused)
+    if (not found and cascade is None) or ("rst" in refused and by_hand):
+        raise BadSpecification(next(iter(refused.values())))
+    return _Placed(plant, force, found, refused, cascade=cascade)
+
+
+_POLE_PLACERS: Mapping[Structure, Callable[..., Tuned]] = {"rst": tune_rst, "pid": tune_pid}
+
+
+def _below_resonance_of(model: Model, goals: Goals) -> Goals:
+    """The goals, with poles on one body no faster than where two masses are still one."""
+    if model.resonance is None:
+        return goals
+    most = 2.0 * np.pi * used(model.resonance["frequency"])
+    return replace(goals, fastest=min(most, goals.fastest or most))
 
 
 def _check_period(period: float | None, model: Model) -> None:
@@ -328,7 +381,7 @@ def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
     if not model.fit.adequate:
         out.append("the model leaves more than noise; check the loop on the machine with care")
     if model.resonance is not None:
-        out += _below_resonance(used(model.resonance["frequency"]), found, chosen)
+        out += beside_resonance(model, found, chosen.controller)
     return out
 
 
@@ -339,18 +392,3 @@ def _inertia(whole: float, motor: float, rotary: bool) -> str:
     if whole < motor:
         return f"{said}: less than the motor's alone; check motor_inertia in the card"
     return f"{said}: the load is {number(whole / motor - 1.0, 2)} times the motor"
-
-
-def _below_resonance(resonance: float, found: Design, chosen: Recommendation) -> Iterator[str]:
-    """How far below a resonance [Hz] the recommended loop stays: it is designed on one body, which
-    two masses are only far below it."""
-    taken = found.controllers.get("rst" if chosen.controller == "none" else chosen.controller)
-    if taken is None:
-        return
-    poles = taken.dominant[0] / (2.0 * np.pi)
-    said = (
-        f"the loop's poles lie at {poles:.3g} Hz, {resonance / poles:.2g} times below the resonance"
-        f" of two masses at {resonance:.3g} Hz"
-    )
-    near = resonance < WELL_BELOW * poles
-    yield f"{said}: too near, it may swing; design it slower (--poles W_N,ZETA)" if near else said

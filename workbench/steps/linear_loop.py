@@ -1,9 +1,11 @@
 """The linear plants of a machine under its loops: nominal, and at its parameters' intervals."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
+from design.elastic import Swing, elastic_plant
 from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
@@ -20,6 +22,7 @@ IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has th
 LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
 WHOLE_SAMPLE = 1e-3  # of a sample, up to which a delay counts as whole
 MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
+SWING_UNSURE = 0.02  # of a resonance, that it may lie beside what is told of it, at least
 
 
 def command_of(model: Model, force: ForceLoop | None) -> Command:
@@ -53,7 +56,10 @@ def linear_of(
     a, b = _physical(*_nominal(model), h, model, force)
     why = _why_physical(model, force)
     m, viscous = model.friction["m"], _viscous(model)
-    return Linear("physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, viscous), force
+    linear = Linear(
+        "physical", why, tuple(a.tolist()), tuple(b.tolist()), h, m, viscous, model.resonance
+    )
+    return linear, force
 
 
 def periods(model: Model) -> tuple[float, ...]:
@@ -80,12 +86,13 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
     known = "mass and viscous friction are identified"
     if names := unknown_viscous(model):
         known = f"the mass is identified, {' and '.join(names)} assumed"
+    body = "sliding body" if model.resonance is None else "two masses, the first sliding"
     inside = "with the force as its input"
     if force:
         told = all(e.known for e in (model.actuator or {}).values())
         actuator = "the actuator" if told else "an actuator of assumed k1 and k2"
         inside = f"with {actuator} and its force loop"
-    return f"{known}: sliding body, {inside}, sampled exactly"
+    return f"{known}: {body}, {inside}, sampled exactly"
 
 
 def unknown_viscous(model: Model) -> list[str]:
@@ -107,22 +114,46 @@ def plants_of(
     per = gain.k_a if isinstance(gain, Motor) else 1.0
     if arx and own is not None and own.input == "F" and abs(own.h - h) < 1e-6 * own.h:
         return [(np.array(own.A), per * np.array(own.B))]
-    bodies = [_nominal(machine), *_corner_bodies(machine)]
-    plants = [_physical(m, f, h, machine, force) for m, f in bodies]
+    plants = [
+        _physical(*_nominal(machine), h, machine, force),
+        *(_physical(m, f, h, machine, force, s) for m, f, s in _corner_bodies(machine)),
+    ]
     return [(a, per * b) for a, b in plants]
 
 
+def swings_of(model: Model) -> tuple[Swing, ...]:
+    """The elastic parts that the model knows of."""
+    two = model.resonance
+    if two is None:
+        return ()
+    names = ("frequency", "anti_resonance", "damping")
+    return (Swing.of_two_masses(*(used(two[name]) for name in names)),)
+
+
 def _physical(
-    m: float, f: float, h: float, model: Model, force: ForceLoop | None
-) -> tuple[Array, Array]:
+    m: float, f: float, h: float, model: Model, force: ForceLoop | None,
+    swings: tuple[Swing, ...] | None = None,
+) -> tuple[Array, Array]:  # fmt: skip
+    """The sampled plant of a body; swings: its elastic parts, by default the model's."""
     actuator = model.simulated.actuator
+    swings = swings_of(model) if swings is None else swings
+    gains = None if force is None else ForceGains(force.k_i, force.T_i)
+    ratio = 1 if force is None else max(1, round(h / force.h))
     if not isinstance(actuator, Actuator):
-        a, b = linear_plant(m, f, h)
+        a, b = elastic_plant(m, f, h, swings) if swings else linear_plant(m, f, h)
         return a, delayed(b, dead_time(model) / h)
-    if force is None:
+    if swings:
+        return elastic_plant(m, f, h, swings, actuator, gains, ratio)
+    if gains is None:
         return commanded_plant(m, f, h, actuator)
-    gains = ForceGains(force.k_i, force.T_i)
-    return linear_plant(m, f, h, actuator, gains, max(1, round(h / force.h)))
+    return linear_plant(m, f, h, actuator, gains, ratio)
+
+
+def stiff_body(model: Model, plant: Linear, force: ForceLoop | None) -> tuple[Array, Array]:
+    """The design's plant without elastic parts, on which poles are placed."""
+    if plant.source == "arx" or not swings_of(model):
+        return np.array(plant.A), np.array(plant.B)
+    return _physical(*_nominal(model), plant.h, model, force, ())
 
 
 def dead_time(model: Model) -> float:
@@ -210,14 +241,28 @@ def corners(
     """
     if plant.source == "arx":
         return ()
-    return tuple(_physical(m, f, plant.h, model, force) for m, f in _corner_bodies(model))
+    return tuple(_physical(m, f, plant.h, model, force, s) for m, f, s in _corner_bodies(model))
 
 
-def _corner_bodies(model: Model) -> list[tuple[float, float]]:
-    """Mass and viscous friction at the corners of their intervals."""
+def _corner_bodies(model: Model) -> list[tuple[float, float, tuple[Swing, ...]]]:
+    """Mass, viscous friction and elastic parts at the corners of their intervals."""
     ends = [_ends(model.friction[name]) for name in ("F_vp", "F_vn")]
     least, most = min(low for low, _ in ends), max(high for _, high in ends)
-    return [(m, f) for m in _ends(model.friction["m"]) for f in (max(least, 0.0), most)]
+    bodies = [(m, f) for m in _ends(model.friction["m"]) for f in (max(least, 0.0), most)]
+    return [(m, f, swings) for m, f in bodies for swings in _swings_told(model)]
+
+
+def _swings_told(model: Model) -> Iterator[tuple[Swing, ...]]:
+    """The elastic parts at both ends of what is told of their frequency."""
+    two = model.resonance
+    if two is None:
+        yield ()
+        return
+    frequency, middle = two["frequency"], used(two["frequency"])
+    low, high = (middle if end is None else end for end in (frequency.low, frequency.high))
+    unsure = max(high / middle - 1.0, 1.0 - low / middle, SWING_UNSURE)
+    for factor in (1.0 - unsure, 1.0 + unsure):
+        yield tuple(one.times(factor) for one in swings_of(model))
 
 
 def _ends(found: Estimate) -> tuple[float, float]:

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
@@ -15,7 +14,13 @@ from identification.errors import BadSpecification
 from identification.model.plant import Motor
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length
-from workbench.documents.design import Design, MarginValues, margin_values
+from workbench.documents.design import (
+    DESIGNED_STRUCTURES,
+    Design,
+    MarginValues,
+    Structure,
+    margin_values,
+)
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
 from workbench.steps.limit_cycle import LimitCycle
@@ -169,11 +174,16 @@ def slowest(found: Design) -> float:
     return -found.plant.h / float(np.log(min(radius, 0.9999)))
 
 
-def judged_of(found: Design) -> Literal["rst", "pid"]:
-    """The controller that decides: the recommended one, or the one there is."""
-    if found.recommended == "pid" and found.pid:
-        return "pid"
-    return "rst" if found.rst else "pid"
+def judged_of(found: Design) -> Structure:
+    """The controller that decides: the recommended one, or the first there is."""
+    there = [name for name in DESIGNED_STRUCTURES if name in found.controllers]
+    return next((name for name in there if name == found.recommended), there[0])
+
+
+def takes_compensator(found: Design, name: str) -> bool:
+    """Whether a controller may have the friction compensator beside it: not beside a feed-forward,
+    which has the friction in it."""
+    return found.controllers[name].feed_forward is None
 
 
 def loop_figures(

@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.errors import BadModel
 from workbench.cards.parameter_units import Shown, shown
-from workbench.documents.design import Design, Recommendation, Recommended
+from workbench.documents.design import DESIGNED_STRUCTURES, Design, Recommendation, Structure
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import driven_loop
 from workbench.steps.loop_figures import (
@@ -19,12 +19,12 @@ from workbench.steps.loop_figures import (
     loop_runs,
     present_figures,
     references,
+    takes_compensator,
 )
 from workbench.steps.loop_motion import SETTLING_BAND
 
 EQUAL = 0.05  # mean relative difference of the measures below which two loops are as good
 LEAST_ERROR = 1e-3  # error relative to step or amplitude below which less is no better
-CONTROLLERS: tuple[Recommended, ...] = ("rst", "pid")
 
 
 def recommended(model: Model, found: Design) -> Recommendation:
@@ -35,7 +35,11 @@ def recommended(model: Model, found: Design) -> Recommendation:
     settling time, peak force and error along the smooth reference; where they are as good, the one
     with the larger modulus margin. The compensator only where it is clearly better with it.
     """
-    kept = [name for name in CONTROLLERS if (one := found.controllers.get(name)) and not one.missed]
+    kept = [
+        name
+        for name in DESIGNED_STRUCTURES
+        if (one := found.controllers.get(name)) and not one.missed
+    ]
     if not kept:
         said = "; ".join(
             f"{n.upper()}: {', '.join(c.missed)}" for n, c in found.controllers.items()
@@ -44,12 +48,15 @@ def recommended(model: Model, found: Design) -> Recommendation:
     figures = compared(model, found)
     alone = _best(kept, figures)
     both = (alone, alone + COMPENSATED)
-    usable = figures[both[1]].passed and figures[both[1]].limit_cycle is None
+    beside = figures.get(both[1])
+    usable = beside is not None and beside.passed and beside.limit_cycle is None
     better = usable and _cost(both[1], both, figures) < _cost(alone, both, figures) - EQUAL
     said = reasons(alone, better, figures, shown(model.rotary))
     taken = both[1] if better else alone
-    why = f"{said}: {_decisive(alone, found, figures)}{_beside_present(taken, figures)}"
-    return Recommendation(alone, better, why)
+    keep = _present_as_good(taken, figures)
+    kept_said = "; the present controller is as good, keep it" if keep else ""
+    why = f"{said}: {_decisive(alone, found, figures)}{kept_said}"
+    return Recommendation(alone, better, why, keep)
 
 
 def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
@@ -58,6 +65,8 @@ def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
     arx = found.plant.source == "arx"
     for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
         for name, one in found.controllers.items():
+            if compensator is not None and not takes_compensator(found, name):
+                continue
             loop = driven_loop(model, found, one, compensator)
             runs = loop_runs(model, loop, references(model, found, loop.h), None)
             out[name + suffix] = loop_figures(model, loop, runs, Limits(), arx=arx)
@@ -71,7 +80,7 @@ def compared(model: Model, found: Design) -> dict[str, LoopFigures]:
 def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], units: Shown) -> str:
     """Why this controller, in one line with its numbers and those of the others."""
     taken = name + (COMPENSATED if compensator else "")
-    every = (*CONTROLLERS, name + COMPENSATED, PRESENT)
+    every = (*DESIGNED_STRUCTURES, name + COMPENSATED, PRESENT)
     others = [other for other in every if other in figures and other != taken]
     one = figures[taken]
     said = (
@@ -108,7 +117,7 @@ def settled(one: LoopFigures) -> str:
     return f"{one.settling:.2g} s"
 
 
-def _best(kept: Sequence[Recommended], figures: Mapping[str, LoopFigures]) -> Recommended:
+def _best(kept: Sequence[Structure], figures: Mapping[str, LoopFigures]) -> Structure:
     """The best of the controllers alone."""
     passing = [n for n in kept if figures[n].passed]
     calm = [n for n in passing if figures[n].limit_cycle is None]
@@ -119,12 +128,15 @@ def _best(kept: Sequence[Recommended], figures: Mapping[str, LoopFigures]) -> Re
     return max(equal, key=lambda n: _modulus(figures[n]))
 
 
-def _decisive(name: Recommended, found: Design, figures: Mapping[str, LoopFigures]) -> str:
-    """What decided against the other controller."""
-    other: Recommended = "pid" if name == "rst" else "rst"
-    called, rival = other.upper(), found.controllers.get(other)
-    if rival is None:
-        return f"there is no {called}"
+def _decisive(name: Structure, found: Design, figures: Mapping[str, LoopFigures]) -> str:
+    """What decided against the other controller, or against the best of several."""
+    others = [one for one in DESIGNED_STRUCTURES if one != name]
+    there = [one for one in others if one in found.controllers]
+    if not there:
+        return f"there is no {' and no '.join(one.upper() for one in others)}"
+    sound = [one for one in there if not found.controllers[one].missed]
+    other = min(sound or there, key=lambda n: _cost(n, (name, n), figures))
+    called, rival = other.upper(), found.controllers[other]
     if rival.missed:
         return f"the {called} misses a goal, {rival.missed[0]}"
     one, its = figures[name], figures[other]
@@ -138,14 +150,20 @@ def _decisive(name: Recommended, found: Design, figures: Mapping[str, LoopFigure
     return f"as good as the {called} in the mean of the first four, and the larger margin"
 
 
-def _beside_present(taken: str, figures: Mapping[str, LoopFigures]) -> str:
-    """That the present controller is as good, where it is."""
-    now = figures.get(PRESENT)
-    if now is None or not now.passed or now.limit_cycle is not None:
-        return ""
+def _present_as_good(taken: str, figures: Mapping[str, LoopFigures]) -> bool:
+    """Whether the present controller is as good, or better: in the mean where it keeps the limits,
+    else, as where a step takes it to the limit of its command, in each error and in settling, with
+    the modulus margin that is asked of a loop."""
+    now, one = figures.get(PRESENT), figures[taken]
+    if now is None or not now.stable or now.limit_cycle is not None:
+        return False
+    if not now.passed:
+        if _modulus(now) < Limits().modulus:
+            return False
+        ahead = np.log(_measures(now)[:3] / _measures(one)[:3])
+        return bool(one.stable and np.all(ahead < EQUAL))
     pool = (taken, PRESENT)
-    as_good = _cost(PRESENT, pool, figures) - _cost(taken, pool, figures) < EQUAL
-    return "; the present controller is as good, keep it" if as_good else ""
+    return _cost(PRESENT, pool, figures) - _cost(taken, pool, figures) < EQUAL
 
 
 def _cost(name: str, pool: Iterable[str], figures: Mapping[str, LoopFigures]) -> float:

@@ -9,11 +9,12 @@ import numpy as np
 from identification.errors import BadModel
 from identification.remarks import Aside
 from workbench.cards.parameter_units import Shown, shown
-from workbench.documents.design import Design
+from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
 from workbench.documents.model import Model
 from workbench.documents.versions import versions
 from workbench.steps.closed_loop import driven_loop, effects_left_out
+from workbench.steps.elastic import with_resonance
 from workbench.steps.loop_figures import (
     ALMOST,
     COMPENSATED,
@@ -27,6 +28,7 @@ from workbench.steps.loop_figures import (
     loop_runs,
     present_figures,
     references,
+    takes_compensator,
 )
 from workbench.steps.recommend import in_thousandths, reasons
 
@@ -41,7 +43,7 @@ class Validation:
     """
 
     card: str
-    judged: Literal["rst", "pid"]
+    judged: Structure
     passed: bool
     limits: Limits
     figures: Mapping[str, Mapping[str, LoopFigures]]
@@ -66,6 +68,8 @@ def validate(
     not fit the plant (a force loop without an actuator).
     """
     limits = limits or Limits()
+    model = with_resonance(model, found.plant.resonance)
+    plant = None if plant is None else with_resonance(plant, found.plant.resonance)
     plants = {"model": model} | ({"plant": plant} if plant else {})
     figures: dict[str, dict[str, LoopFigures]] = {}
     traces: dict[tuple[str, str], Traces] = {}
@@ -81,6 +85,8 @@ def validate(
     arx = found.plant.source == "arx"
     for suffix, compensator in (("", None), (COMPENSATED, found.compensator.value)):
         for name, controller in found.controllers.items():
+            if compensator is not None and not takes_compensator(found, name):
+                continue
             loop = driven_loop(model, found, controller, compensator)
             reference = references(model, found, loop.h)
             figures[name + suffix] = {}
@@ -131,7 +137,7 @@ def _remarks(
             f" {100 * figures[judged][place].smooth_relative:.3g} ->"
             f" {100 * one.smooth_relative:.3g} %{'' if one.stable else ', unstable'}"
         )
-        for place, one in figures[judged + COMPENSATED].items()
+        for place, one in figures.get(judged + COMPENSATED, {}).items()
     ]
     if found.recommended == "none":
         why = f" ({found.recommendation.why})" if found.recommendation else ""
@@ -144,7 +150,8 @@ def _remarks(
     taken = judged + (COMPENSATED if with_it else "")
     for name, places in figures.items():
         for place, one in places.items():
-            called = name if name == PRESENT else name.replace(name[:3], name[:3].upper(), 1)
+            alone = name.removesuffix(COMPENSATED)
+            called = name if name == PRESENT else name.replace(alone, alone.upper(), 1)
             seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
             told = (f"{called} on the {place}: {line}" for line in seen)
             # What the table of the loops shows of those that nobody takes is an aside.

@@ -13,6 +13,7 @@ from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.export.exported import Exported
+from workbench.steps.design import design
 
 ACTUATOR = Actuator(19530.0, 10405.0)
 START = 0.03  # m, where the simulated machine stands before its first sample
@@ -29,7 +30,10 @@ class Case:
 @cache
 def case(name: str) -> Case:
     """The design of a machine: "paper_table1" to 3 above a force loop (two-rate), "limited" with a
-    limit of its command, "emps" with a motor."""
+    limit of its command, "emps" with a motor, "cascade" a P-PI for the same."""
+    if name == "cascade":
+        model = case("emps").model
+        return Case(model, design(model, structures=("p-pi",)))
     if name == "emps":
         model = model_of(EMPS, k_a=35.15)
         model = replace(model, rig=replace(model.rig, control_limit=10.0))

@@ -151,3 +151,16 @@ def test_c_plus_plus_takes_the_header(tmp_path: Path) -> None:
     subprocess.run(
         ["g++", "-Wall", "-Werror", "-fsyntax-only", str(tmp_path / "main.cpp")], check=True
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("build", list(BUILDS))
+def test_the_code_of_a_cascade_gives_the_simulation_in_every_bit(
+    build: str, tmp_path: Path
+) -> None:
+    one = case("cascade")
+    what = exported(one.design, "p-pi")
+    run, inputs = simulated(one, what, 20_000)
+    code = library(what, tmp_path, build)
+    assert code.tested() == 0
+    assert np.array_equal(driven(code, inputs), run.u)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat
 
+from design.servo import Compensation
 from tests.workbench.export.designs import NAMES, case
 from workbench.export.data import json_file, mat_file
 from workbench.export.exported import exported
@@ -96,7 +97,7 @@ def test_matlab_reads_the_law_and_the_test(name: str, compensated: bool) -> None
     assert np.array_equal(found["test"]["u"], what.test.outputs)
     assert np.array_equal(found["test"]["y"], what.test.inputs[:, 1])
     if compensated:
-        assert what.loop.compensation is not None
+        assert isinstance(what.loop.compensation, Compensation)
         own, filters = what.loop.compensation.compensator, what.loop.compensation.filters
         assert found["compensator"]["F_sp"] == own.friction.F_sp
         assert found["compensator"]["e_T"] == own.e_T

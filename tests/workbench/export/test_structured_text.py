@@ -73,3 +73,17 @@ def test_a_reset_begins_anew() -> None:
 )
 def test_numbers_are_real_literals(value: float, said: str) -> None:
     assert st_syntax("double").number(value) == said
+
+
+@pytest.mark.slow
+def test_the_block_of_a_cascade_gives_what_the_simulation_gave() -> None:
+    one = case("cascade")
+    what = exported(one.design, "p-pi")
+    run, inputs = simulated(one, what, 3000)
+    (source,) = st_file(what).values()
+    block = Blocks(source).made(f"FB_{what.program.name}")
+    found = []
+    for r, y in inputs.tolist():
+        block(r_ref=r, y=y)
+        found.append(block.values["u"])
+    assert np.max(np.abs(np.array(found) - run.u)) < 1e-9 * np.max(np.abs(run.u))

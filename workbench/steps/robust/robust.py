@@ -8,7 +8,7 @@ import numpy as np
 from design.tune import Asked, Goals
 from identification.errors import BadModel, NotIdentifiable
 from identification.progress import Progress, quiet
-from workbench.documents.design import Design, From, Recommendation
+from workbench.documents.design import Design, From, Recommendation, Recommended
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, present_loop
 from workbench.steps.design import design, effort_limit, with_choice
@@ -156,9 +156,11 @@ def _promises(
     limits: dict[str, float], rng: np.random.Generator, report: Progress,
 ) -> dict[str, Promise]:  # fmt: skip
     """What each loop comes to on machines of which the search knew nothing."""
-    loops = {ROBUST: (chosen.name, chosen.compensator, chosen.loop(model))}
-    if nominal.recommendation is not None and nominal.recommended != "none":
-        own = nominal.recommendation
+    loops: dict[str, tuple[Recommended, bool, DrivenLoop]] = {
+        ROBUST: (chosen.name, chosen.compensator, chosen.loop(model))
+    }
+    own = nominal.recommendation
+    if own is not None and own.controller != "none":
         one = Candidate(nominal, own.controller, own.compensator)
         loops[NOMINAL] = (one.name, one.compensator, one.loop(model))
     now = _present(model)

@@ -15,10 +15,10 @@ from design.tracking import integrates
 from design.tune import Asked, Goals
 from identification.errors import BadSpecification
 from identification.progress import Progress
-from workbench.documents.design import CompensatorValues, Controller, Design, From, Recommended
+from workbench.documents.design import CompensatorValues, Controller, Design, From, Structure
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, driven_loop
-from workbench.steps.design import placed_design
+from workbench.steps.design import POLES_PLACED, placed_design
 from workbench.steps.robust.machines import DrawnMachines, some_of
 from workbench.steps.robust.outcomes import MEASURES, Motion, Outcomes, outcomes
 
@@ -40,7 +40,7 @@ class Candidate:
     """One of a design's controllers, with or without its compensator, and what came of it."""
 
     design: Design
-    name: Recommended
+    name: Structure
     compensator: bool
     found: Outcomes | None = None
 
@@ -148,7 +148,7 @@ def _speed(found: Design) -> float:
 
 def _of_design(model: Model, found: Design) -> Iterator[Candidate]:
     """Its controllers that keep their goals, each without and with compensators."""
-    names: tuple[Recommended, ...] = ("rst", "pid")
+    names = POLES_PLACED
     kept = [n for n in names if n in found.controllers and not found.controllers[n].missed]
     for name in kept or [n for n in names if n in found.controllers]:
         yield Candidate(found, name, compensator=False)

@@ -1,0 +1,61 @@
+"""A machine's resonance where its model has none: of a frequency response, or of a design."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from identification.errors import BadModel
+from identification.model.estimates import Estimate
+from workbench.documents.model import Model, used
+from workbench.documents.reading import read_document
+from workbench.steps.response import RESPONSE_SCHEMA
+
+
+def with_resonance(model: Model, resonance: Mapping[str, Estimate] | None) -> Model:
+    """The model with this resonance, where it has none of its own."""
+    if model.resonance is not None or resonance is None:
+        return model
+    return replace(model, resonance=resonance)
+
+
+def with_response(model: Model, file: Path | None) -> Model:
+    """The model with the lowest pair of anti-resonance and resonance in a response.json.
+
+    Raises BadModel where the file is none, or holds no such pair.
+    """
+    if file is None:
+        return model
+    written = read_document(file)
+    if written.get("schema") != RESPONSE_SCHEMA:
+        raise BadModel(
+            f"{file}: schema {written.get('schema')!r}, {RESPONSE_SCHEMA!r} needed; give the"
+            " response.json of 'workbench response'"
+        )
+    peaks = sorted(written["peaks"], key=lambda one: float(one["frequency"]["value"]))
+    for low, high in pairwise(peaks):
+        if (low["kind"], high["kind"]) == ("anti-resonance", "resonance"):
+            return replace(model, resonance=_of_pair(model, low, high))
+    kinds = ", ".join(one["kind"] for one in peaks) or "none"
+    raise BadModel(
+        f"{file}: no anti-resonance with a resonance above it (peaks: {kinds}), as two masses have"
+        " them; log a run that moves the machine there, or design without --response"
+    )
+
+
+def _of_pair(model: Model, low: dict[str, Any], high: dict[str, Any]) -> dict[str, Estimate]:
+    anti, top = _estimate(low["frequency"]), _estimate(high["frequency"])
+    m, unit = model.karnopp.m, model.friction["m"].unit
+    first = m * (used(anti) / used(top)) ** 2
+    return {
+        "frequency": top, "anti_resonance": anti, "damping": _estimate(high["damping"]),
+        "m_1": Estimate(first, unit), "m_2": Estimate(m - first, unit),
+    }  # fmt: skip
+
+
+def _estimate(written: dict[str, Any]) -> Estimate:
+    return Estimate(
+        float(written["value"]), written["unit"], sd=written.get("sd"), low=written.get("low"),
+        high=written.get("high"),
+    )  # fmt: skip
