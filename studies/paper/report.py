@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from design.servo import ServoRun
-from workbench.paper.claims import claims
-from workbench.paper.document import CLAIMS, FIGURES, case_rows, claim_rows, rival_servo_rows
-from workbench.paper.measures import Case
-from workbench.paper.sensitivity import Sensitivity
-from workbench.paper.study import Study
+from studies.paper.claims import claims
+from studies.paper.document import CLAIMS, FIGURES, case_rows, claim_rows, rival_servo_rows
+from studies.paper.measures import Case
+from studies.paper.sensitivity import Sensitivity
+from studies.paper.study import Study
 from workbench.report.figures import (
     BAND,
     MEASURED,
