@@ -16,7 +16,7 @@ from workbench.options import (
     complete_file,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import OutputFolder, output_options, progress
 from workbench.steps.stages import IDENTIFY_STAGES
 
 
@@ -61,12 +61,11 @@ def command(
     report.html. LOG is a path, or a file name of the card's set.
     """
     begun = time.monotonic()
-    from workbench.documents.model_file import model_document
     from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.options import parse_orders
-    from workbench.report.model_tables import model_view
     from workbench.report.next_steps import after_identify, looked_over
-    from workbench.report.reports import identification_report
+    from workbench.report.reports import identified_view
+    from workbench.report.view import show
     from workbench.steps.identify_sources import Options, identify_sources
 
     if card_of_velocity(card):
@@ -95,14 +94,10 @@ def command(
                     on_progress=course.report,
                     keep_going=course.keep_going,
                 )
-        folder.write_json("model.json", model_document(found.model))
-        folder.write_text("report.html", identification_report(found))
-    emit(
-        {**model_document(found.model), "remarks": found.remarks, "out": folder.final},
-        as_json,
-        lambda: model_view(found.model, found.remarks, folder.final),
-        after_identify(found.model, logs, card, folder.final),
-    )
+        view = identified_view(found)
+        view.write(folder)
+    then = after_identify(found.model, logs, card, folder.final)
+    show(view, folder.final, as_json, then, remarks=found.remarks)
 
 
 def _velocity(
@@ -111,10 +106,10 @@ def _velocity(
     """The same of a rig whose velocity follows the command."""
     begun = time.monotonic()
     refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
-    from workbench.documents.velocity import velocity_document
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.velocity import after_velocity, velocity_model_view, velocity_report
+    from workbench.report.velocity import after_velocity, velocity_model_view
+    from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
     with (
@@ -124,12 +119,6 @@ def _velocity(
         with progress("identifying", as_json=as_json):
             sources = read_sources(logs, card, velocity=True)
             model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)
-        document = velocity_document(model)
-        folder.write_json("model.json", document)
-        folder.write_text("report.html", velocity_report(model))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: velocity_model_view(model, folder.final),
-        after_velocity(model, logs, card, folder.final),
-    )
+        view = velocity_model_view(model)
+        view.write(folder)
+    show(view, folder.final, as_json, after_velocity(model, logs, card, folder.final))

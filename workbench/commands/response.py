@@ -16,7 +16,7 @@ from workbench.options import (
     complete_file,
     effects_option,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import OutputFolder, output_options, progress
 from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
@@ -68,8 +68,9 @@ def command(
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.response import response_report, response_view
-    from workbench.steps.response import respond, response_csv, response_document
+    from workbench.report.response import response_view
+    from workbench.report.view import show
+    from workbench.steps.response import respond
 
     known = None if model_file is None else read_model(model_file, library(effects))
     left_in = "asked for" if friction_left_in else None
@@ -86,11 +87,9 @@ def command(
                 sources.runs, sources.rig, sources.card.name, known, lowest, left_in=left_in,
                 read=sources.remarks,
             )  # fmt: skip
-        document = response_document(found)
-        folder.write_json("response.json", document)
-        folder.write_text("response.csv", response_csv(found))
-        folder.write_text("report.html", response_report(found))
-    emit({**document, "out": folder.final}, as_json, lambda: response_view(found, folder.final))
+        view = response_view(found)
+        view.write(folder)
+    show(view, folder.final, as_json)
 
 
 def _identified(

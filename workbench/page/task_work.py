@@ -33,9 +33,9 @@ from workbench.report.model_tables import (
 )
 from workbench.report.notes import report_notes
 from workbench.report.page import Section
-from workbench.report.reports import identification_report
+from workbench.report.reports import identified_view
 from workbench.report.residual import residual
-from workbench.report.trace import trace_report
+from workbench.report.trace import traced_view
 from workbench.report.trace_pictures import against_signal, pictures
 from workbench.report.trace_tables import error_rows, errors_head, logs_of_trace
 from workbench.report.trace_words import trace_sentence
@@ -105,7 +105,7 @@ def _identified(sources: Sources, course: Course) -> Made:
         "summary": summary(model),
         "notes": _told((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
         "errors": None,
-        "report": identification_report(found),
+        "report": identified_view(found).page(),
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
     drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs))
@@ -119,7 +119,7 @@ def _traced(sources: Sources, course: Course) -> Made:
         "summary": trace_sentence(found),
         "notes": _told((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
         "errors": {"head": errors_head(False), "rows": error_rows(found.trace, rotary)},
-        "report": trace_report(found),
+        "report": traced_view(found).page(),
     }
     documents = {"trace": trace_document(found), "model": model_document(model)}
     command = model.rig.command_unit

@@ -48,12 +48,12 @@ def export_files(design: str, target: str) -> dict[str, bytes]:
     }
 
 
-def design_report_of(design: str) -> str:
+def design_page(design: str) -> str:
     """The report of a design's document."""
-    from workbench.report.reports import design_report
+    from workbench.report.reports import design_view
 
     with _read(design) as found:
-        return design_report(found, found.motion == "rotary")
+        return design_view(found, found.motion == "rotary").page()
 
 
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:

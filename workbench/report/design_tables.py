@@ -1,14 +1,13 @@
 """A design as tables and lines, for a terminal and a report."""
 
-from pathlib import Path
-
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import DriveUnits, equation_lines, force_lines
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, instead, listed, more, screen, tabled
+from workbench.report.view import OUT
+from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.recommend import other_figures, own_figures
 
 DESIGN_HEAD = (
@@ -144,9 +143,9 @@ def design_sentence(found: Design) -> str:
     return f"{said}{why}."
 
 
-def then_of_design(found: Design, folder: Path | None = None) -> list[str]:
-    """What to do next with a design; `folder` in which it lies."""
-    file = "design.json" if folder is None else str(folder / "design.json")
+def then_of_design(found: Design) -> list[str]:
+    """What to do next with a design."""
+    file = f"{OUT}design.json"
     if found.recommended == "none":
         return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and"
                 " identify again"]  # fmt: skip
@@ -196,19 +195,15 @@ def polynomial_lines(found: Design) -> list[str]:
     ]
 
 
-def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Screen:
-    """The design for a terminal.
+def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
+    """The margins, what the design rests on, and remarks.
 
     Behind --verbose: the plant, the other controllers' ramps, and the equations that a drive runs,
     which `export` writes as code.
     """
     chosen = None if found.recommended == "none" else found.recommended
-    said_by_command = folder is not None and chosen is None  # with the names of its files
-    parts: list[Part | str] = [design_sentence(found)]
-    if not said_by_command:
-        parts.extend(map(next_step, then_of_design(found, folder)))
     ramps = set_point_lines(found)
-    parts += [
+    return [
         tabled(DESIGN_HEAD, margin_rows(found)),
         MARGINS_SAID,
         tabled(IN_DRIVES_HEAD, drive_rows(found)),
@@ -221,6 +216,3 @@ def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Scr
         notes(found.remarks),
         *map(more, drive_lines(found, chosen)),
     ]
-    if folder is not None:
-        parts.append(written(folder, "design.json", "report.html"))
-    return screen(*parts)

@@ -1,15 +1,13 @@
 """A drift test in words and tables, for a terminal and for its report."""
 
-from pathlib import Path
-
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
 from workbench.cards.readable import number, shown_unit
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.remarks import told_once
 from workbench.report.model_tables import reasons_once
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, instead, screen, tabled
+from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested
 
 RUN_HEAD = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
@@ -176,12 +174,9 @@ def logs_of_drift(found: Drifted) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for both in names for name in both))
 
 
-def drift_view(found: Drifted, folder: Path | None) -> Screen:
-    """The verdict, every run, the parameters of the last one, for a terminal."""
-    parts: list[Part | str] = [drift_sentence(found)]
-    if folder is None or found.verdict in ("none", "not_judged"):  # else the command says it
-        parts.extend(map(next_step, then_of_drift(found)))
-    parts.append(tabled(RUN_HEAD, run_rows(found), right=(), latest=True))
+def drift_parts(found: Drifted) -> list[Part | str]:
+    """Every run, the parameters of the last one, and what to know of the tests."""
+    parts: list[Part | str] = [tabled(RUN_HEAD, run_rows(found), right=(), latest=True)]
     rows, logs = shift_rows(found.tests[-1]), logs_of_drift(found)
     if rows:
         once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
@@ -190,14 +185,12 @@ def drift_view(found: Drifted, folder: Path | None) -> Screen:
     # What is not judged, and why, stands in the table too.
     told = told_once((line.partition("; not judged: ")[0] for line in seen), logs)
     short = [line for line in told if line not in drift_sentence(found)]
-    parts.append(instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]))
-    parts.append(
-        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True)
-    )
-    parts.append(notes(found.remarks, logs))
-    if folder is not None:
-        parts.append(written(folder, "drift.json", "report.html"))
-    return screen(*parts)
+    return [
+        *parts,
+        instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]),
+        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True),
+        notes(found.remarks, logs),
+    ]
 
 
 def _swapped(row: Row) -> Row:

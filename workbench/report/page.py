@@ -1,8 +1,9 @@
 """A report as one HTML file without network: what was found, what next, a picture, the rest."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from workbench.report.chart import chart_assets
 from workbench.report.symbols import used_symbols
@@ -15,6 +16,23 @@ class Section:
 
     title: str
     html: str
+
+
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()) -> str:
+    """The HTML of a table, and of lines below it."""
+    return render("table", head=head, rows=list(rows), lines=lines)
+
+
+def table_section(
+    title: str, head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()
+) -> Section:
+    """A section that is a table."""
+    return Section(title, table(head, rows, lines))
+
+
+def lines_section(title: str, lines: Sequence[Any]) -> Section:
+    """A section of lines; merged remarks open up."""
+    return Section(title, render("lines", lines=lines))
 
 
 def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str] = ()) -> str:

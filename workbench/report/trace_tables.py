@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from identification.effects._base import Param
 from identification.log import Rig
@@ -23,11 +22,11 @@ from workbench.cards.readable import (
     small,
     units_of,
 )
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.model_tables import is_left_out, reasons_once
 from workbench.report.notes import notes
-from workbench.report.trace_words import percent, then_of, trace_sentence, words
-from workbench.screen import Part, Screen, more, screen, tabled
+from workbench.report.trace_words import percent, words
+from workbench.screen import Part, more, tabled
 from workbench.steps.trace import Traced, effect_estimates
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
@@ -202,30 +201,26 @@ def drift_rows(found: Trace) -> list[Row]:
     ]
 
 
-def trace_view(traced: Traced, folder: Path | None) -> Screen:
-    """The verdict, errors before and after, effects, parameters and drift, for a terminal.
+def trace_parts(traced: Traced) -> list[Part | str]:
+    """Errors before and after, effects, parameters and drift.
 
     Behind --verbose: the effects' equations and sources, and the rivals.
     """
     found, rotary = traced.trace, traced.model.rotary
     plain, logs = change_rows(found), logs_of_trace(traced)
-    parts: list[Part | str] = [trace_sentence(traced)]
-    parts.extend(next_step(line) for line in then_of(traced, folder))
     errors = error_rows(found, rotary)
-    parts.append(tabled(errors_head(bool(traced.test)), _telling(errors), whole=errors))
+    parts: list[Part | str] = [
+        tabled(errors_head(bool(traced.test)), _telling(errors), whole=errors)
+    ]
     if found.effects:
-        rows = effect_rows(found, traced.model.rig)
-        parts.append(_effects(found, rows, logs))
+        parts.append(_effects(found, effect_rows(found, traced.model.rig), logs))
         parts += map(more, effect_lines(found))
     parts.append(more(tabled(RIVAL_HEAD, rival_rows(found, rotary))))
     told = reasons_once(plain, logs, 2 if found.effects else 1)
     parts.append(tabled(change_head(found), told, whole=plain))
     if found.drift:
         parts.append(tabled(DRIFT_HEAD, drift_rows(found)))
-    parts.append(notes((*traced.remarks, *found.remarks), logs))
-    if folder is not None:
-        parts.append(written(folder, "trace.json", "model.json", "report.html"))
-    return screen(*parts)
+    return [*parts, notes((*traced.remarks, *found.remarks), logs)]
 
 
 def logs_of_trace(traced: Traced) -> tuple[str, ...]:
@@ -237,17 +232,3 @@ def _telling(errors: list[Row]) -> list[Row]:
     """The errors in newtons and millimetres that are known; those that fell, where any did."""
     known = [row for row in errors if set(row[1:5]) != {"-"} and "%" not in row[0]]
     return [row for row in known if row[1] != row[2] or row[3] != row[4]] or known
-
-
-def trace_parts(traced: Traced) -> list[tuple[Sequence[str], list[Row], list[str]]]:
-    """Errors before and after, effects, rivals, parameters and drift: head, rows and lines each;
-    those without rows are left out."""
-    found, rotary = traced.trace, traced.model.rotary
-    parts: list[tuple[Sequence[str], list[Row], list[str]]] = [
-        (errors_head(bool(traced.test)), error_rows(found, rotary), []),
-        (EFFECT_HEAD, effect_rows(found, traced.model.rig), effect_lines(found)),
-        (RIVAL_HEAD, rival_rows(found, rotary), []),
-        (change_head(found), change_rows(found), []),
-        (DRIFT_HEAD, drift_rows(found), []),
-    ]
-    return [part for part in parts if part[1]]

@@ -1,12 +1,10 @@
 """A validation as tables and lines, for a terminal and a report."""
 
-from pathlib import Path
-
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, listed, more, screen, tabled
+from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
 from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
 from workbench.steps.validate import Validation
@@ -152,21 +150,14 @@ def then_of_validation(found: Validation) -> list[str]:
     return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"]
 
 
-def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> Screen:
-    """The validation for a terminal; what controllers miss that are not judged, with --verbose."""
-    said_by_command = folder is not None and not found.passed  # with the names of its files
+def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
+    """The figures of each loop; what controllers miss that are not judged, with --verbose."""
     others = other_figures(found.why)
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
-    parts: list[Part | str] = [validation_sentence(found)]
-    if not said_by_command:
-        parts.extend(map(next_step, then_of_validation(found)))
-    parts += [
+    return [
         validation_table(found, rotary),
         *([more(others)] if others else []),
         *(more(listed(_missed(found, name))) for name in alone),
         columns_line(found, rotary),
         notes(found.remarks),
     ]
-    if folder is not None:
-        parts.append(written(folder, "validation.json", "report.html"))
-    return screen(*parts)
