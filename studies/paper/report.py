@@ -52,7 +52,7 @@ def paper_report(found: Study) -> str:
     return page("The paper in simulation", lead, sections)
 
 
-def _table(head: tuple[str, ...], rows: Any, lines: tuple[str, ...] = ()) -> str:
+def _table(head: tuple[str, ...], rows: Any, lines: tuple[str, ...] = ()) -> Any:
     return table(head, rows, lines)
 
 

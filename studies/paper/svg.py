@@ -3,9 +3,10 @@
 import io
 import re
 from html import escape
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from workbench.report.figures import BAND, GREY, MODEL, OTHER, REFERENCE
+from workbench.report.templating import safe
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +40,7 @@ def inline(drawn: "Figure", name: str, description: str) -> str:
     return svg.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1)
 
 
-def picture(svg: str, caption: str) -> str:
+def picture(svg: str, caption: str) -> Any:
     """The HTML of an inline figure with its caption."""
     said = f"<figcaption>{escape(caption)}</figcaption>"
-    return f'<figure class="picture">\n{svg}\n{said}\n</figure>'
+    return safe(f'<figure class="picture">\n{svg}\n{said}\n</figure>')

@@ -114,7 +114,7 @@ def _keys_at(kind: Any, loc: Sequence[str | int]) -> list[str]:
     for part in loc:
         hints = [get_type_hints(one) for one in _options(kind) if is_dataclass(one)]
         inside = [get_args(one) for one in _options(kind) if get_args(one)]
-        kind = hints[0][part] if hints else inside[0][0 if isinstance(part, int) else -1]
+        kind = hints[0][str(part)] if hints else inside[0][0 if isinstance(part, int) else -1]
     return [each.name for one in _options(kind) if is_dataclass(one) for each in fields(one)]
 
 

@@ -24,7 +24,10 @@ from workbench.steps.drift import Drifted, Tested, drift_document
 
 WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]
 LEAST_STATISTIC = 1e-3  # over its threshold, that is drawn
-BESIDE, UPRIGHT = 0.12, 1e-3  # places on the axis of the parameters
+BESIDE = 0.12  # of this log beside the model, in places of the axis of the parameters
+UPRIGHT = 0.01  # half the width of an upright line, which goes on in x
+LINEAR_UP_TO = 10.0  # statistic over threshold up to which the axis is linear
+NAMED_HEIGHT = 280
 THIS_LOG: tuple[tuple[str, bool, Colour], ...] = (
     ("this log", False, "measured"),
     ("this log, moved", True, "model"),
@@ -96,9 +99,9 @@ def _changes(found: Drifted, last: Tested) -> Panel:
             where = place[of] + BESIDE
             lines += _with_intervals(name, where, change[of], half[of], colour)
     return Panel(
-        "", "change from the model in force [%]", lines, last.source.file,
+        "", "change [%]", lines, f"{last.source.file}: change from the model in force",
         bands=[Band("does not matter", -margin, margin, "y", "band")],
-        x_range=(-0.5, n - 0.5), names=[shift.name for shift in shifts],
+        x_range=(-0.5, n - 0.5), names=[shift.name for shift in shifts], height=NAMED_HEIGHT,
     )  # fmt: skip
 
 
@@ -107,9 +110,11 @@ def _with_intervals(
 ) -> list[Line]:
     """Dots, and an upright line through each."""
     half = np.minimum(half, WIDEST_CHANGE)
-    x = (place[:, None] + UPRIGHT * np.array([-1.0, 1.0, 2.0])).ravel()
-    y = np.stack([values - half, values + half, np.full(len(values), np.nan)], axis=1).ravel()
-    return [Line("", x, y, colour), Line(name, place, values, colour, "dots")]
+    upright = [
+        Line("", at + np.array([-UPRIGHT, UPRIGHT]), value + np.array([-size, size]), colour)
+        for at, value, size in zip(place, values, half, strict=True)
+    ]
+    return [*upright, Line(name, place, values, colour, "dots")]
 
 
 def _over_logs(found: Drifted) -> Panel:
@@ -120,12 +125,15 @@ def _over_logs(found: Drifted) -> Panel:
     for name, key, colour in STATISTICS:
         known = _known([getattr(one, key) for one in seen])
         lines += [Line("", number, known, colour), Line(name, number, known, colour, "dots")]
+    most = max([1.0, *(float(np.nanmax(one.y, initial=0.0)) for one in lines)])
+    wide = most > LINEAR_UP_TO
     other = number[[one.verdict == "structure" for one in seen]]
     if len(other):
         lines.append(Line("other structure", other, np.ones(len(other)), "model", "dots"))
     return Panel(
         "log since the model was put in force", "statistic over its threshold", lines,
-        marks=[Mark(1.0)], log_y=True, x_range=(0.5, len(seen) + 0.5),
+        marks=[Mark(1.0)], x_range=(0.5, len(seen) + 0.5), log_y=wide,
+        y_range=None if wide else (0.0, 1.1 * most), height=NAMED_HEIGHT,
     )  # fmt: skip
 
 

@@ -178,7 +178,14 @@ def run_chart(found: Experiment) -> Chart:
             lines.append(Line("reference", seen.t, seen.r, "reference", "dotted"))
         marks = [Mark(edge) for edge in edges if np.all(np.isfinite(edges))]
         areas = [Area("machines that it may be", seen.t, low, high)]
-        panels.append(Panel("time [s]", f"{name} [{unit}]", lines, areas=areas, marks=marks))
+        ends = [float(low.min()), float(high.max()), *(mark.at for mark in marks)]
+        room = 0.05 * (max(ends) - min(ends))
+        panels.append(
+            Panel(
+                "time [s]", f"{name} [{unit}]", lines, areas=areas, marks=marks,
+                y_range=(min(ends) - room, max(ends) + room),
+            )
+        )  # fmt: skip
     return Chart("experiment", "reference, motion, speed and force", panels)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from workbench.report.chart import chart_assets
 from workbench.report.symbols import used_symbols
-from workbench.report.templating import render
+from workbench.report.templating import render, safe
 
 
 @dataclass(frozen=True)
@@ -18,9 +18,9 @@ class Section:
     html: str
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()) -> str:
+def table(head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()) -> Any:
     """The HTML of a table, and of lines below it."""
-    return render("table", head=head, rows=list(rows), lines=lines)
+    return safe(render("table", head=head, rows=list(rows), lines=lines))
 
 
 def table_section(

@@ -68,6 +68,7 @@ def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str 
         [f"`workbench trace {log} --card {card}`, where that is more than noise"],
         has_page=False,
         lead=first.rstrip(".") + ".",
+        then_below=len(more),
     )
 
 

@@ -1,6 +1,7 @@
 """Frequency responses for a terminal and as Bode plots."""
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,7 @@ from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
 from workbench.report.page import Section, lines_section, table
-from workbench.report.templating import render
+from workbench.report.templating import render, safe
 from workbench.report.view import View
 from workbench.screen import listed, tabled
 from workbench.steps.response import (
@@ -175,11 +176,11 @@ def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
     return [*sections, lines_section("Notes", told)] if told else sections
 
 
-def _peaks_and(found: Responded, lines: Sequence[str]) -> str:
+def _peaks_and(found: Responded, lines: Sequence[str]) -> Any:
     """The table of the resonances, where there are any, and lines."""
     if found.peaks:
         return table(PEAK_HEAD, peak_rows(found), lines)
-    return render("lines", lines=lines)
+    return safe(render("lines", lines=lines))
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
@@ -196,11 +197,11 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
     return [Section("Over frequency", plant_html(found) + _peaks_and(found, lines))]
 
 
-def plant_html(found: Responded) -> str:
+def plant_html(found: Responded) -> Any:
     """The plant's Bode plot with its caption."""
     without = "" if found.left_in else " Grey: the same with friction left in the force."
     model = "" if found.curves is None else " Dashed: the model's mass, friction and springs."
-    return str(chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}"))
+    return chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}")
 
 
 def plant_chart(found: Responded) -> Chart:

@@ -32,6 +32,7 @@ ROBUST_CAPTION = (
     "Share of the machines drawn (upwards) on which a measure is at most the value (to the right):"
     " the robust loop, the nominal design's, the present one. Broken: the limit."
 )
+UPWARDS = 1e-7  # of the largest value, from machine to machine
 AXIS_WIDEST = 12.0  # times the middle of all curves, to which an axis goes
 
 
@@ -216,7 +217,10 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
         at = np.sort(factor * values)
         share = 100.0 * np.arange(1, len(at) + 1) / len(at)
         keep = np.isfinite(at)
-        lines.append(Line(name, at[keep], share[keep], *CURVE_LOOKS[name]))
+        at, share = at[keep], share[keep]
+        # Where many machines have one value the line goes up, which an axis takes as going on.
+        apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
+        lines.append(Line(name, at + apart, share, *CURVE_LOOKS[name]))
     return Panel(
         f"{one.words.split(',')[0]}{unit}", "share of machines [%]", lines,
         marks=[] if limit is None else [Mark(factor * limit, "x")],

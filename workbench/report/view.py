@@ -33,7 +33,7 @@ class View:
     picture, drawn when they are asked for. content: the document by which other programs read it;
     files: what the command writes, by name, a text or a document, and the page where it has_page.
     then_by_command: its command ends with the step to type, so that its screen leaves `then` out.
-    lead: of the page, where that is another sentence.
+    lead: of the page, where that is another sentence. then_below: so many parts stand above `then`.
     """
 
     title: str
@@ -47,6 +47,7 @@ class View:
     then_by_command: bool = False
     has_page: bool = True
     lead: str = ""
+    then_below: int = 0
 
     @cached_property
     def document(self) -> Mapping[str, Any]:
@@ -62,7 +63,8 @@ class View:
         """The result for a terminal; folder: where its command has written the files."""
         then = () if folder is not None and self.then_by_command else self._then(folder)
         where = () if folder is None else (written(folder, *self.names),)
-        return screen(self.sentence, *map(next_step, then), *self.parts, *where)
+        first, rest = self.parts[: self.then_below], self.parts[self.then_below :]
+        return screen(self.sentence, *first, *map(next_step, then), *rest, *where)
 
     def page(self) -> str:
         """The result as a page of HTML that needs no network."""

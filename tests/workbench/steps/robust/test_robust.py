@@ -148,6 +148,7 @@ def test_the_document_is_json_and_names_every_loop() -> None:
 def test_the_report_shows_the_shares_and_the_design() -> None:
     text = robust_view(found(), rotary=False).page()
     assert text.count('<figure class="chart"') == 1
+    assert "&lt;t" not in text
     assert "modulus margin" in text and "nominal" in text
     assert any("drawn anew" in line for line in robust_lines(found(), rotary=False))
 
