@@ -24,6 +24,7 @@ from workbench.report.figures import (
     style,
 )
 from workbench.report.page import Section, page, table
+from workbench.screen import tabled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,7 +54,7 @@ def paper_report(found: Study) -> str:
 
 
 def _table(head: tuple[str, ...], rows: Any, lines: tuple[str, ...] = ()) -> Any:
-    return table(head, rows, lines)
+    return table(tabled(head, rows), lines)
 
 
 def _figure_6(found: Study) -> Section:

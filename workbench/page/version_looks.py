@@ -60,7 +60,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     """Designs of versions by their numbers, each as text, side by side."""
     from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
     from workbench.report.controllers import linear_step
-    from workbench.report.design_tables import DESIGN_HEAD, margin_rows
+    from workbench.report.design_tables import DESIGN_HEAD, margins_table
 
     rows: list[Sequence[str]] = []
     lines: list[Line] = []
@@ -68,7 +68,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     for place, (number, text) in enumerate(designs):
         try:
             with _read(text) as found:
-                rows += [(f"version {number}", *row) for row in margin_rows(found)]
+                rows += [(f"version {number}", *row) for row in margins_table(found).whole]
                 for name, one in found.controllers.items():
                     t, y = linear_step(found, one)
                     colour: Colour = "reference" if place else "model"

@@ -20,14 +20,14 @@ POSTGRES_FUNCTIONS = (
     "CREATE TRIGGER in_force_forward BEFORE UPDATE ON in_force"
     " FOR EACH ROW EXECUTE FUNCTION registry_forward()",
 )
-_MOVED = "BEGIN SELECT RAISE(ABORT, 'in_force moves by a new decision only'); END"
+POINTER_MOVES = "BEGIN SELECT RAISE(ABORT, 'in_force moves by a new decision only'); END"
 SQLITE_POINTER = (
     "CREATE TRIGGER in_force_delete BEFORE DELETE ON in_force"
     " BEGIN SELECT RAISE(ABORT, 'in_force is never empty again'); END",
     "CREATE TRIGGER in_force_update BEFORE UPDATE ON in_force"
-    f" WHEN NEW.machine <> OLD.machine OR NEW.decision_id <= OLD.decision_id {_MOVED}",
+    f" WHEN NEW.machine <> OLD.machine OR NEW.decision_id <= OLD.decision_id {POINTER_MOVES}",
     "CREATE TRIGGER in_force_replace BEFORE INSERT ON in_force"
-    f" WHEN EXISTS (SELECT 1 FROM in_force AS o WHERE o.machine = NEW.machine) {_MOVED}",
+    f" WHEN EXISTS (SELECT 1 FROM in_force AS o WHERE o.machine = NEW.machine) {POINTER_MOVES}",
 )
 
 

@@ -32,13 +32,14 @@ MARGINS_SAID = (
 )
 
 
-def margin_rows(found: Design) -> list[Row]:
-    """One row a controller, by `DESIGN_HEAD`."""
-    return [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+def margins_table(found: Design) -> Part:
+    """A row a controller."""
+    rows = [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+    return tabled(DESIGN_HEAD, rows)
 
 
-def drive_rows(found: Design) -> list[Row]:
-    """The same in a drive engineer's words, by `IN_DRIVES_HEAD`; none of an older file."""
+def drive_table(found: Design) -> Part:
+    """The same in a drive engineer's words; without rows of an older file."""
     rows = []
     for name, one in found.controllers.items():
         m = one.margins
@@ -51,7 +52,7 @@ def drive_rows(found: Design) -> list[Row]:
             "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
             "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
         ))  # fmt: skip
-    return rows
+    return tabled(IN_DRIVES_HEAD, rows)
 
 
 def _margins(one: Controller) -> Row:
@@ -204,9 +205,9 @@ def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
     chosen = None if found.recommended == "none" else found.recommended
     ramps = set_point_lines(found)
     return [
-        tabled(DESIGN_HEAD, margin_rows(found)),
+        margins_table(found),
         MARGINS_SAID,
-        tabled(IN_DRIVES_HEAD, drive_rows(found)),
+        drive_table(found),
         listed(other_lines(found)),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),

@@ -7,14 +7,12 @@ import numpy as np
 from identification.arrays import Array
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.drift_tables import (
-    RUN_HEAD,
-    SHIFT_HEAD,
     drift_notes,
     drift_parts,
     drift_sentence,
     logs_of_drift,
-    run_rows,
-    shift_rows,
+    run_table,
+    shift_table,
     then_of_drift,
 )
 from workbench.report.notes import report_notes
@@ -58,7 +56,7 @@ def drift_view(found: Drifted, model_name: str) -> View:
 
 
 def _sections(found: Drifted) -> list[Section]:
-    sections, logs = [], table_section("The logs", RUN_HEAD, run_rows(found))
+    sections, logs = [], table_section("The logs", run_table(found))
     judged = _judged(found)
     if judged:
         last = judged[-1]
@@ -67,7 +65,7 @@ def _sections(found: Drifted) -> list[Section]:
     sections.append(logs)
     if judged:
         title = f"Parameters before and after, {last.source.file}"
-        sections.append(table_section(title, SHIFT_HEAD, shift_rows(last)))
+        sections.append(table_section(title, shift_table(last)))
     notes = report_notes(drift_notes(found), logs_of_drift(found))
     return [*sections, lines_section("Notes", notes)]
 

@@ -8,7 +8,7 @@ from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart
 from workbench.report.notes import notes
 from workbench.report.page import Section, table, table_section
 from workbench.report.view import View
-from workbench.screen import listed, more, tabled
+from workbench.screen import Part, listed, more, tabled
 from workbench.steps.experiment.planned import Experiment, Promised, experiment_document
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
@@ -38,9 +38,9 @@ def reference_text(found: Experiment) -> str:
     return "\n".join([f"t [s],r [{unit}]", *rows, ""])
 
 
-def promise_rows(found: Experiment) -> list[Row]:
-    """A row a parameter, by `PROMISE_HEAD`."""
-    return [_row(one) for one in found.promise]
+def promise_table(found: Experiment) -> Part:
+    """A row a parameter."""
+    return tabled(PROMISE_HEAD, map(_row, found.promise), right=(1, 3, 4, 5))
 
 
 def _row(one: Promised) -> Row:
@@ -120,7 +120,7 @@ def experiment_view(found: Experiment) -> View:
         f"The run to make next on {found.card}",
         experiment_lead(found),
         [
-            tabled(PROMISE_HEAD, promise_rows(found), right=(1, 3, 4, 5)),
+            promise_table(found),
             listed(limit_lines(found)),
             more(listed(search_lines(found))),
             notes(found.remarks),
@@ -142,7 +142,7 @@ def _sections(found: Experiment) -> list[Section]:
          _rate(found, i))
         for i, one in enumerate(found.segments)
     ]  # fmt: skip
-    promised = table(PROMISE_HEAD, promise_rows(found), experiment_lines(found))
+    promised = table(promise_table(found), experiment_lines(found))
     sections = [
         Section("The run", chart_html(run_chart(found), RUN_CAPTION)),
         Section("What it promises", promised + chart_html(promise_chart(found))),
@@ -150,8 +150,8 @@ def _sections(found: Experiment) -> list[Section]:
     if found.separation:
         apart = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
         between = ("if the machine has", "rival", "deviations of the noise")
-        sections.append(table_section("What it tells apart", between, apart))
-    return [*sections, table_section("Pieces", ("", "piece", "amplitude", "pace"), pieces)]
+        sections.append(table_section("What it tells apart", tabled(between, apart)))
+    return [*sections, table_section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
 
 
 def _rate(found: Experiment, index: int) -> str:

@@ -1,6 +1,6 @@
 """A report as one HTML file without network: what was found, what next, a picture, the rest."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from typing import Any
@@ -8,6 +8,7 @@ from typing import Any
 from workbench.report.chart import chart_assets
 from workbench.report.symbols import used_symbols
 from workbench.report.templating import render, safe
+from workbench.screen import Part
 
 
 @dataclass(frozen=True)
@@ -18,16 +19,16 @@ class Section:
     html: str
 
 
-def table(head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()) -> Any:
-    """The HTML of a table, and of lines below it."""
-    return safe(render("table", head=head, rows=list(rows), lines=lines))
+def table(part: Part, lines: Sequence[Any] = ()) -> Any:
+    """The HTML of a whole table, and of lines below it; "" where it has no rows and none are."""
+    if not part.whole:
+        return safe(render("lines", lines=lines) if lines else "")
+    return safe(render("table", head=part.full_head, rows=part.whole, lines=lines))
 
 
-def table_section(
-    title: str, head: Sequence[str], rows: Iterable[Sequence[str]], lines: Sequence[Any] = ()
-) -> Section:
+def table_section(title: str, part: Part, lines: Sequence[Any] = ()) -> Section:
     """A section that is a table."""
-    return Section(title, table(head, rows, lines))
+    return Section(title, table(part, lines))
 
 
 def lines_section(title: str, lines: Sequence[Any]) -> Section:

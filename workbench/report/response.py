@@ -15,13 +15,11 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.output import Row
 from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
 from workbench.report.page import Section, lines_section, table
-from workbench.report.templating import render, safe
 from workbench.report.view import View
-from workbench.screen import listed, tabled
+from workbench.screen import Part, listed, tabled
 from workbench.steps.response import (
     Responded,
     decibels,
@@ -58,11 +56,12 @@ def response_sentence(found: Responded) -> str:
     return f"{said}, with {_and(named)}."
 
 
-def peak_rows(found: Responded) -> list[Row]:
+def peak_table(found: Responded) -> Part:
     """Resonances and anti-resonances with their intervals, a row each."""
-    return [
+    rows = [
         (one.kind, *_cells(one.frequency, "Hz"), *_cells(one.damping, "1")) for one in found.peaks
     ]
+    return tabled(PEAK_HEAD, rows, right=(1, 3))
 
 
 def _cells(one: Size, unit: str) -> tuple[str, str]:
@@ -148,11 +147,10 @@ def response_lines(found: Responded) -> list[str]:
 def response_view(found: Responded) -> View:
     """The responses with their resonances and margins."""
     logs, lines = tuple(one["file"] for one in found.logs), response_lines(found)
-    resonances = [tabled(PEAK_HEAD, peak_rows(found), right=(1, 3))] if found.peaks else []
     return View(
         f"Frequency response of {found.card}",
         response_sentence(found),
-        [*resonances, listed(lines), notes(found.remarks, logs)],
+        [peak_table(found), listed(lines), notes(found.remarks, logs)],
         lambda: response_document(found),
         {
             "response.json": lambda: response_document(found),
@@ -166,7 +164,7 @@ def response_view(found: Responded) -> View:
 def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
     sections = [
         Section("Plant", plant_html(found)),
-        Section("Resonances and margins", _peaks_and(found, response_lines(found))),
+        Section("Resonances and margins", table(peak_table(found), response_lines(found))),
     ]
     if found.open_loop is not None:
         sections.append(Section("Open loop", loop_html(found)))
@@ -174,13 +172,6 @@ def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
         sections.append(Section("Controller", controller_html(found)))
     told = report_notes(found.remarks, logs)
     return [*sections, lines_section("Notes", told)] if told else sections
-
-
-def _peaks_and(found: Responded, lines: Sequence[str]) -> Any:
-    """The table of the resonances, where there are any, and lines."""
-    if found.peaks:
-        return table(PEAK_HEAD, peak_rows(found), lines)
-    return safe(render("lines", lines=lines))
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
@@ -194,7 +185,7 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
     except UserError:
         return []
     lines = [response_sentence(found), friction_line(found)]
-    return [Section("Over frequency", plant_html(found) + _peaks_and(found, lines))]
+    return [Section("Over frequency", plant_html(found) + table(peak_table(found), lines))]
 
 
 def plant_html(found: Responded) -> Any:

@@ -8,14 +8,13 @@ from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
-from workbench.output import Row
 from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
 from workbench.report.notes import notes
 from workbench.report.page import Section, lines_section, table, table_section
 from workbench.report.view import View
-from workbench.screen import listed, tabled
+from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
 from workbench.steps.robust.document import robust_document
 from workbench.steps.robust.outcomes import MEASURES, Measure
@@ -59,9 +58,9 @@ def robust_sentence(found: Robust) -> str:
     )
 
 
-def promise_rows(found: Robust, rotary: bool) -> list[Row]:
-    """A row a measure of the robust loop, by `ROBUST_HEAD`."""
-    return [
+def promise_table(found: Robust, rotary: bool) -> Part:
+    """A row a measure of the robust loop."""
+    rows = [
         (
             one.words,
             "" if spread.limit is None else _limit(one, spread.limit, rotary),
@@ -70,14 +69,16 @@ def promise_rows(found: Robust, rotary: bool) -> list[Row]:
         )
         for one, spread in _of(found.promises[ROBUST])
     ]
+    return tabled(ROBUST_HEAD, rows, right=(2, 3, 4, 5))
 
 
-def beside_rows(found: Robust, rotary: bool) -> list[Row]:
-    """The medians of every loop, and the shares, by `BESIDE_HEAD`."""
-    return [
+def beside_table(found: Robust, rotary: bool) -> Part:
+    """The medians of every loop, and the shares."""
+    rows = [
         (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_LOOKS))
         for one, _ in _of(found.promises[ROBUST])
     ]
+    return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
 
 
 def _beside(one: Measure, promise: Promise | None, rotary: bool) -> str:
@@ -143,8 +144,8 @@ def robust_view(found: Robust, rotary: bool) -> View:
         f"Robust design for {found.design.card}",
         robust_sentence(found),
         [
-            tabled(ROBUST_HEAD, promise_rows(found, rotary), right=(2, 3, 4, 5)),
-            tabled(BESIDE_HEAD, beside_rows(found, rotary), right=(1, 2, 3)),
+            promise_table(found, rotary),
+            beside_table(found, rotary),
             listed(choice_lines(found, rotary)),
             notes(robust_remarks(found)),
         ],
@@ -163,13 +164,13 @@ def robust_view(found: Robust, rotary: bool) -> View:
 def _sections(found: Robust, rotary: bool) -> list[Section]:
     design, chart = found.design, robust_chart(found, rotary)
     lines = robust_lines(found, rotary)
-    promised = table(ROBUST_HEAD, promise_rows(found, rotary), lines)
+    promised = table(promise_table(found, rotary), lines)
     picture = chart_html(chart, ROBUST_CAPTION) if chart.panels else ""
     return [
         Section("Over the machines that there may be", picture + promised),
         table_section(
             "Beside the nominal design and the present controller",
-            BESIDE_HEAD, beside_rows(found, rotary),
+            beside_table(found, rotary),
         ),
         controllers(design, rotary),
         coefficients(design),

@@ -16,18 +16,13 @@ from workbench.report.trace_pictures import (
     signal_chart,
 )
 from workbench.report.trace_tables import (
-    DRIFT_HEAD,
-    EFFECT_HEAD,
-    RIVAL_HEAD,
-    change_head,
-    change_rows,
-    drift_rows,
+    changes_table,
+    differences_table,
     effect_lines,
-    effect_rows,
-    error_rows,
-    errors_head,
+    effects_table,
+    errors_table,
     logs_of_trace,
-    rival_rows,
+    rivals_table,
     trace_parts,
 )
 from workbench.report.trace_words import then_of, trace_sentence, words
@@ -73,23 +68,22 @@ def _sections(traced: Traced) -> list[Section]:
     sections = [*_drawn(traced, drawn), *_hidden(traced, drawn)]
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
-    head = errors_head(bool(traced.test))
-    sections.append(table_section("Before and after", head, error_rows(found, model.rotary)))
+    errors = errors_table(found, model.rotary, bool(traced.test))
+    sections.append(table_section("Before and after", errors))
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
-        rows = effect_rows(found, model.rig)
-        sections.append(table_section(title, EFFECT_HEAD, rows, effect_lines(found)))
+        effects = effects_table(found, model.rig)
+        sections.append(table_section(title, effects, effect_lines(found)))
     if found.curves:
         sections.append(free_curves(found.curves, model.rotary, model.rig.command_unit))
     sections.append(friction_before_after(traced))
     plain = "Parameters before and after" if found.effects else "Parameters"
-    for title, head, rows in (
-        ("Rivals, by the force that they leave", RIVAL_HEAD, rival_rows(found, model.rotary)),
-        (plain, change_head(found), change_rows(found)),
-        ("Drift between training and test logs", DRIFT_HEAD, drift_rows(found)),
-    ):
-        if rows:
-            sections.append(table_section(title, head, rows))
+    tables = {
+        "Rivals, by the force that they leave": rivals_table(found, model.rotary),
+        plain: changes_table(found),
+        "Drift between training and test logs": differences_table(found),
+    }
+    sections += [table_section(title, one) for title, one in tables.items() if one.whole]
     sections += over_frequency(model, traced.train)
     notes = report_notes((*traced.remarks, *found.remarks), logs_of_trace(traced))
     return [*sections, lines_section("Notes", notes)] if notes else sections

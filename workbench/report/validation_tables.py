@@ -10,8 +10,18 @@ from workbench.steps.recommend import in_thousandths, other_figures, own_figures
 from workbench.steps.validate import Validation
 
 
-def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
-    """Names of the columns of `validation_rows`."""
+def validation_table(found: Validation, rotary: bool = False) -> Part:
+    """A row a controller and plant."""
+    alone = len(found.figures[found.judged]) == 1
+    rows = [
+        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        for name, places in found.figures.items()
+        for place, one in places.items()
+    ]
+    return tabled(_head(found, rotary), rows, right=())
+
+
+def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
     units, one = shown(rotary), _any(found)
     where = ("on",) if len(found.figures[found.judged]) > 1 else ()
     command = () if one.command_peak is None else (f"command {one.command_unit}",)
@@ -29,21 +39,6 @@ def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
         *command,
         "limit cycle",
     )
-
-
-def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
-    """One row a controller and plant, by `validation_head`."""
-    alone = len(found.figures[found.judged]) == 1
-    return [
-        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
-        for name, places in found.figures.items()
-        for place, one in places.items()
-    ]
-
-
-def validation_table(found: Validation, rotary: bool = False) -> Part:
-    """The table for a terminal."""
-    return tabled(validation_head(found, rotary), validation_rows(found, rotary), right=())
 
 
 def _any(found: Validation) -> LoopFigures:

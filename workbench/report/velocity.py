@@ -84,7 +84,7 @@ def _logs(model: VelocityModel) -> tuple[str, ...]:
 
 def valve_section(model: VelocityModel) -> Section:
     """The numbers with their meaning."""
-    return table_section("The valve", (*MODEL_HEAD, "meaning"), valve_rows(model))
+    return table_section("The valve", tabled((*MODEL_HEAD, "meaning"), valve_rows(model)))
 
 
 def valve_table(model: VelocityModel) -> Part:
@@ -237,8 +237,8 @@ def velocity_design_view(found: VelocityDesign) -> View:
 VALIDATED = ("plant", "standstill", "overshoot", "tracking", "modulus", "delay", "misses")
 
 
-def _validation_rows(found: VelocityValidation) -> list[Row]:
-    rows = []
+def _validation_table(found: VelocityValidation) -> Part:
+    rows: list[Row] = []
     for place, one in found.figures.items():
         m = one.margins or {}
         shown = [
@@ -247,7 +247,7 @@ def _validation_rows(found: VelocityValidation) -> list[Row]:
         ]
         shares = [f"{100 * value:.2g} %" for value in (one.standstill, one.overshoot, one.tracking)]
         rows.append((place, *shares, *shown, "; ".join(one.misses) or "nothing"))
-    return rows
+    return tabled(VALIDATED, rows, (1, 2, 3, 4, 5))
 
 
 def _passed(found: VelocityValidation) -> str:
@@ -263,10 +263,10 @@ def velocity_validation_view(found: VelocityValidation) -> View:
     return View(
         f"Validation for {found.card}",
         _passed(found),
-        [tabled(VALIDATED, _validation_rows(found), (1, 2, 3, 4, 5))],
+        [_validation_table(found)],
         lambda: velocity_validation_document(found),
         {"validation.json": lambda: velocity_validation_document(found)},
-        lambda: [table_section("The loop", VALIDATED, _validation_rows(found))],
+        lambda: [table_section("The loop", _validation_table(found))],
     )
 
 

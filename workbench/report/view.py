@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from workbench.ending import Step
+from workbench.files import REPORT_FILE
 from workbench.output import OutputFolder, dumps, emit, next_step, written
 from workbench.report.chart import Chart
 from workbench.report.page import Section, page, table
@@ -17,7 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 OUT = "\0"  # in what to do next: the folder of the files, where they are written
-REPORT_FILE = "report.html"
 
 
 def no_sections() -> Sequence[Section]:
@@ -78,7 +78,7 @@ class View:
             if isinstance(part, str):
                 shown.append(render("lines", lines=[part]))
             elif part.full_head:
-                shown += [table(part.full_head, part.whole)] if part.whole else []
+                shown.append(table(part))
             elif lines := part.merged or part.whole:
                 shown.append(render("lines", lines=lines))
         return "\n".join(shown)

@@ -15,9 +15,8 @@ from workbench.report.in_a_row import liveliest
 from workbench.report.page import Section, page
 from workbench.report.reports import design_view, identified_view, validation_view
 from workbench.report.validation_tables import (
-    validation_head,
     validation_lines,
-    validation_rows,
+    validation_table,
 )
 from workbench.steps.identify_sources import Identified
 from workbench.steps.validate import validate
@@ -167,6 +166,6 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
 def test_a_rotary_validation_has_rotary_columns() -> None:
     model = turned(identified()).model
     result, _ = validate(model, designed(model), np.random.default_rng(0))
-    head = validation_head(result, rotary=True)
-    assert "force N m" in head and "force N" in validation_head(result)
-    assert all(len(row) == len(head) for row in validation_rows(result, rotary=True))
+    found = validation_table(result, rotary=True)
+    assert "force N m" in found.head and "force N" in validation_table(result).head
+    assert all(len(row) == len(found.head) for row in found.whole)

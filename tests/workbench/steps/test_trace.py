@@ -37,12 +37,11 @@ from workbench.report.trace_pictures import (
     share_inside,
 )
 from workbench.report.trace_tables import (
-    change_head,
-    change_rows,
-    drift_rows,
-    effect_rows,
-    error_rows,
-    rival_rows,
+    changes_table,
+    differences_table,
+    effects_table,
+    errors_table,
+    rivals_table,
 )
 from workbench.report.trace_words import percent, trace_sentence
 from workbench.steps import trace as tracing
@@ -111,7 +110,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
     document = trace_document(found)
     assert document["effects"][0]["params"]["v_s"]["unit"] == "rad/s"
     assert found.model.effects["spring"]["k"].unit == "N m/rad"
-    assert [row[2] for row in effect_rows(found.trace, Rig("force", motion="rotary"))] == [
+    assert [row[2] for row in effects_table(found.trace, Rig("force", motion="rotary")).whole] == [
         "N m",
         "rad/s",
         "",
@@ -119,7 +118,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad",
         "N m/rad**3",
     ]
-    assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in trace_sentence(found)
+    assert "[rad]" in str(errors_table(found.trace, True).whole) and "N m" in trace_sentence(found)
     html = checked(traced_view(found).page(), 5)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
@@ -238,18 +237,18 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
 
 def test_rows_of_the_tables() -> None:
     found = trace_of("drift")
-    assert error_rows(found, False)[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
-    assert [row[0] for row in rival_rows(found, False)] == [
+    assert errors_table(found, False).whole[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
+    assert [row[0] for row in rivals_table(found, False).whole] == [
         "spring",
         "nonlinear viscous",
         "cogging",
     ]
-    changed = {row[0]: row[-1] for row in change_rows(found)}
+    changed = {row[0]: row[-1] for row in changes_table(found).whole}
     assert changed["F_cp"] == "-8.3 %" and changed["m"] == "0 %"
-    assert len(change_head(found)) == len(change_rows(found)[0])
+    assert len(changes_table(found).head) == len(changes_table(found).whole[0])
     plain = trace_of("none", ())
-    assert len(change_head(plain)) == len(change_rows(plain)[0]) == 4
-    assert drift_rows(found) == [("F_cp", "12", "14.4 ± 0.2", "N", "+20 %")]
+    assert len(changes_table(plain).head) == len(changes_table(plain).whole[0]) == 4
+    assert differences_table(found).whole == (("F_cp", "12", "14.4 ± 0.2", "N", "+20 %"),)
 
 
 def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
@@ -260,7 +259,8 @@ def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
         **effect.params,
         "v_s": of_effect(v_s, v_s.high, 1.0),
     }
-    rows = effect_rows(replace(found, effects=(replace(effect, params=params),)), Rig("force"))
+    sized = replace(found, effects=(replace(effect, params=params),))
+    rows = effects_table(sized, Rig("force")).whole
     assert [row[1] for row in rows[1:3]] == ["-", "0"]
     assert rows[1][3].startswith("at its bound 100: ")
     assert rows[2][3] == HELD
