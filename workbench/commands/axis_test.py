@@ -1,14 +1,13 @@
 """`workbench axis-test`: one log of an axis -> a light, its numbers with limits, one page."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from workbench.ending import StatusCommand, Step, refused_with, step
+from workbench.ending import StatusCommand, Step, step
 from workbench.options import card_option, complete_file
-from workbench.output import OutputFolder, output_options
+from workbench.output import output_options, results
 
 if TYPE_CHECKING:
     from workbench.steps.axis_test import AxisTest
@@ -65,10 +64,7 @@ def command(
             earlier = earlier_of(registry, name, sources, seed)
     elif machine is not None:
         raise click.UsageError("--machine is a name in a registry; give --registry too.")
-    with (
-        refused_with(looked_over([log], card)),
-        OutputFolder("axis-test", out, now=datetime.now()) as folder,
-    ):
+    with results("axis-test", out, looked_over([log], card)) as folder:
         test = axis_test(sources, earlier, name)
         view = axis_view(test)
         view.write(folder)

@@ -1,14 +1,13 @@
 """`workbench demo`: the whole chain on a shipped recipe, and one folder with all its results."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from workbench.course import Course, moving
 from workbench.ending import StatusCommand
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import emit, output_options, progress, results
 from workbench.steps.stages import TRACE_STAGES
 
 RECIPE = "demo"
@@ -44,7 +43,7 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     from workbench.steps.kernels_ahead import servo_compiled_ahead
 
     card = load_card(card_path(RECIPE))
-    with OutputFolder("demo", out, now=datetime.now()) as folder:
+    with results("demo", out) as folder:
         with progress("demo", 1.0, as_json=as_json) as bar:
             course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
             with moving(course), servo_compiled_ahead():

@@ -1,14 +1,12 @@
 """`workbench design`: a model -> design.json and report.html."""
 
-import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with, step
+from workbench.course import running
+from workbench.ending import StatusCommand, step
 from workbench.options import (
     POSITIVE,
     Finite,
@@ -17,7 +15,7 @@ from workbench.options import (
     present_card_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 
 if TYPE_CHECKING:
     from design.tune import Asked
@@ -170,10 +168,7 @@ def _nominal(
 
     (model_file, card, kept), (source, period) = given, plant
     goals = Goals(limits.modulus, limits.delay, effort_limit(model))
-    with (
-        refused_with(without_design(model, card)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
+    with results("design", out, without_design(model, card)) as folder:
         with progress("designing", as_json=as_json):
             found = design(model, asked, goals=goals, source=source, period=period)
         view = design_view(found, model.rotary)
@@ -195,10 +190,7 @@ def _velocity(
     from workbench.steps.velocity_loop import design_velocity
 
     model = read_velocity_model(model_file)
-    with (
-        refused_with(without_design(model, None)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
+    with results("design", out, without_design(model, None)) as folder:
         found = design_velocity(model, limits, integrator=loop[0], period=loop[1])
         view = velocity_design_view(found)
         view.write(folder)
@@ -227,14 +219,9 @@ def _robust(
     from workbench.report.view import show
     from workbench.steps.robust.robust import ROBUST_STAGES, robust_design
 
-    with (
-        refused_with(without_design(model, None)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
-        with progress("robust design", 1.0, as_json=as_json) as bar:
-            course = Course(bar, ROBUST_STAGES, time.monotonic, told=bar.told)
-            with watched(course):
-                found = robust_design(model, wanted, asked, where=plant, report=course.report)
+    with results("design", out, without_design(model, None)) as folder:
+        with running("robust design", ROBUST_STAGES, as_json=as_json) as course:
+            found = robust_design(model, wanted, asked, where=plant, report=course.report)
         view = robust_view(found, model.rotary)
         view.write(folder)
     design = design_document(found.design)

@@ -1,13 +1,12 @@
 """`workbench drift`: new logs against the model in force -> drift.json and report.html."""
 
-from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, card_option, complete_file, effects_option
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 
 
 @click.command(
@@ -82,10 +81,7 @@ def command(
     model = read_model(model_file, library(effects))
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("drift", out, now=datetime.now()) as folder,
-    ):
+    with results("drift", out, looked_over(logs, card)) as folder:
         with progress("testing", as_json=as_json):
             found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed

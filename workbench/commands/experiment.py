@@ -1,15 +1,13 @@
 """`workbench experiment`: a model -> the run to make next, as CSV, JSON and a page."""
 
-import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.course import Course, watched
+from workbench.course import running
 from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, Finite, effects_option, present_card_option
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, results
 
 SEARCH_SECONDS = 30.0
 
@@ -95,11 +93,9 @@ def command(
     names = tuple(name.strip() for name in (parameters or "").split(",") if name.strip())
     rivals = read_rivals(trace_file, model, known) if trace_file else ()
     wanted = Wanted(names, stroke, speed, force, limit, seconds, seed, rivals)
-    with OutputFolder("experiment", out, now=datetime.now()) as folder:
-        with progress("experiment", 1.0, as_json=as_json) as bar:
-            course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
-            with watched(course):
-                found = experiment(model, wanted, design, course.report, course.keep_going)
+    with results("experiment", out) as folder:
+        with running("experiment", EXPERIMENT_STAGES, as_json=as_json, budget=budget) as course:
+            found = experiment(model, wanted, design, course.report, course.keep_going)
         view = experiment_view(found)
         view.write(folder)
     then = after_experiment(found, model_file, design_file)

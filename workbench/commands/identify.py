@@ -1,14 +1,13 @@
 """`workbench identify`: logs -> model.json and report.html."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import (
     POSITIVE,
     budget_option,
@@ -16,7 +15,7 @@ from workbench.options import (
     complete_file,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import IDENTIFY_STAGES
 
 
@@ -72,10 +71,7 @@ def command(
         _velocity(logs, card, budget, as_json, out)
         return
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("identify", out, now=datetime.now()) as folder,
-    ):
+    with results("identify", out, looked_over(logs, card)) as folder:
         with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
             if drive == "force" and sources.rig.kind == "motor":
@@ -112,10 +108,7 @@ def _velocity(
     from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("identify", out, now=datetime.now()) as folder,
-    ):
+    with results("identify", out, looked_over(logs, card)) as folder:
         with progress("identifying", as_json=as_json):
             sources = read_sources(logs, card, velocity=True)
             model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)

@@ -1,6 +1,5 @@
 """`workbench predict`: a model on a log -> prediction.csv."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +13,7 @@ from workbench.options import (
     effects_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 
 
 @click.command(
@@ -65,7 +64,7 @@ def command(
         return
     model = read_model(model_file, library(effects))
     sources = read_sources([log], card)
-    with OutputFolder("predict", out, now=datetime.now()) as folder:
+    with results("predict", out) as folder:
         with progress("predicting", as_json=as_json):
             found = predict_sources(model, sources, drive=drive, window=window)
         view = prediction_view(found, model.rotary, log, card)
@@ -87,7 +86,7 @@ def _velocity(
     log, card = given
     model = read_velocity_model(model_file)
     sources = read_sources([log], card, velocity=True)
-    with OutputFolder("predict", out, now=datetime.now()) as folder:
+    with results("predict", out) as folder:
         runs = predict_velocity(model, sources, window)
         view = velocity_prediction_view(runs, window, model.rotary)
         view.write(folder)

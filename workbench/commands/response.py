@@ -1,14 +1,13 @@
 """`workbench response`: logs -> frequency responses, resonances, margins of the open loop."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.course import running
+from workbench.ending import StatusCommand
 from workbench.options import (
     POSITIVE,
     budget_option,
@@ -16,7 +15,7 @@ from workbench.options import (
     complete_file,
     effects_option,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
@@ -74,10 +73,7 @@ def command(
 
     known = None if model_file is None else read_model(model_file, library(effects))
     left_in = "asked for" if friction_left_in else None
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("response", out, now=datetime.now()) as folder,
-    ):
+    with results("response", out, looked_over(logs, card)) as folder:
         sources = read_sources(logs, card)
         if known is None and left_in is None:
             left = budget - (time.monotonic() - begun)
@@ -98,7 +94,5 @@ def _identified(
     """The model that the logs themselves give, or None and why they give none."""
     from workbench.steps.response import identified_or_not
 
-    with progress("identifying", 1.0, as_json=as_json) as bar:
-        course = Course(bar, IDENTIFY_STAGES, time.monotonic, budget, bar.told)
-        with watched(course):
-            return identified_or_not(sources, seed, course.report, course.keep_going)
+    with running("identifying", IDENTIFY_STAGES, as_json=as_json, budget=budget) as course:
+        return identified_or_not(sources, seed, course.report, course.keep_going)

@@ -1,13 +1,12 @@
 """`workbench trace`: logs and held-out logs -> trace.json, model.json and report.html."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import (
     budget_option,
     card_option,
@@ -15,7 +14,7 @@ from workbench.options import (
     effects_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import TRACE_STAGES
 
 
@@ -69,10 +68,7 @@ def command(
         _velocity((logs, tests), card, budget, as_json, out)
         return
     known = library(effects)
-    with (
-        refused_with(looked_over([*logs, *tests], card)),
-        OutputFolder("trace", out, now=datetime.now()) as folder,
-    ):
+    with results("trace", out, looked_over([*logs, *tests], card)) as folder:
         with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
@@ -101,10 +97,7 @@ def _velocity(
     from workbench.steps.trace import named_logs
     from workbench.steps.velocity import trace_velocity
 
-    with (
-        refused_with(looked_over([*given[0], *given[1]], card)),
-        OutputFolder("trace", out, now=datetime.now()) as folder,
-    ):
+    with results("trace", out, looked_over([*given[0], *given[1]], card)) as folder:
         with progress("trace", as_json=as_json):
             names, held_out = named_logs(*given, card)
             train = read_sources(names, card, velocity=True)

@@ -1,6 +1,5 @@
 """`workbench validate`: a design on its model in simulation -> validation.json and report.html."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ from workbench.options import (
     present_card_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, output_options, progress
+from workbench.output import output_options, progress, results
 
 if TYPE_CHECKING:
     from workbench.steps.loop_figures import Limits
@@ -88,7 +87,7 @@ def command(
     model, found = with_card(read_model(model_file, known), card), read_design(design_file)
     plant = read_model(plant_file, known) if plant_file else None
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
-    with OutputFolder("validate", out, now=datetime.now()) as folder:
+    with results("validate", out) as folder:
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             result, traces = validate(model, found, rng, plant=plant, limits=limits)
@@ -113,7 +112,7 @@ def _velocity(
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
     plant = read_velocity_model(files[2]) if files[2] else None
-    with OutputFolder("validate", out, now=datetime.now()) as folder:
+    with results("validate", out) as folder:
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
