@@ -1,4 +1,4 @@
-# make demo | make test | make test-all | make docs | make bench; needs Python 3.11 or newer
+# make demo | make test | make test-all | make docs | make bench | make paper; needs Python 3.11 or newer
 # (make PYTHON=python3.12 demo).
 PYTHON ?= python3
 WORKERS ?= 2
@@ -20,7 +20,7 @@ UV := $(BIN)/uv pip install --quiet --python $(BIN)/python --constraint constrai
 install = $(UV) $(1) 2>/dev/null || $(PIP) install --constraint constraints.txt $(1)
 
 .PHONY: demo test test-all test-method environment lint types floors kernels tests wheel docs slow verdicts \
-	bench format clean
+	bench paper format clean
 
 demo: $(VENV)/.installed
 	$(BIN)/workbench demo
@@ -92,6 +92,10 @@ verdicts: environment
 bench: environment
 	@test -n "$(BENCHMARKS)" || echo "no benchmarks/*.py yet"
 	@set -e; for file in $(BENCHMARKS); do echo "== $$file"; $(BIN)/python $$file; done
+
+# The paper in simulation, its figures beside ours: two minutes.
+paper: $(VENV)/.installed
+	$(BIN)/python -m studies.paper --out runs/paper
 
 format: environment
 	$(BIN)/ruff check --fix .

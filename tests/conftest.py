@@ -18,7 +18,7 @@ LONG_FIRST = (  # files and folders whose tests take longest, so that no worker 
     "end_to_end",
     "identification/tracing",
     "workbench/jobs",
-    "workbench/paper",
+    "studies/paper",
     "workbench/steps",
     "workbench/interface",
     "identification/drift",

@@ -49,8 +49,8 @@ def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionD
 
 
 def files() -> list[Path]:
-    """The files of the three packages."""
-    folders = ("identification", "design", "workbench")
+    """The files of the three packages and of the studies."""
+    folders = ("identification", "design", "workbench", "studies")
     every = [path for name in folders for path in (ROOT / name).rglob("*.py")]
     return [path for path in every if "migrations" not in path.parts]  # lists of tables
 

@@ -43,7 +43,6 @@ COMMANDS = {
     "export": "Write a design as code, a model as tables for its control.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "effects": "List the effects that 'trace' knows; check your own.",
-    "paper": "Run the paper in simulation, its figures beside ours.",
     "registry": "Show and change what is in force on each machine.",
     "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",

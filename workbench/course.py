@@ -7,12 +7,15 @@ where a budget of seconds and Ctrl-C become an answer.
 import math
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from types import FrameType
 
 import click
+
+from workbench.output import progress
 
 Clock = Callable[[], float]  # s
 Stages = Mapping[str, tuple[float, float]]
@@ -135,6 +138,17 @@ def watched(course: Course) -> Iterator[None]:
     """
     with moving(course), _first_ctrl_c(course):
         yield
+
+
+@contextmanager
+def running(
+    label: str, stages: Stages, *, as_json: bool = False, budget: float = math.inf
+) -> Iterator[Course]:
+    """A course behind a bar of that label, `watched`; mute with JSON."""
+    with progress(label, 1.0, as_json=as_json) as bar:
+        course = Course(bar, stages, time.monotonic, budget, bar.told)
+        with watched(course):
+            yield course
 
 
 @contextmanager

@@ -6,6 +6,7 @@ from pathlib import Path
 from identification.errors import UserError
 
 CARD_FILE = "card.toml"
+REPORT_FILE = "report.html"
 """Name of a card in a machine's folder."""
 
 LOGS = "logs"

@@ -9,7 +9,7 @@ import secrets
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
@@ -19,7 +19,7 @@ from typing import Any, Protocol, Self, TypeVar
 import click
 
 from identification.errors import UserError
-from workbench.ending import Step
+from workbench.ending import Step, refused_with
 from workbench.screen import SCREEN_LINES, SCREEN_WIDTH, Screen, listed, screen
 from workbench.screen import Row as Row
 from workbench.screen import as_text as as_text
@@ -147,6 +147,21 @@ class OutputFolder:
         for folder in self._made:
             with suppress(OSError):
                 folder.rmdir()
+
+
+@contextmanager
+def results(
+    command: str, out: Path | None, then: Callable[[str], Step] | None = None
+) -> Iterator[OutputFolder]:
+    """The folder of a command's results.
+
+    then: what to type after a refusal within the block, by its reason.
+    """
+    with (
+        refused_with(then) if then else nullcontext(),
+        OutputFolder(command, out, now=datetime.now()) as folder,
+    ):
+        yield folder
 
 
 def write_whole(path: Path, text: str, option: str) -> None:

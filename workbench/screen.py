@@ -46,7 +46,8 @@ class Part:
 
     head, right: of a table, its head and its columns of numbers; most: entries shown at most on one
     screen; latest: of a list that is cut the last ones are shown; yields: it is cut before others;
-    whole_head: the head with --verbose, where it is another.
+    whole_head: the head with --verbose, where it is another; merged: what a notebook shows in place
+    of `whole`.
     """
 
     entries: Sequence[str] | Sequence[Row]
@@ -57,6 +58,7 @@ class Part:
     latest: bool = False
     yields: bool = False
     whole_head: Row = ()
+    merged: Sequence[Any] = ()
 
     @property
     def full_head(self) -> Row:

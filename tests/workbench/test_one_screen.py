@@ -32,18 +32,16 @@ from workbench.documents.model import Model
 from workbench.registry.store import Registry
 from workbench.registry.values import Candidate, LogOutcome, SeenLog
 from workbench.report.demo_tables import demo_view
-from workbench.report.design_tables import design_view
-from workbench.report.drift_tables import drift_view
+from workbench.report.drift import drift_view
 from workbench.report.experiment import experiment_view
 from workbench.report.first_card import proposal_view
 from workbench.report.installation import installation_view
-from workbench.report.model_tables import model_view
 from workbench.report.prediction import prediction_view
+from workbench.report.reports import design_view, identified_view, validation_view
 from workbench.report.response import response_view
 from workbench.report.robust import robust_view
-from workbench.report.trace_tables import trace_view
+from workbench.report.trace import traced_view
 from workbench.report.trace_words import words
-from workbench.report.validation_tables import validation_view
 from workbench.screen import Screen
 from workbench.steps.demo import Demonstration
 from workbench.steps.drift import Drifted
@@ -93,7 +91,7 @@ def identify() -> Iterator[Screen]:
         for adequate in (True, False):
             model = many_logs(identified().model, told)
             model = replace(model, fit=replace(model.fit, adequate=adequate))
-            yield model_view(model, REMARKS, OUT)
+            yield identified_view(replace(identified(), model=model, remarks=REMARKS)).screen(OUT)
 
 
 def trace() -> Iterator[Screen]:
@@ -103,7 +101,7 @@ def trace() -> Iterator[Screen]:
                           ("inseparable", every[:2])):  # fmt: skip
         found = replace(trace_of(verdict, keys), remarks=REMARKS)  # type: ignore[arg-type]
         found = replace(found, drift=drift if verdict == "drift" else found.drift)
-        yield trace_view(replace(traced(found), remarks=REMARKS), OUT)
+        yield traced_view(replace(traced(found), remarks=REMARKS)).screen(OUT)
 
 
 def figures(n: int, *missed: str) -> LoopFigures:
@@ -132,7 +130,7 @@ def validation(passed: bool) -> Validation:
 
 
 def validate() -> Iterator[Screen]:
-    yield from (validation_view(validation(passed), OUT) for passed in (True, False))
+    yield from (validation_view(validation(passed), {}).screen(OUT) for passed in (True, False))
 
 
 def design() -> Iterator[Screen]:
@@ -142,15 +140,16 @@ def design() -> Iterator[Screen]:
     pid = found.pid and replace(found.pid, missed=goals, note="slow " * 30)
     worst = replace(found, remarks=REMARKS, refused={"pid": "no gains " * 30}, rst=rst, pid=pid)
     none = Recommendation("none", False, "; ".join(LOGS))
-    yield design_view(replace(found, remarks=REMARKS), OUT)
-    yield design_view(worst, OUT)
-    yield design_view(replace(worst, recommended="none", recommendation=none), OUT)
+    yield design_view(replace(found, remarks=REMARKS)).screen(OUT)
+    yield design_view(worst).screen(OUT)
+    worst = replace(worst, recommended="none", recommendation=none)
+    yield design_view(worst).screen(OUT)
     measures = {one.name: Spread(0.1, 0.2, 0.3, 0.25, 0.9) for one in MEASURES}
     promise = Promise("rst", True, measures, 0.8, Outcomes({}))
     promises = dict.fromkeys((ROBUST, NOMINAL, PRESENT), promise)
     for missed in ((), tuple(f"limit {n} is kept by too few" for n in range(9))):
         robust = Robust(found, RobustAsked(), promises, 40, 1e-3, missed, REMARKS)
-        yield robust_view(robust, OUT, False)
+        yield robust_view(robust, False).screen(OUT)
 
 
 def demo() -> Iterator[Screen]:
@@ -181,7 +180,8 @@ def drift() -> Iterator[Screen]:
             for log in LOGS
         )  # fmt: skip
         settings: Any = SimpleNamespace(margin=0.02, run_length=1e3, variation=0.01, to_be_seen=1.0)
-        yield drift_view(Drifted(identified().model, "", settings, tests, state, REMARKS), OUT)
+        found = Drifted(identified().model, "", settings, tests, state, REMARKS)
+        yield drift_view(found, "model.json").screen(OUT)
 
 
 def experiment() -> Iterator[Screen]:
@@ -189,12 +189,13 @@ def experiment() -> Iterator[Screen]:
     peaks: Any = SimpleNamespace(low=-0.1, high=0.1, speed=0.3, force=90.0, command=4.0)
     limits: Any = SimpleNamespace(stroke=(-0.2, 0.2), speed=0.4, force=100.0, command=5.0)
     found: Any = SimpleNamespace(
-        h=1e-3, r=np.zeros(20_001), promise=promise, separation=(), motion="linear", limits=limits,
+        card="a", h=1e-3, r=np.zeros(20_001), promise=promise, separation=(),
+        motion="linear", limits=limits,
         safety=Safety(20, peaks, 3, 0.7), tried=(40, 9), controller="the present controller",
         segments=(1, 2), efficiency=0.9, remarks=REMARKS, command_unit="V",
     )  # fmt: skip
     assert set(vars(found)) <= set(Experiment.__dataclass_fields__)
-    yield experiment_view(found, OUT)
+    yield experiment_view(found).screen(OUT)
 
 
 def predict() -> Iterator[Screen]:
@@ -202,7 +203,7 @@ def predict() -> Iterator[Screen]:
         "drive": "force", "window": None, "position_rms": 1e-3, "force_predicted_rms": 1.0,
         "force_simulated_rms": 1.0, "run_refused": WHY * 3, "remarks": REMARKS,
     }  # fmt: skip
-    yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml", OUT)
+    yield prediction_view(Predicted((), summary), False, LOGS[0], "card.toml").screen(OUT)
 
 
 def response() -> Iterator[Screen]:
@@ -214,7 +215,8 @@ def response() -> Iterator[Screen]:
     modes = Modes(peaks, np.zeros(2), np.zeros(2), 1.0)
     logs = tuple({"file": log} for log in LOGS)
     for left_in in (None, WHY):
-        yield response_view(replace(found, modes=modes, logs=logs, left_in=left_in), OUT)
+        many = replace(found, modes=modes, logs=logs, left_in=left_in)
+        yield response_view(many).screen(OUT)
 
 
 def reidentify() -> Iterator[Screen]:
@@ -255,7 +257,7 @@ def axis_test() -> Iterator[Screen]:
     limits = dict.fromkeys(MEANING_OF, (1e6, 2e6))
     for given in ({}, limits):
         found = Sources(replace(card, limits=given), card.rig(), runs, tuple(REMARKS))
-        yield axis_view(step.axis_test(found), OUT)
+        yield axis_view(step.axis_test(found)).screen(OUT)
 
 
 BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
@@ -263,16 +265,13 @@ BY_VIEW: tuple[Callable[[], Iterator[Screen]], ...] = (
     fleet, doctor, axis_test,
 )  # fmt: skip
 BY_COMMAND = ("effects", "init", "registry", "token", "simulate", "export")  # run below
-ELSEWHERE = {"paper": "tests/workbench/paper/test_study.py"}  # as it takes long to make
 NO_SCREEN = ("serve", "work", "watch")  # events as JSON lines, until they are stopped
 
 
 def test_every_command_is_held() -> None:
     views = {view.__name__.replace("_", "-") for view in BY_VIEW}
-    held = views | {*BY_COMMAND, *ELSEWHERE, *NO_SCREEN}
+    held = views | {*BY_COMMAND, *NO_SCREEN}
     assert held == set(cli.COMMANDS)
-    for path in ELSEWHERE.values():
-        assert "one_screen(" in (Path(__file__).parents[2] / path).read_text("utf-8")
     tests = inspect.getsource(inspect.getmodule(held_by_command))  # type: ignore[arg-type]
     assert all(f'held_by_command("{name}"' in tests for name in BY_COMMAND)
 
@@ -302,7 +301,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
     model = many_logs(identified().model)
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
-    shown = model_view(model, (), None)
+    shown = identified_view(replace(identified(), model=model, remarks=())).screen()
     assert "dv_p, dv_n - m/s not told: the interval is wider than the value" in words_of(
         shown.text()
     )

@@ -27,60 +27,107 @@ from workbench.cards.units import Motion
 LONGEST_RECIPE = 1e8  # samples of a recipe: a gigabyte a signal
 
 
-@dataclass(frozen=True)
-class RecipePD:
+class RecipePD(CardTable):
     """k_d (1 + T_d s/(eps s + 1)); k_d [N/m], times [s]."""
 
-    k_d: float
-    T_d: float
-    eps: float
+    kind: Literal["PD"]
+    """k_d (1 + T_d s/(eps s + 1))"""
+    k_d: Positive
+    """N/m"""
+    T_d: NotNegative
+    """s"""
+    eps: Positive
+    """s"""
 
 
-@dataclass(frozen=True)
-class RecipePID:
+class RecipePID(CardTable):
     """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1)); k_R [N/m], times [s]."""
 
-    k_R: float
-    T_d: float
-    T_i: float
-    eps: float
+    kind: Literal["PID"]
+    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1))"""
+    k_R: Positive
+    """N/m"""
+    T_d: NotNegative
+    """s"""
+    T_i: Positive
+    """s"""
+    eps: Positive
+    """s"""
 
 
-@dataclass(frozen=True)
-class RecipeRST:
+class RecipeRST(CardTable):
     """Polynomials in z^-1: S(z^-1) F_ref = T(z^-1) r - R(z^-1) y."""
 
-    R: tuple[float, ...]
-    S: tuple[float, ...]
-    T: tuple[float, ...]
+    kind: Literal["RST"]
+    """S F_ref = T r - R y, in z^-1"""
+    R: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
+    S: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
+    T: tuple[float, ...] = Field(min_length=1)
+    """coefficients in z^-1"""
 
 
-@dataclass(frozen=True)
-class RecipeForcePI:
+class RecipeForcePI(CardTable):
     """The force loop C_F = k_i (1 + 1/(T_i s)); k_i [V/N], T_i [s]."""
 
-    k_i: float
-    T_i: float
+    k_i: Positive
+    """V/N"""
+    T_i: Positive
+    """s"""
 
 
-@dataclass(frozen=True)
-class RecipeCompensator:
+class FrictionSection(CardTable):
+    """The nine parameters; signs are checked by `Karnopp`."""
+
+    m: Divisor
+    """moving mass, kg"""
+    F_cp: float
+    """Coulomb level of motion towards +y, N"""
+    F_cn: float
+    """Coulomb level of motion towards -y, N"""
+    F_vp: float
+    """viscous friction towards +y, N s/m"""
+    F_vn: float
+    """viscous friction towards -y, N s/m"""
+    dv_p: float
+    """upper end of the band in which the body may stick, m/s"""
+    dv_n: float
+    """its lower end, m/s, negative"""
+    F_sp: float
+    """stick limit towards +y, N"""
+    F_sn: float
+    """stick limit towards -y, N, negative"""
+
+    @property
+    def value(self) -> Karnopp:
+        """The nine; raises BadModel where one has the wrong sign."""
+        return Karnopp(**self.model_dump())
+
+
+class RecipeCompensator(CardTable):
     """The compensator (4): N_c [-], e_T [m]; friction: that it knows, None: the plant's."""
 
-    N_c: float
-    e_T: float
-    friction: Karnopp | None = None
+    N_c: Annotated[float, Field(gt=1)] = 2.0
+    """by which the band is divided for its term near standstill"""
+    e_T: Positive
+    """position error at which that term is at the stick limit, m (rad)"""
+    friction: FrictionSection | None = None
+    """the nine that it knows; without it those of the plant"""
 
 
-@dataclass(frozen=True)
-class LoopSpec:
+class LoopSpec(CardTable):
     """Position controller (`None`: that of the card), force controller (`None` for a motor), limit
     of the command [V] and friction compensator (`None` for none)."""
 
-    position: RecipePD | RecipePID | RecipeRST | None
+    position: Annotated[RecipePD | RecipePID | RecipeRST, Field(discriminator="kind")] | None = None
+    """the position controller; without one the card's [controller] runs the machine"""
     force: RecipeForcePI | None = None
-    control_limit: float | None = None
+    """the force loop below it; none with a motor"""
+    control_limit_v: Positive | None = None
+    """of the size of the command"""
     compensator: RecipeCompensator | None = None
+    """of friction, eq. (4)"""
 
 
 @dataclass(frozen=True)
@@ -116,129 +163,6 @@ class Recipe:
         return self.h * np.arange(round(self.duration / self.h) + 1, dtype=np.float64)
 
 
-class PDSection(CardTable):
-    """`RecipePD` as a card writes it."""
-
-    kind: Literal["PD"]
-    """k_d (1 + T_d s/(eps s + 1))"""
-    k_d: Positive
-    """N/m"""
-    T_d: NotNegative
-    """s"""
-    eps: Positive
-    """s"""
-
-    def value(self) -> RecipePD:
-        """The controller."""
-        return RecipePD(self.k_d, self.T_d, self.eps)
-
-
-class PIDSection(CardTable):
-    """`RecipePID` as a card writes it."""
-
-    kind: Literal["PID"]
-    """k_R (1 + 1/(T_i s) + T_d s/(eps s + 1))"""
-    k_R: Positive
-    """N/m"""
-    T_d: NotNegative
-    """s"""
-    T_i: Positive
-    """s"""
-    eps: Positive
-    """s"""
-
-    def value(self) -> RecipePID:
-        """The controller."""
-        return RecipePID(self.k_R, self.T_d, self.T_i, self.eps)
-
-
-class RSTSection(CardTable):
-    """`RecipeRST` as a card writes it."""
-
-    kind: Literal["RST"]
-    """S F_ref = T r - R y, in z^-1"""
-    R: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    S: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-    T: tuple[float, ...] = Field(min_length=1)
-    """coefficients in z^-1"""
-
-    def value(self) -> RecipeRST:
-        """The controller."""
-        return RecipeRST(self.R, self.S, self.T)
-
-
-class ForceSection(CardTable):
-    """`RecipeForcePI` as a card writes it."""
-
-    k_i: Positive
-    """V/N"""
-    T_i: Positive
-    """s"""
-
-
-class FrictionSection(CardTable):
-    """The nine parameters; signs are checked by `Karnopp`."""
-
-    m: Divisor
-    """moving mass, kg"""
-    F_cp: float
-    """Coulomb level of motion towards +y, N"""
-    F_cn: float
-    """Coulomb level of motion towards -y, N"""
-    F_vp: float
-    """viscous friction towards +y, N s/m"""
-    F_vn: float
-    """viscous friction towards -y, N s/m"""
-    dv_p: float
-    """upper end of the band in which the body may stick, m/s"""
-    dv_n: float
-    """its lower end, m/s, negative"""
-    F_sp: float
-    """stick limit towards +y, N"""
-    F_sn: float
-    """stick limit towards -y, N, negative"""
-
-
-class CompensatorSection(CardTable):
-    """`RecipeCompensator` as a card writes it."""
-
-    N_c: Annotated[float, Field(gt=1)] = 2.0
-    """by which the band is divided for its term near standstill"""
-    e_T: Positive
-    """position error at which that term is at the stick limit, m (rad)"""
-    friction: FrictionSection | None = None
-    """the nine that it knows; without it those of the plant"""
-
-    def value(self) -> RecipeCompensator:
-        """The compensator."""
-        known = Karnopp(**self.friction.model_dump()) if self.friction else None
-        return RecipeCompensator(self.N_c, self.e_T, known)
-
-
-class LoopSection(CardTable):
-    """`LoopSpec` as a card writes it."""
-
-    position: Annotated[PDSection | PIDSection | RSTSection, Field(discriminator="kind")] | None = (
-        None
-    )
-    """the position controller; without one the card's [controller] runs the machine"""
-    force: ForceSection | None = None
-    """the force loop below it; none with a motor"""
-    control_limit_v: Positive | None = None
-    """of the size of the command"""
-    compensator: CompensatorSection | None = None
-    """of friction, eq. (4)"""
-
-    def value(self) -> LoopSpec:
-        """The loop."""
-        force = RecipeForcePI(self.force.k_i, self.force.T_i) if self.force else None
-        beside = self.compensator.value() if self.compensator else None
-        position = self.position.value() if self.position else None
-        return LoopSpec(position, force, self.control_limit_v, beside)
-
-
 class ActuatorSection(CardTable):
     """The linear electro-pneumatic actuator."""
 
@@ -272,7 +196,7 @@ class RecipeSection(CardTable):
     """this or `actuator`"""
     effects: dict[str, dict[str, Any]] = Field(default_factory=dict)
     """by key of an effect its parameters, numbers in SI or texts with a unit"""
-    loop: LoopSection | None = None
+    loop: LoopSpec | None = None
     """the closed loop"""
     drive: Literal["loop", "command"] = "loop"
     """whether the loop is closed, or the reference is the command"""
@@ -325,14 +249,17 @@ class RecipeSection(CardTable):
             if self.actuator
             else Motor(self.motor.k_a if self.motor else 0.0)
         )
+        beside = self.loop.compensator if self.loop else None
+        if beside and beside.friction:
+            _ = beside.friction.value  # refused here, not in the simulation
         known = library or (_installed() if self.effects else built_in())
         effects = tuple(self._effect(key, known, motion, command) for key in self.effects)
-        plant = Plant(Karnopp(**self.friction.model_dump()), drive, effects)
+        plant = Plant(self.friction.value, drive, effects)
         return Recipe(
             plant=plant,
             duration=self.duration_s,
             h=self.h_s,
-            loop=self.loop.value() if self.loop else None,
+            loop=self.loop,
             reference=self.reference.value(),
             noise_F=self.noise_F,
             noise_y=self.noise_y,

@@ -1,14 +1,13 @@
 """`workbench axis-test`: one log of an axis -> a light, its numbers with limits, one page."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from workbench.ending import StatusCommand, Step, refused_with, step
+from workbench.ending import StatusCommand, Step, step
 from workbench.options import card_option, complete_file
-from workbench.output import OutputFolder, emit, output_options
+from workbench.output import output_options, results
 
 if TYPE_CHECKING:
     from workbench.steps.axis_test import AxisTest
@@ -49,9 +48,10 @@ def command(
     nothing to judge by. Writes axis_test.json, and report.html to be printed on one page.
     """
     from workbench.logs.sources import read_sources
-    from workbench.report.axis_test import axis_report, axis_view
+    from workbench.report.axis_test import axis_view
     from workbench.report.next_steps import looked_over
-    from workbench.steps.axis_test import axis_document, axis_test
+    from workbench.report.view import show
+    from workbench.steps.axis_test import axis_test
 
     sources = read_sources([log], card)
     name = machine or sources.card.name
@@ -64,20 +64,11 @@ def command(
             earlier = earlier_of(registry, name, sources, seed)
     elif machine is not None:
         raise click.UsageError("--machine is a name in a registry; give --registry too.")
-    with (
-        refused_with(looked_over([log], card)),
-        OutputFolder("axis-test", out, now=datetime.now()) as folder,
-    ):
+    with results("axis-test", out, looked_over([log], card)) as folder:
         test = axis_test(sources, earlier, name)
-        document = axis_document(test)
-        folder.write_json("axis_test.json", document)
-        folder.write_text("report.html", axis_report(test))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: axis_view(test, folder.final),
-        after_axis_test(test, log, card, where),
-    )
+        view = axis_view(test)
+        view.write(folder)
+    show(view, folder.final, as_json, after_axis_test(test, log, card, where))
     return 0 if test.light == "green" else 1
 
 

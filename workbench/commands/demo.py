@@ -1,14 +1,13 @@
 """`workbench demo`: the whole chain on a shipped recipe, and one folder with all its results."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from workbench.course import Course, moving
 from workbench.ending import StatusCommand
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import emit, output_options, progress, results
 from workbench.steps.stages import TRACE_STAGES
 
 RECIPE = "demo"
@@ -34,34 +33,26 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     the model found, and checks them in simulation.
     """
     from workbench.cards.card import load_card
-    from workbench.documents.design_file import design_document
-    from workbench.documents.model_file import model_document
     from workbench.logs.fetch import card_path
     from workbench.report.demo_tables import demo_view
     from workbench.report.next_steps import after_demo
-    from workbench.report.reports import design_report, validation_report
-    from workbench.report.trace import trace_report
+    from workbench.report.reports import design_view, validation_view
+    from workbench.report.trace import traced_view
     from workbench.report.validation_tables import missed
     from workbench.steps.demo import demonstrate
     from workbench.steps.kernels_ahead import servo_compiled_ahead
-    from workbench.steps.trace import trace_document
-    from workbench.steps.validate import validation_document
 
     card = load_card(card_path(RECIPE))
-    with OutputFolder("demo", out, now=datetime.now()) as folder:
+    with results("demo", out) as folder:
         with progress("demo", 1.0, as_json=as_json) as bar:
             course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
             with moving(course), servo_compiled_ahead():
                 found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
-        folder.write_json("trace.json", trace_document(traced))
-        folder.write_json("model.json", model_document(traced.model))
-        folder.write_json("design.json", design_document(found.design))
-        folder.write_json("validation.json", validation_document(validation))
         rotary = traced.model.rotary
-        folder.write_text("report.html", trace_report(traced))
-        folder.write_text("design.html", design_report(found.design, rotary))
-        folder.write_text("validation.html", validation_report(validation, found.traces, rotary))
+        traced_view(traced).write(folder)
+        design_view(found.design, rotary).write(folder, "design.html")
+        validation_view(validation, found.traces, rotary).write(folder, "validation.html")
     result = {
         "recipe": RECIPE,
         "seed": seed,

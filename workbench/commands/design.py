@@ -1,14 +1,12 @@
 """`workbench design`: a model -> design.json and report.html."""
 
-import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with, step
+from workbench.course import running
+from workbench.ending import StatusCommand, step
 from workbench.options import (
     POSITIVE,
     Finite,
@@ -17,7 +15,7 @@ from workbench.options import (
     present_card_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 
 if TYPE_CHECKING:
     from design.tune import Asked
@@ -182,32 +180,23 @@ def _nominal(
     """given: model file and card, and the options that another try keeps; plant: what it is taken
     from, the period, and the structures."""
     from design.tune import Goals
-    from workbench.documents.design_file import design_document
-    from workbench.report.design_tables import design_view
     from workbench.report.next_steps import after_design, without_design
-    from workbench.report.reports import design_report
+    from workbench.report.reports import design_view
+    from workbench.report.view import show
     from workbench.steps.design import design, effort_limit
 
     (model_file, card, kept), (source, period, structures) = given, plant
     goals = Goals(limits.modulus, limits.delay, effort_limit(model))
-    with (
-        refused_with(without_design(model, card)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
+    with results("design", out, without_design(model, card)) as folder:
         with progress("designing", as_json=as_json):
             found = design(
                 model, asked, goals=goals, source=source, period=period,
                 structures=structures or None,
             )  # fmt: skip
-        document = design_document(found)
-        folder.write_json("design.json", document)
-        folder.write_text("report.html", design_report(found, model.rotary))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: design_view(found, folder.final, model.rotary),
-        after_design(found, model_file, asked.dominant is not None, kept),
-    )
+        view = design_view(found, model.rotary)
+        view.write(folder)
+    then = after_design(found, model_file, asked.dominant is not None, kept)
+    show(view, folder.final, as_json, then)
     return 1 if found.recommended == "none" else 0
 
 
@@ -216,26 +205,19 @@ def _velocity(
     out: Path | None,
 ) -> int:  # fmt: skip
     """The same of a rig whose velocity follows the command; loop: integrator, and period [s]."""
-    from workbench.documents.velocity import read_velocity_model, velocity_document
+    from workbench.documents.velocity import read_velocity_model
     from workbench.report.next_steps import without_design
-    from workbench.report.velocity import velocity_design_report, velocity_design_view
+    from workbench.report.velocity import velocity_design_view
+    from workbench.report.view import show
     from workbench.steps.velocity_loop import design_velocity
 
     model = read_velocity_model(model_file)
-    with (
-        refused_with(without_design(model, None)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
+    with results("design", out, without_design(model, None)) as folder:
         found = design_velocity(model, limits, integrator=loop[0], period=loop[1])
-        document = velocity_document(found)
-        folder.write_json("design.json", document)
-        folder.write_text("report.html", velocity_design_report(found))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: velocity_design_view(found, folder.final),
-        step("the loop in simulation", "validate", model_file, folder.final / "design.json"),
-    )
+        view = velocity_design_view(found)
+        view.write(folder)
+    then = step("the loop in simulation", "validate", model_file, folder.final / "design.json")
+    show(view, folder.final, as_json, then)
     return 0
 
 
@@ -269,28 +251,17 @@ def _robust(
 ) -> int:  # fmt: skip
     from workbench.documents.design_file import design_document
     from workbench.report.next_steps import after_robust, without_design
-    from workbench.report.robust import robust_report, robust_view
-    from workbench.steps.robust.document import robust_document
+    from workbench.report.robust import robust_view
+    from workbench.report.view import show
     from workbench.steps.robust.robust import ROBUST_STAGES, robust_design
 
-    with (
-        refused_with(without_design(model, None)),
-        OutputFolder("design", out, now=datetime.now()) as folder,
-    ):
-        with progress("robust design", 1.0, as_json=as_json) as bar:
-            course = Course(bar, ROBUST_STAGES, time.monotonic, told=bar.told)
-            with watched(course):
-                found = robust_design(model, wanted, asked, where=plant, report=course.report)
-        design, document = design_document(found.design), robust_document(found)
-        folder.write_json("design.json", design)
-        folder.write_json("robust.json", document)
-        folder.write_text("report.html", robust_report(found, model.rotary))
-    emit(
-        {**document, "design": design, "out": folder.final},
-        as_json,
-        lambda: robust_view(found, folder.final, model.rotary),
-        after_robust(found, model_file),
-    )
+    with results("design", out, without_design(model, None)) as folder:
+        with running("robust design", ROBUST_STAGES, as_json=as_json) as course:
+            found = robust_design(model, wanted, asked, where=plant, report=course.report)
+        view = robust_view(found, model.rotary)
+        view.write(folder)
+    design = design_document(found.design)
+    show(view, folder.final, as_json, after_robust(found, model_file), design=design)
     return 0 if found.passed else 1
 
 

@@ -2,7 +2,6 @@
 
 import os
 from collections.abc import Mapping
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +9,7 @@ import click
 
 from workbench.ending import StatusCommand, step
 from workbench.options import complete_card, complete_file
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import emit, output_options, progress, results
 
 if TYPE_CHECKING:
     from workbench.steps.doctor import Examined
@@ -73,7 +72,7 @@ def _log(name: str, card_name: str, effects: bool, as_json: bool, out: Path | No
         found: Examined = examine(path, card, effects=effects)
     document = doctor_document(found, card.name)
     if out is not None:
-        with OutputFolder("doctor", out, now=datetime.now()) as folder:
+        with results("doctor", out) as folder:
             folder.write_json("doctor.json", document)
             doctor_picture(found, folder.path / "doctor.png")
     then = after_doctor(found, name, card_name, out)

@@ -1,13 +1,12 @@
 """`workbench drift`: new logs against the model in force -> drift.json and report.html."""
 
-from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, card_option, complete_file, effects_option
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 
 
 @click.command(
@@ -73,29 +72,25 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
-    from workbench.report.drift import drift_report
-    from workbench.report.drift_tables import drift_view
+    from workbench.report.drift import drift_view
     from workbench.report.next_steps import after_drift, looked_over
-    from workbench.steps.drift import drift_document, drift_of, model_key, read_stream, write_stream
+    from workbench.report.view import show
+    from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 
     settings = DriftSettings(margin=margin / 100, variation=variation / 100, run_length=run_length)
     model = read_model(model_file, library(effects))
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("drift", out, now=datetime.now()) as folder,
-    ):
+    with results("drift", out, looked_over(logs, card)) as folder:
         with progress("testing", as_json=as_json):
             found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed
             )
-        document = drift_document(found, str(model_file))
-        folder.write_json("drift.json", document)
-        folder.write_text("report.html", drift_report(found))
+        view = drift_view(found, str(model_file))
+        view.write(folder)
     # After the results: a run that is ended between them is simply made again.
     if state_file:
         write_stream(state_file, found.stream)
     then = after_drift(found, logs, card)
-    emit({**document, "out": folder.final}, as_json, lambda: drift_view(found, folder.final), then)
+    show(view, folder.final, as_json, then)
     return 0 if then is None else 1

@@ -1,15 +1,13 @@
 """`workbench experiment`: a model -> the run to make next, as CSV, JSON and a page."""
 
-import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.course import Course, watched
+from workbench.course import running
 from workbench.ending import StatusCommand
 from workbench.options import POSITIVE, Finite, effects_option, present_card_option
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, results
 
 SEARCH_SECONDS = 30.0
 
@@ -81,10 +79,11 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.design_read import read_design
     from workbench.documents.model_file import read_model
-    from workbench.report.experiment import experiment_report, experiment_view, reference_text
+    from workbench.report.experiment import experiment_view
     from workbench.report.next_steps import after_experiment
+    from workbench.report.view import show
     from workbench.steps.experiment.plan import EXPERIMENT_STAGES, experiment
-    from workbench.steps.experiment.planned import Wanted, experiment_document
+    from workbench.steps.experiment.planned import Wanted
     from workbench.steps.experiment.rivals import read_rivals
     from workbench.steps.present import with_card
 
@@ -94,19 +93,11 @@ def command(
     names = tuple(name.strip() for name in (parameters or "").split(",") if name.strip())
     rivals = read_rivals(trace_file, model, known) if trace_file else ()
     wanted = Wanted(names, stroke, speed, force, limit, seconds, seed, rivals)
-    with OutputFolder("experiment", out, now=datetime.now()) as folder:
-        with progress("experiment", 1.0, as_json=as_json) as bar:
-            course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
-            with watched(course):
-                found = experiment(model, wanted, design, course.report, course.keep_going)
-        document = experiment_document(found)
-        folder.write_json("experiment.json", document)
-        folder.write_text("reference.csv", reference_text(found))
-        folder.write_text("report.html", experiment_report(found))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: experiment_view(found, folder.final),
-        then := after_experiment(found, model_file, design_file),
-    )
+    with results("experiment", out) as folder:
+        with running("experiment", EXPERIMENT_STAGES, as_json=as_json, budget=budget) as course:
+            found = experiment(model, wanted, design, course.report, course.keep_going)
+        view = experiment_view(found)
+        view.write(folder)
+    then = after_experiment(found, model_file, design_file)
+    show(view, folder.final, as_json, then)
     return 0 if then is None else 1

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 from workbench.ending import StatusCommand
-from workbench.output import OutputFolder, emit, output_options
+from workbench.output import OutputFolder, emit, output_options, results
 
 if TYPE_CHECKING:
     from workbench.export.compensation import Encoder
@@ -198,7 +198,7 @@ def _tables(
     model = read_model(file)
     what = Compensation(model, tables_asked(model.rotary, *said))
     found = tables(what, targets, controls)
-    with OutputFolder("export", out, now=datetime.now()) as folder:
+    with results("export", out) as folder:
         for one in found.files:
             folder.write(one.name, one.text)
     emit(

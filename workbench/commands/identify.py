@@ -1,14 +1,13 @@
 """`workbench identify`: logs -> model.json and report.html."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import (
     POSITIVE,
     budget_option,
@@ -16,7 +15,7 @@ from workbench.options import (
     complete_file,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import IDENTIFY_STAGES
 
 
@@ -61,22 +60,18 @@ def command(
     report.html. LOG is a path, or a file name of the card's set.
     """
     begun = time.monotonic()
-    from workbench.documents.model_file import model_document
     from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.options import parse_orders
-    from workbench.report.model_tables import model_view
     from workbench.report.next_steps import after_identify, looked_over
-    from workbench.report.reports import identification_report
+    from workbench.report.reports import identified_view
+    from workbench.report.view import show
     from workbench.steps.identify_sources import Options, identify_sources
 
     if card_of_velocity(card):
         _velocity(logs, card, budget, as_json, out)
         return
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("identify", out, now=datetime.now()) as folder,
-    ):
+    with results("identify", out, looked_over(logs, card)) as folder:
         with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
             if drive == "force" and sources.rig.kind == "motor":
@@ -95,14 +90,10 @@ def command(
                     on_progress=course.report,
                     keep_going=course.keep_going,
                 )
-        folder.write_json("model.json", model_document(found.model))
-        folder.write_text("report.html", identification_report(found))
-    emit(
-        {**model_document(found.model), "remarks": found.remarks, "out": folder.final},
-        as_json,
-        lambda: model_view(found.model, found.remarks, folder.final),
-        after_identify(found.model, logs, card, folder.final),
-    )
+        view = identified_view(found)
+        view.write(folder)
+    then = after_identify(found.model, logs, card, folder.final)
+    show(view, folder.final, as_json, then, remarks=found.remarks)
 
 
 def _velocity(
@@ -111,25 +102,16 @@ def _velocity(
     """The same of a rig whose velocity follows the command."""
     begun = time.monotonic()
     refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
-    from workbench.documents.velocity import velocity_document
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.velocity import after_velocity, velocity_model_view, velocity_report
+    from workbench.report.velocity import after_velocity, velocity_model_view
+    from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("identify", out, now=datetime.now()) as folder,
-    ):
+    with results("identify", out, looked_over(logs, card)) as folder:
         with progress("identifying", as_json=as_json):
             sources = read_sources(logs, card, velocity=True)
             model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)
-        document = velocity_document(model)
-        folder.write_json("model.json", document)
-        folder.write_text("report.html", velocity_report(model))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: velocity_model_view(model, folder.final),
-        after_velocity(model, logs, card, folder.final),
-    )
+        view = velocity_model_view(model)
+        view.write(folder)
+    show(view, folder.final, as_json, after_velocity(model, logs, card, folder.final))

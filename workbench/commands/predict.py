@@ -1,6 +1,5 @@
 """`workbench predict`: a model on a log -> prediction.csv."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +13,7 @@ from workbench.options import (
     effects_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 
 
 @click.command(
@@ -56,7 +55,8 @@ def command(
     from workbench.documents.velocity import is_velocity_model
     from workbench.logs.sources import read_sources
     from workbench.report.prediction import prediction_view
-    from workbench.steps.predict import predict_sources, prediction_csv
+    from workbench.report.view import show
+    from workbench.steps.predict import predict_sources
 
     if is_velocity_model(model_file):
         refuse_for_velocity("drive", "effects")
@@ -64,15 +64,12 @@ def command(
         return
     model = read_model(model_file, library(effects))
     sources = read_sources([log], card)
-    with OutputFolder("predict", out, now=datetime.now()) as folder:
+    with results("predict", out) as folder:
         with progress("predicting", as_json=as_json):
             found = predict_sources(model, sources, drive=drive, window=window)
-        folder.write_text("prediction.csv", prediction_csv(found.runs))
-    emit(
-        {**found.summary, "out": folder.final},
-        as_json,
-        lambda: prediction_view(found, model.rotary, log, card, folder.final),
-    )
+        view = prediction_view(found, model.rotary, log, card)
+        view.write(folder)
+    show(view, folder.final, as_json)
 
 
 def _velocity(
@@ -82,18 +79,15 @@ def _velocity(
     """The same of a rig whose velocity follows the command; given: log and card."""
     from workbench.documents.velocity import read_velocity_model
     from workbench.logs.sources import read_sources
-    from workbench.report.velocity import velocity_csv, velocity_prediction_view
-    from workbench.steps.velocity import predict_velocity, prediction_summary
+    from workbench.report.velocity import velocity_prediction_view
+    from workbench.report.view import show
+    from workbench.steps.velocity import predict_velocity
 
     log, card = given
     model = read_velocity_model(model_file)
     sources = read_sources([log], card, velocity=True)
-    with OutputFolder("predict", out, now=datetime.now()) as folder:
+    with results("predict", out) as folder:
         runs = predict_velocity(model, sources, window)
-        folder.write_text("prediction.csv", velocity_csv(runs))
-    summary = prediction_summary(runs, window)
-    emit(
-        {**summary, "out": folder.final},
-        as_json,
-        lambda: velocity_prediction_view(summary, model.rotary, folder.final),
-    )
+        view = velocity_prediction_view(runs, window, model.rotary)
+        view.write(folder)
+    show(view, folder.final, as_json)

@@ -12,7 +12,7 @@ import click
 
 from workbench.ending import StatusGroup
 from workbench.options import effects_option, registry_option
-from workbench.output import OutputFolder, emit, verbose_option
+from workbench.output import emit, results, verbose_option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
@@ -262,7 +262,7 @@ def _documents(found: "Registry", version: "Version") -> dict[str, dict[str, Any
 
 
 def _write(found: "Registry", version: "Version", out: Path) -> None:
-    with OutputFolder("registry", out, now=datetime.now()) as folder:
+    with results("registry", out) as folder:
         for kind, document in _documents(found, version).items():
             if document is not None:
                 folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")

@@ -1,14 +1,13 @@
 """`workbench response`: logs -> frequency responses, resonances, margins of the open loop."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.course import running
+from workbench.ending import StatusCommand
 from workbench.options import (
     POSITIVE,
     budget_option,
@@ -16,7 +15,7 @@ from workbench.options import (
     complete_file,
     effects_option,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
@@ -68,15 +67,13 @@ def command(
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.response import response_report, response_view
-    from workbench.steps.response import respond, response_csv, response_document
+    from workbench.report.response import response_view
+    from workbench.report.view import show
+    from workbench.steps.response import respond
 
     known = None if model_file is None else read_model(model_file, library(effects))
     left_in = "asked for" if friction_left_in else None
-    with (
-        refused_with(looked_over(logs, card)),
-        OutputFolder("response", out, now=datetime.now()) as folder,
-    ):
+    with results("response", out, looked_over(logs, card)) as folder:
         sources = read_sources(logs, card)
         if known is None and left_in is None:
             left = budget - (time.monotonic() - begun)
@@ -86,11 +83,9 @@ def command(
                 sources.runs, sources.rig, sources.card.name, known, lowest, left_in=left_in,
                 read=sources.remarks,
             )  # fmt: skip
-        document = response_document(found)
-        folder.write_json("response.json", document)
-        folder.write_text("response.csv", response_csv(found))
-        folder.write_text("report.html", response_report(found))
-    emit({**document, "out": folder.final}, as_json, lambda: response_view(found, folder.final))
+        view = response_view(found)
+        view.write(folder)
+    show(view, folder.final, as_json)
 
 
 def _identified(
@@ -99,7 +94,5 @@ def _identified(
     """The model that the logs themselves give, or None and why they give none."""
     from workbench.steps.response import identified_or_not
 
-    with progress("identifying", 1.0, as_json=as_json) as bar:
-        course = Course(bar, IDENTIFY_STAGES, time.monotonic, budget, bar.told)
-        with watched(course):
-            return identified_or_not(sources, seed, course.report, course.keep_going)
+    with running("identifying", IDENTIFY_STAGES, as_json=as_json, budget=budget) as course:
+        return identified_or_not(sources, seed, course.report, course.keep_going)

@@ -1,6 +1,5 @@
 """`workbench simulate`: a recipe -> its log, the truth beside it."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
@@ -8,7 +7,7 @@ import click
 
 from workbench.ending import StatusCommand
 from workbench.options import effects_option
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import emit, output_options, progress, results
 
 
 @click.command(
@@ -51,7 +50,7 @@ def command(
     card.refuse_velocity()
     if card.recipe is None:
         raise BadCard(f"{card.path}: has no [recipe]; name a card with one, as paper_table1")
-    with OutputFolder("simulate", out, now=datetime.now()) as folder:
+    with results("simulate", out) as folder:
         with progress("simulating", as_json=as_json):
             log = record(card.name, card.recipe, seed, card.rig(), card.controller)
         name = f"{card.name}.{form}"

@@ -1,13 +1,12 @@
 """`workbench trace`: logs and held-out logs -> trace.json, model.json and report.html."""
 
 import time
-from datetime import datetime
 from pathlib import Path
 
 import click
 
 from workbench.course import Course, watched
-from workbench.ending import StatusCommand, refused_with
+from workbench.ending import StatusCommand
 from workbench.options import (
     budget_option,
     card_option,
@@ -15,7 +14,7 @@ from workbench.options import (
     effects_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 from workbench.steps.stages import TRACE_STAGES
 
 
@@ -58,22 +57,18 @@ def command(
     """
     begun = time.monotonic()
     from workbench.cards.own_effects import library
-    from workbench.documents.model_file import model_document
     from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.trace import trace_report
-    from workbench.report.trace_tables import trace_view
-    from workbench.steps.trace import named_logs, trace_document, trace_sources
+    from workbench.report.trace import traced_view
+    from workbench.report.view import show
+    from workbench.steps.trace import named_logs, trace_sources
 
     if card_of_velocity(card):
         refuse_for_velocity("effects", "seed")
         _velocity((logs, tests), card, budget, as_json, out)
         return
     known = library(effects)
-    with (
-        refused_with(looked_over([*logs, *tests], card)),
-        OutputFolder("trace", out, now=datetime.now()) as folder,
-    ):
+    with results("trace", out, looked_over([*logs, *tests], card)) as folder:
         with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
@@ -84,11 +79,9 @@ def command(
                 found = trace_sources(
                     train, test, known, seed, course.report, keep_going=course.keep_going
                 )
-        document = trace_document(found)
-        folder.write_json("trace.json", document)
-        folder.write_json("model.json", model_document(found.model))
-        folder.write_text("report.html", trace_report(found))
-    emit({**document, "out": folder.final}, as_json, lambda: trace_view(found, folder.final))
+        view = traced_view(found)
+        view.write(folder)
+    show(view, folder.final, as_json)
 
 
 def _velocity(
@@ -97,17 +90,14 @@ def _velocity(
 ) -> None:  # fmt: skip
     """The same of a rig whose velocity follows the command; given: logs, held-out logs."""
     begun = time.monotonic()
-    from workbench.documents.velocity import velocity_document
     from workbench.logs.sources import read_sources
     from workbench.report.next_steps import looked_over
-    from workbench.report.velocity import velocity_trace_report, velocity_trace_view
+    from workbench.report.velocity import velocity_trace_view
+    from workbench.report.view import show
     from workbench.steps.trace import named_logs
-    from workbench.steps.velocity import trace_velocity, velocity_trace_document
+    from workbench.steps.velocity import trace_velocity
 
-    with (
-        refused_with(looked_over([*given[0], *given[1]], card)),
-        OutputFolder("trace", out, now=datetime.now()) as folder,
-    ):
+    with results("trace", out, looked_over([*given[0], *given[1]], card)) as folder:
         with progress("trace", as_json=as_json):
             names, held_out = named_logs(*given, card)
             train = read_sources(names, card, velocity=True)
@@ -115,10 +105,6 @@ def _velocity(
             found = trace_velocity(
                 train, test, keep_going=lambda: time.monotonic() - begun < budget
             )
-        document = velocity_trace_document(found)
-        folder.write_json("trace.json", document)
-        folder.write_json("model.json", velocity_document(found.model))
-        folder.write_text("report.html", velocity_trace_report(found))
-    emit(
-        {**document, "out": folder.final}, as_json, lambda: velocity_trace_view(found, folder.final)
-    )
+        view = velocity_trace_view(found)
+        view.write(folder)
+    show(view, folder.final, as_json)

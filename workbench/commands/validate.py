@@ -1,6 +1,5 @@
 """`workbench validate`: a design on its model in simulation -> validation.json and report.html."""
 
-from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,7 @@ from workbench.options import (
     present_card_option,
     refuse_for_velocity,
 )
-from workbench.output import OutputFolder, emit, output_options, progress
+from workbench.output import output_options, progress, results
 
 if TYPE_CHECKING:
     from workbench.steps.loop_figures import Limits
@@ -74,11 +73,11 @@ def command(
     from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
     from workbench.report.next_steps import after_validate
-    from workbench.report.reports import validation_report
-    from workbench.report.validation_tables import validation_view
+    from workbench.report.reports import validation_view
+    from workbench.report.view import show
     from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
-    from workbench.steps.validate import validate, validation_document
+    from workbench.steps.validate import validate
 
     if is_velocity_model(model_file):
         refuse_for_velocity("force", "card", "effects")
@@ -88,19 +87,14 @@ def command(
     model, found = with_card(read_model(model_file, known), card), read_design(design_file)
     plant = read_model(plant_file, known) if plant_file else None
     limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
-    with OutputFolder("validate", out, now=datetime.now()) as folder:
+    with results("validate", out) as folder:
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             result, traces = validate(model, found, rng, plant=plant, limits=limits)
-        document = validation_document(result)
-        folder.write_json("validation.json", document)
-        folder.write_text("report.html", validation_report(result, traces, model.rotary))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: validation_view(result, folder.final, model.rotary),
-        after_validate(result, found, model, model_file, plant_file, card),
-    )
+        view = validation_view(result, traces, model.rotary)
+        view.write(folder)
+    then = after_validate(result, found, model, model_file, plant_file, card)
+    show(view, folder.final, as_json, then)
     return 0 if result.passed else 1
 
 
@@ -112,26 +106,17 @@ def _velocity(
     import numpy as np
 
     from workbench.documents.velocity import read_velocity_design, read_velocity_model
-    from workbench.report.velocity import (
-        after_velocity_validation,
-        velocity_validation_report,
-        velocity_validation_view,
-    )
-    from workbench.steps.velocity_loop import validate_velocity, velocity_validation_document
+    from workbench.report.velocity import after_velocity_validation, velocity_validation_view
+    from workbench.report.view import show
+    from workbench.steps.velocity_loop import validate_velocity
 
     model, design = read_velocity_model(files[0]), read_velocity_design(files[1])
     plant = read_velocity_model(files[2]) if files[2] else None
-    with OutputFolder("validate", out, now=datetime.now()) as folder:
+    with results("validate", out) as folder:
         with progress("simulating the loop", as_json=as_json):
             rng = np.random.default_rng(seed)
             found = validate_velocity(model, design, rng, limits, plant)
-        document = velocity_validation_document(found)
-        folder.write_json("validation.json", document)
-        folder.write_text("report.html", velocity_validation_report(found))
-    emit(
-        {**document, "out": folder.final},
-        as_json,
-        lambda: velocity_validation_view(found, folder.final),
-        after_velocity_validation(found, files[0]),
-    )
+        view = velocity_validation_view(found)
+        view.write(folder)
+    show(view, folder.final, as_json, after_velocity_validation(found, files[0]))
     return 0 if found.passed else 1

@@ -3,7 +3,7 @@
 import json
 import math
 import types
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
@@ -15,6 +15,7 @@ from workbench.files import ABSURD, RESULT_BYTES, refuse_larger, refuse_special
 from workbench.links import broken_link
 
 Value = TypeVar("Value")
+UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
 MOST_DIGITS = 30  # of a whole number in a result
 
 
@@ -36,16 +37,15 @@ def read_result(path: Path, kind: type[Value], schema: str) -> Value:
             )
         said = "no 'schema'" if found is None else f"schema {_shown(found)}"
         raise BadModel(f"{path}: {said}, {schema!r} needed; give the file that command writes")
-    unknown = _unknown(raw, kind, "")
-    if unknown:
-        raise BadModel(f"{path}: {unknown}")
     from pydantic import TypeAdapter, ValidationError
 
     try:
-        return TypeAdapter(kind).validate_json(json.dumps(raw), strict=True)
+        text = json.dumps(raw)
+        return TypeAdapter(kind).validate_json(text, strict=True, extra="forbid")
     except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        raise BadModel(f"{path}: {_explained(dict(first))}") from None
+        found = [dict(one) for one in error.errors(include_url=False)]
+        first = next((one for one in found if one["type"] == UNKNOWN_KEY), found[0])
+        raise BadModel(f"{path}: {_explained(first, kind)}") from None
     except BadModel as error:
         raise BadModel(f"{path}: {error}") from None
 
@@ -109,32 +109,13 @@ def _whole(text: str) -> int:
     return int(text)
 
 
-def _unknown(raw: object, kind: Any, where: str) -> str | None:
-    """What is wrong with the first key that `kind` does not have, searched depth first."""
-    for option in _options(kind):
-        if is_dataclass(option) and isinstance(raw, Mapping):
-            hints = get_type_hints(option)
-            names = [field.name for field in fields(option)]
-            for key, entry in raw.items():
-                place = f"{where}.{key}" if where else str(key)
-                if key not in names:
-                    table = f"[{where}] " if where else ""
-                    return f"{table}unknown key {key!r}{nearest(str(key), names)}"
-                wrong = _unknown(entry, hints[key], place)
-                if wrong:
-                    return wrong
-        elif get_origin(option) is tuple and isinstance(raw, list):
-            inner = get_args(option)[0]
-            for number, entry in enumerate(raw):
-                wrong = _unknown(entry, inner, f"{where}.{number}")
-                if wrong:
-                    return wrong
-        elif isinstance(raw, Mapping) and len(get_args(option)) == 2:
-            for key, entry in raw.items():
-                wrong = _unknown(entry, get_args(option)[1], f"{where}.{key}")
-                if wrong:
-                    return wrong
-    return None
+def _keys_at(kind: Any, loc: Sequence[str | int]) -> list[str]:
+    """Keys of the dataclass that stands at `loc` in one of `kind`."""
+    for part in loc:
+        hints = [get_type_hints(one) for one in _options(kind) if is_dataclass(one)]
+        inside = [get_args(one) for one in _options(kind) if get_args(one)]
+        kind = hints[0][str(part)] if hints else inside[0][0 if isinstance(part, int) else -1]
+    return [each.name for one in _options(kind) if is_dataclass(one) for each in fields(one)]
 
 
 def _options(kind: Any) -> tuple[Any, ...]:
@@ -142,10 +123,14 @@ def _options(kind: Any) -> tuple[Any, ...]:
     return get_args(kind) if get_origin(kind) in (Union, types.UnionType) else (kind,)
 
 
-def _explained(first: Mapping[str, Any]) -> str:
+def _explained(first: Mapping[str, Any], kind: Any) -> str:
     loc = [str(part) for part in first["loc"]]
+    table = f"[{'.'.join(loc[:-1])}] " if loc[:-1] else ""
+    if first["type"] == UNKNOWN_KEY:
+        return (
+            f"{table}unknown key {loc[-1]!r}{nearest(loc[-1], _keys_at(kind, first['loc'][:-1]))}"
+        )
     if first["type"] in ("missing", "missing_argument"):
-        table = f"[{'.'.join(loc[:-1])}] " if loc[:-1] else ""
         return f"{table}has no {loc[-1]!r}; add it, or run the command again"
     where = f"[{'.'.join(loc)}] " if loc else ""
     message = " ".join(str(first["msg"]).removeprefix("Value error, ").split())

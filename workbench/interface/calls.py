@@ -30,7 +30,7 @@ import numpy as np
 from identification.errors import BadCard, BadModel
 from workbench.cards.card import Card, load_card
 from workbench.cards.own_effects import library
-from workbench.course import Course, moving, watched
+from workbench.course import Course, Stages, moving, running
 from workbench.documents.design import Design, Structure
 from workbench.documents.design_read import read_design
 from workbench.documents.model import Model
@@ -132,12 +132,10 @@ def trace(
     learnt = sources(train, card, rig, signals)
     seen = None if test is None else sources(test, learnt.card, None, None)
     left = math.inf if budget is None else budget - (time.monotonic() - begun)
-    with _bar("trace", 1.0) as bar:
-        course = Course(bar, TRACE_STAGES, time.monotonic, left, bar.told)
-        with watched(course):
-            found = trace_sources(
-                learnt, seen, known, seed, course.report, keep_going=course.keep_going
-            )
+    with _course("trace", TRACE_STAGES, left) as course:
+        found = trace_sources(
+            learnt, seen, known, seed, course.report, keep_going=course.keep_going
+        )
     return TraceResult(learnt.card, found)
 
 
@@ -183,12 +181,10 @@ def robust_design(
 
     known = _model(model)
     asked = Asked(poles, None, integrator)
-    with _bar("robust design", 1.0) as bar:
-        course = Course(bar, ROBUST_STAGES, time.monotonic, told=bar.told)
-        with watched(course):
-            found = robust_of_model(
-                known, wanted or RobustAsked(), asked, where=(None, period), report=course.report
-            )
+    with _course("robust design", ROBUST_STAGES) as course:
+        found = robust_of_model(
+            known, wanted or RobustAsked(), asked, where=(None, period), report=course.report
+        )
     return RobustResult(found, known)
 
 
@@ -225,10 +221,8 @@ def experiment(
     if rivals is not None:
         asked = replace(asked, rivals=_rivals(rivals, known))
     made = None if design is None else _design(design)
-    with _bar("experiment", 1.0) as bar:
-        course = Course(bar, EXPERIMENT_STAGES, time.monotonic, budget, bar.told)
-        with watched(course):
-            found = plan_experiment(known, asked, made, course.report, course.keep_going)
+    with _course("experiment", EXPERIMENT_STAGES, budget) as course:
+        found = plan_experiment(known, asked, made, course.report, course.keep_going)
     return ExperimentResult(found)
 
 
@@ -372,6 +366,14 @@ def _bar(label: str, total: float | None = None) -> Iterator[Bar]:
     """Work with a bar as the commands show it; none in a notebook, where its traces would stay."""
     with one_thread(), progress(label, total, as_json="ipykernel" in sys.modules) as bar:
         yield bar
+
+
+@contextmanager
+def _course(label: str, stages: Stages, budget: float = math.inf) -> Iterator[Course]:
+    """As `_bar`, of work that the first Ctrl-C ends with the best so far."""
+    quiet = "ipykernel" in sys.modules
+    with one_thread(), running(label, stages, as_json=quiet, budget=budget) as course:
+        yield course
 
 
 def _model(given: ModelLike) -> Model:

@@ -1,7 +1,7 @@
 """Results of `predict`, `response`, `drift` and `simulate`: what is said of logs, and logs that are
 made."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.log import Log
 from workbench.cards.card import Card
-from workbench.interface.result import Part, Result
+from workbench.interface.result import Result
 from workbench.output import dumps
 from workbench.steps.axis_test import AxisTest
 from workbench.steps.drift import Drifted
@@ -18,7 +18,8 @@ from workbench.steps.response import Curve, Responded
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from workbench.report.view import View
 
 
 @dataclass(frozen=True, repr=False)
@@ -29,50 +30,16 @@ class PredictResult(Result):
     rotary: bool = False
 
     @property
-    def document(self) -> Mapping[str, Any]:
-        return self.found.summary
-
-    @property
     def frame(self) -> "pd.DataFrame":
         """The columns of prediction.csv; NaN where there is no value."""
         from workbench.steps.predict import prediction_frame
 
         return prediction_frame(self.found.runs)
 
-    def report(self) -> str:
-        from workbench.report.page import Section, page
-        from workbench.report.prediction import prediction_section, then_of_prediction
-        from workbench.report.templating import render
+    def _made(self) -> "View":
+        from workbench.report.prediction import prediction_view
 
-        first, *more = self._lines()
-        sections = [prediction_section(self.found, self.rotary)]
-        if more:
-            sections.append(Section("In words", render("lines", lines=more)))
-        lead, then = first.rstrip(".") + ".", then_of_prediction("LOG", "CARD")
-        return page("Prediction", lead, sections, then)
-
-    def _lines(self) -> list[str]:
-        from workbench.report.prediction import prediction_lines
-
-        return prediction_lines(self.found, self.rotary)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.prediction import prediction_chart
-
-        return chart_figure(prediction_chart(self.found, self.rotary))
-
-    def _view(self) -> object:
-        return "\n".join(self._lines())
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        first, *rest = self._lines()
-        return first, [Part((), (), rest)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        from workbench.steps.predict import prediction_csv
-
-        yield "prediction.csv", prediction_csv(self.found.runs)
+        return prediction_view(self.found, self.rotary)
 
     @property
     def _command(self) -> str:
@@ -84,12 +51,6 @@ class ResponseResult(Result):
     """A machine over frequency: plant, controller and open loop with bands, resonances, margins."""
 
     found: Responded
-
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.response import response_document
-
-        return response_document(self.found)
 
     @property
     def frame(self) -> "pd.DataFrame":
@@ -110,39 +71,10 @@ class ResponseResult(Result):
         one = curve_of(self.found, what)
         return frd(one.H[one.seen], 2.0 * np.pi * one.f[one.seen])
 
-    def report(self) -> str:
-        from workbench.report.response import response_report
-
-        return response_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.response import plant_chart
-
-        return chart_figure(plant_chart(self.found))
-
-    def _view(self) -> object:
+    def _made(self) -> "View":
         from workbench.report.response import response_view
 
-        return response_view(self.found, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.response import (
-            PEAK_HEAD,
-            peak_rows,
-            response_lines,
-            response_sentence,
-        )
-
-        lines = [*response_lines(self.found), *(f"note: {one}" for one in self.found.remarks)]
-        return response_sentence(self.found), [Part(PEAK_HEAD, peak_rows(self.found), lines)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        from workbench.steps.response import response_csv
-
-        yield "response.json", self.to_json() + "\n"
-        yield "response.csv", response_csv(self.found)
-        yield "report.html", self.report()
+        return response_view(self.found)
 
     @property
     def _command(self) -> str:
@@ -161,48 +93,10 @@ class DriftResult(Result):
         """ "none", "drift", "structure" or "not_judged"."""
         return self.found.verdict
 
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.drift import drift_document
+    def _made(self) -> "View":
+        from workbench.report.drift import drift_view
 
-        return drift_document(self.found, self.model_name)
-
-    def report(self) -> str:
-        from workbench.report.drift import drift_report
-
-        return drift_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.drift import drift_figure
-
-        judged = [one for one in self.found.tests if one.test.shifts] or list(self.found.tests)
-        return drift_figure(self.found, judged[-1])
-
-    def _view(self) -> object:
-        from workbench.report.drift_tables import drift_view
-
-        return drift_view(self.found, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.remarks import told_once
-        from workbench.report.drift_tables import (
-            RUN_HEAD,
-            SHIFT_HEAD,
-            drift_notes,
-            drift_sentence,
-            logs_of_drift,
-            run_rows,
-            shift_rows,
-        )
-
-        lines = told_once(drift_notes(self.found), logs_of_drift(self.found))
-        last = Part(SHIFT_HEAD, shift_rows(self.found.tests[-1]))
-        parts = [Part(RUN_HEAD, run_rows(self.found), lines), last]
-        return drift_sentence(self.found), parts
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "drift.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return drift_view(self.found, self.model_name)
 
     @property
     def _command(self) -> str:
@@ -225,37 +119,10 @@ class AxisTestResult(Result):
         """Why it is not green, the worst first."""
         return self.found.reasons
 
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.axis_test import axis_document
-
-        return axis_document(self.found)
-
-    def report(self) -> str:
-        from workbench.report.axis_test import axis_report
-
-        return axis_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.axis_test import axis_charts
-        from workbench.report.chart_figure import chart_figure
-
-        return chart_figure(axis_charts(self.found)[0])
-
-    def _view(self) -> object:
+    def _made(self) -> "View":
         from workbench.report.axis_test import axis_view
 
-        return axis_view(self.found, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.axis_test import AXIS_HEAD, axis_rows, axis_sentence
-
-        rows = axis_rows(self.found)
-        return axis_sentence(self.found), [Part(AXIS_HEAD, rows, self.found.reasons)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "axis_test.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return axis_view(self.found)
 
     @property
     def _command(self) -> str:

@@ -1,6 +1,6 @@
 """Results of `design`, `validate` and `experiment`: controllers, and what a simulated loop does."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -9,7 +9,7 @@ import numpy as np
 from identification.errors import BadModel
 from workbench.documents.design import Design
 from workbench.documents.model import Model
-from workbench.interface.result import Part, Result
+from workbench.interface.result import Result
 from workbench.steps.experiment.planned import Experiment
 from workbench.steps.loop_figures import Traces
 from workbench.steps.robust.robust import ROBUST, Robust
@@ -17,7 +17,8 @@ from workbench.steps.validate import Validation
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from workbench.report.view import View
 
 
 class ControlLoop(NamedTuple):
@@ -34,12 +35,6 @@ class DesignResult(Result):
 
     design: Design
     model: Model
-
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.documents.design_file import design_document
-
-        return design_document(self.design)
 
     @property
     def recommended(self) -> str:
@@ -62,36 +57,10 @@ class DesignResult(Result):
         feedback, forward = controller_to_control(there[wanted].rst)
         return ControlLoop(to_control(plant.A, plant.B, plant.h), feedback, forward)
 
-    def report(self) -> str:
-        from workbench.report.reports import design_report
+    def _made(self) -> "View":
+        from workbench.report.reports import design_view
 
-        return design_report(self.design, self.model.rotary)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.controllers import step_chart
-
-        return chart_figure(step_chart(self.design))
-
-    def _view(self) -> object:
-        from workbench.report.design_tables import design_view
-
-        return design_view(self.design, None, self.model.rotary)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.design_tables import (
-            DESIGN_HEAD,
-            design_lines,
-            design_sentence,
-            margin_rows,
-        )
-
-        lines = design_lines(self.design, self.model.rotary)
-        return design_sentence(self.design), [Part(DESIGN_HEAD, margin_rows(self.design), lines)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "design.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return design_view(self.design, self.model.rotary)
 
     @property
     def _command(self) -> str:
@@ -116,53 +85,16 @@ class RobustResult(Result):
         return self.found.passed
 
     @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.robust.document import robust_document
-
-        return robust_document(self.found)
-
-    @property
     def frame(self) -> "pd.DataFrame":
         """Every measure of the robust loop on every machine drawn, a row a machine."""
         import pandas as pd
 
         return pd.DataFrame(dict(self.found.promises[ROBUST].found.values))
 
-    def report(self) -> str:
-        from workbench.report.robust import robust_report
-
-        return robust_report(self.found, self.model.rotary)
-
-    def plot(self) -> "Figure":
-        from workbench.report.robust import robust_figure
-
-        return robust_figure(self.found, self.model.rotary)
-
-    def _view(self) -> object:
+    def _made(self) -> "View":
         from workbench.report.robust import robust_view
 
-        return robust_view(self.found, None, self.model.rotary)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.robust import (
-            BESIDE_HEAD,
-            ROBUST_HEAD,
-            beside_rows,
-            promise_rows,
-            robust_lines,
-            robust_sentence,
-        )
-
-        rotary = self.model.rotary
-        return robust_sentence(self.found), [
-            Part(ROBUST_HEAD, promise_rows(self.found, rotary), robust_lines(self.found, rotary)),
-            Part(BESIDE_HEAD, beside_rows(self.found, rotary), []),
-        ]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "design.json", self.design.to_json() + "\n"
-        yield "robust.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return robust_view(self.found, self.model.rotary)
 
     @property
     def _command(self) -> str:
@@ -182,45 +114,10 @@ class ValidateResult(Result):
         """Whether the judged controller keeps every limit on every plant."""
         return self.found.passed
 
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.validate import validation_document
+    def _made(self) -> "View":
+        from workbench.report.reports import validation_view
 
-        return validation_document(self.found)
-
-    def report(self) -> str:
-        from workbench.report.reports import validation_report
-
-        return validation_report(self.found, self.traces, self.rotary)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.loop import step_chart
-
-        return chart_figure(step_chart(self.found, self.traces, "model", self.rotary))
-
-    def _view(self) -> object:
-        from workbench.report.validation_tables import validation_view
-
-        return validation_view(self.found, None, self.rotary)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.validation_tables import (
-            validation_head,
-            validation_lines,
-            validation_rows,
-            validation_verdict,
-        )
-
-        rows = validation_rows(self.found, self.rotary)
-        lines = validation_lines(self.found, self.rotary)
-        return f"{validation_verdict(self.found)}.", [
-            Part(validation_head(self.found, self.rotary), rows, lines)
-        ]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "validation.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return validation_view(self.found, self.traces, self.rotary)
 
     @property
     def _command(self) -> str:
@@ -234,12 +131,6 @@ class ExperimentResult(Result):
     found: Experiment
 
     @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.experiment.planned import experiment_document
-
-        return experiment_document(self.found)
-
-    @property
     def frame(self) -> "pd.DataFrame":
         """The reference: t [s] and r, a row a sample of the controller."""
         import pandas as pd
@@ -247,38 +138,10 @@ class ExperimentResult(Result):
         r = self.found.r
         return pd.DataFrame({"t": self.found.h * np.arange(len(r)), "r": r})
 
-    def report(self) -> str:
-        from workbench.report.experiment import experiment_report
-
-        return experiment_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.experiment import experiment_figure
-
-        return experiment_figure(self.found)
-
-    def _view(self) -> object:
+    def _made(self) -> "View":
         from workbench.report.experiment import experiment_view
 
-        return experiment_view(self.found, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.experiment import (
-            PROMISE_HEAD,
-            experiment_lead,
-            experiment_lines,
-            promise_rows,
-        )
-
-        rows, lines = promise_rows(self.found), experiment_lines(self.found)
-        return experiment_lead(self.found), [Part(PROMISE_HEAD, rows, lines)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        from workbench.report.experiment import reference_text
-
-        yield "reference.csv", reference_text(self.found)
-        yield "experiment.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return experiment_view(self.found)
 
     @property
     def _command(self) -> str:

@@ -3,7 +3,6 @@
 import importlib
 import warnings
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,14 +10,14 @@ from identification.errors import BadModel, UserError
 from identification.model.estimates import Estimate
 from workbench.cards.card import Card
 from workbench.documents.model import Model
-from workbench.interface.result import Part, Result
-from workbench.output import dumps
+from workbench.interface.result import Result
 from workbench.steps.identify_sources import Identified
 from workbench.steps.trace import Traced
 
 if TYPE_CHECKING:
     import pandas as pd
-    from matplotlib.figure import Figure
+
+    from workbench.report.view import View
 
 
 class MissingLibrary(UserError):
@@ -78,12 +77,6 @@ class IdentifyResult(_OfModel):
         return self.found.model
 
     @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.documents.model_file import model_document
-
-        return model_document(self.model)
-
-    @property
     def remarks(self) -> tuple[str, ...]:
         """What to know of the logs and the fit, a line each."""
         return (*self.found.remarks, *self.model.fit.remarks)
@@ -103,44 +96,10 @@ class IdentifyResult(_OfModel):
         said = {"units": str(units), "verdict": walk.verdict, "converged": int(walk.converged)}
         return arviz.from_dict(posterior=posterior, attrs=said)
 
-    def report(self) -> str:
-        from workbench.report.reports import identification_report
+    def _made(self) -> "View":
+        from workbench.report.reports import identified_view
 
-        return identification_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.fit import fit_chart
-        from workbench.steps.predict import fitted_run
-
-        sources = self.found.sources
-        runs = [fitted_run(self.model, one.log, number) for number, one in enumerate(sources)]
-        return chart_figure(fit_chart(self.model, sources, runs))
-
-    def _view(self) -> object:
-        from workbench.report.model_tables import model_view
-
-        return model_view(self.model, self.found.remarks, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.model_tables import (
-            MODEL_HEAD,
-            fit_lines,
-            logs_of,
-            parameter_rows,
-            plant_lines,
-            summary,
-        )
-        from workbench.report.notes import report_notes
-
-        rows = [row[:4] for row in parameter_rows(self.model)]
-        said = (*fit_lines(self.model), *plant_lines(self.model), *self.remarks)
-        lines = [one.text for one in report_notes(said, logs_of(self.model))]
-        return summary(self.model), [Part(MODEL_HEAD, rows, lines)]
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        yield "model.json", self.to_json() + "\n"
-        yield "report.html", self.report()
+        return identified_view(self.found)
 
     @property
     def _command(self) -> str:
@@ -182,52 +141,10 @@ class TraceResult(_OfModel):
         own = {"t": rest.t, "before": rest.before, "after": rest.after, "noise": rest.noise}
         return pd.DataFrame({**rest.signals, **own})
 
-    @property
-    def document(self) -> Mapping[str, Any]:
-        from workbench.steps.trace import trace_document
+    def _made(self) -> "View":
+        from workbench.report.trace import traced_view
 
-        return trace_document(self.found)
-
-    def report(self) -> str:
-        from workbench.report.trace import trace_report
-
-        return trace_report(self.found)
-
-    def plot(self) -> "Figure":
-        from workbench.report.chart_figure import chart_figure
-        from workbench.report.trace_friction import friction_chart
-        from workbench.report.trace_pictures import pictures, signal_chart
-
-        drawn, rig = pictures(self.found.trace), self.model.rig
-        chart = friction_chart(self.found)
-        if drawn:
-            chart = signal_chart(drawn[0], self.model.rotary, rig.command_unit)
-        return chart_figure(chart)
-
-    def _view(self) -> object:
-        from workbench.report.trace_tables import trace_view
-
-        return trace_view(self.found, None)
-
-    def _told(self) -> tuple[str, Sequence[Part]]:
-        from workbench.report.notes import report_notes
-        from workbench.report.trace_tables import logs_of_trace, trace_parts
-        from workbench.report.trace_words import then_of, trace_sentence
-
-        found = self.found.trace
-        parts = [Part(head, rows, lines) for head, rows, lines in trace_parts(self.found)]
-        said = (*self.found.remarks, *found.remarks)
-        notes = [f"note: {one.text}" for one in report_notes(said, logs_of_trace(self.found))]
-        parts[-1] = parts[-1]._replace(lines=[*parts[-1].lines, *notes])
-        then = " ".join(f"Next: {line}." for line in then_of(self.found))
-        return f"{trace_sentence(self.found)} {then}".strip(), parts
-
-    def _files(self) -> Iterator[tuple[str, str]]:
-        from workbench.documents.model_file import model_document
-
-        yield "trace.json", self.to_json() + "\n"
-        yield "model.json", dumps(model_document(self.model)) + "\n"
-        yield "report.html", self.report()
+        return traced_view(self.found)
 
     @property
     def _command(self) -> str:

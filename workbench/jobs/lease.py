@@ -4,15 +4,13 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from typing import ParamSpec, TypeVar
 
 from tenacity import Retrying, retry_if_exception_type, stop_after_delay, wait_random_exponential
 
 from workbench.registry.database import Database
 from workbench.registry.errors import LostClaim, RegistryAway
-from workbench.registry.queue import Queue
-from workbench.registry.values import Claim
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -48,26 +46,31 @@ def shared_clock(database: Database, here: Clock) -> Clock:
 
 
 @contextmanager
-def kept_alive(queue: Queue, claim: Claim, lease: timedelta, clock: Clock) -> Iterator[None]:
-    """Renews the claim from a thread until the block ends.
+def renewed(
+    renew: Callable[[], None], every: float, lost: Callable[[threading.Event], None] | None = None
+) -> Iterator[None]:
+    """Renews a claim from a thread, every so many seconds, until the block ends.
 
     What goes wrong there is not raised here: a result is recorded only where the claim holds.
+    lost: called in the thread where the claim is lost, with the event of the block's end.
     """
-    done = threading.Event()
+    over = threading.Event()
 
-    def renew() -> None:
-        while not done.wait(lease.total_seconds() / SHARE):
+    def beat() -> None:
+        while not over.wait(every):
             try:
-                queue.renew(claim, lease=lease, now=clock())
+                renew()
             except RegistryAway:
                 continue  # the next renewal comes before the lease ends, or the claim is lost
             except LostClaim:
+                if lost is not None:
+                    lost(over)
                 return
 
-    thread = threading.Thread(target=renew, name="lease", daemon=True)
+    thread = threading.Thread(target=beat, name="lease", daemon=True)
     thread.start()
     try:
         yield
     finally:
-        done.set()
+        over.set()
         thread.join()

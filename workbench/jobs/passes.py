@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from identification.errors import BadCard, BadLog, BadModel, UserError
-from workbench.jobs.lease import Clock, Patience, kept_alive
+from workbench.jobs.lease import SHARE, Clock, Patience, renewed
 from workbench.jobs.scan import MachineFolder, Scan, machine_folders, refuse_name, scan, unchanged
 from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.order import Order
@@ -170,8 +170,12 @@ class Pass:
         )
         if claim is None:
             return replace(done, busy=(*done.busy, name))
+
+        def renew() -> None:
+            self._queue.renew(claim, lease=settings.lease, now=self._clock())
+
         try:
-            with kept_alive(self._queue, claim, settings.lease, self._clock):
+            with renewed(renew, settings.lease.total_seconds() / SHARE):
                 self._logs(folder, found, claim, outcomes)
         except LostClaim as error:
             self._report("claim_lost", machine=name, reason=str(error))

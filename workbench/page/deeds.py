@@ -11,8 +11,9 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
+from workbench.files import REPORT_FILE
 from workbench.page import version_looks
-from workbench.page.dropped import REPORT_FILE, card_of, log_of
+from workbench.page.dropped import card_of, log_of
 from workbench.page.kept import keep_files, refuse_machine
 from workbench.page.pages import go, part
 from workbench.page.version_looks import EXPORTS

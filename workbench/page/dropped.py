@@ -21,7 +21,7 @@ ENDINGS = (
     ".csv", ".txt", ".tsv", ".dat", ".log", ".parquet", ".mat", ".h5", ".hdf5", ".json", ".tdms",
     ".mdf", ".mf4", ".mcap", ".ulg", ".xlsx", ".xlsm", ".xlsb", ".xls", ".ods",
 )  # fmt: skip
-RESULT_FILE, CHARTS_FILE, REPORT_FILE = "result.json", "charts.html", "report.html"
+RESULT_FILE, CHARTS_FILE = "result.json", "charts.html"
 COPIED_AT_ONCE = 1 << 20
 LONGEST_FILE_NAME = 80
 _ID = re.compile(r"[0-9a-f]{16}")

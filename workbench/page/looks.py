@@ -39,7 +39,6 @@ class DoctorFound:
 
 def warm() -> None:
     """Import what the looks need, and compile or load their kernels' module."""
-    import matplotlib  # noqa: F401
     import pandas  # noqa: F401
     import pyarrow.parquet  # noqa: F401
 
@@ -108,15 +107,15 @@ def card_refused(card: Path, path: Path) -> str:
 def doctor_chart(path: Path, card: Path) -> str:
     """The doctor's picture, as HTML; raises BadLook."""
     from workbench.cards.card import load_card
-    from workbench.page.doctor_chart import chart_of
     from workbench.report.chart import chart_html
+    from workbench.report.doctor_chart import doctor_charts
     from workbench.steps.doctor import looked
 
     try:
         found = looked(path, load_card(card, with_recipe=False))
     except UserError as error:
         raise BadLook(without_path(str(error), [path, card])) from None
-    return "".join(str(chart_html(chart)) for chart in chart_of(found))
+    return "".join(str(chart_html(chart)) for chart in doctor_charts(found))
 
 
 def doctor_words(path: Path, card: Path) -> DoctorFound:

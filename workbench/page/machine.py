@@ -76,7 +76,7 @@ def report(request: Request, _visitor: Visitor) -> Response:
     registry = _registry(request)
     version = registry.version(request.path_params["machine"], request.path_params["number"])
     design = json.dumps(registry.document(version, "design"))
-    return report_response(request.app.state.helpers(version_looks.design_report_of, design))
+    return report_response(request.app.state.helpers(version_looks.design_page, design))
 
 
 def kept_report(request: Request, _visitor: Visitor) -> Response:

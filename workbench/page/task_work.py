@@ -18,9 +18,10 @@ from workbench.course import Course, moving
 from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
 from workbench.documents.model_file import model_document
+from workbench.files import REPORT_FILE
 from workbench.logs.sources import Sources, read_sources
 from workbench.output import OutputFolder
-from workbench.page.dropped import CHARTS_FILE, REPORT_FILE, RESULT_FILE
+from workbench.page.dropped import CHARTS_FILE, RESULT_FILE
 from workbench.registry.bench import TaskKind
 from workbench.report.fit import fit
 from workbench.report.model_tables import (
@@ -33,11 +34,11 @@ from workbench.report.model_tables import (
 )
 from workbench.report.notes import report_notes
 from workbench.report.page import Section
-from workbench.report.reports import identification_report
+from workbench.report.reports import identified_view
 from workbench.report.residual import residual
-from workbench.report.trace import trace_report
+from workbench.report.trace import traced_view
 from workbench.report.trace_pictures import against_signal, pictures
-from workbench.report.trace_tables import error_rows, errors_head, logs_of_trace
+from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence
 from workbench.steps.design import design
 from workbench.steps.identify_sources import Identified, identify_sources
@@ -105,7 +106,7 @@ def _identified(sources: Sources, course: Course) -> Made:
         "summary": summary(model),
         "notes": _told((*fit_lines(model), *plant_lines(model), *found.remarks), logs_of(model)),
         "errors": None,
-        "report": identification_report(found),
+        "report": identified_view(found).page(),
     }
     runs = [fitted_run(model, one.log, number) for number, one in enumerate(found.sources)]
     drawn = (fit(model, found.sources, runs), residual(model, found.sources, runs))
@@ -115,11 +116,12 @@ def _identified(sources: Sources, course: Course) -> Made:
 def _traced(sources: Sources, course: Course) -> Made:
     found: Traced = trace_sources(sources, None, library(()), 0, course.report)
     model, rotary = found.model, found.model.rotary
+    errors = errors_table(found.trace, rotary, tested=False)
     result = {
         "summary": trace_sentence(found),
         "notes": _told((*found.remarks, *found.trace.remarks), logs_of_trace(found)),
-        "errors": {"head": errors_head(False), "rows": error_rows(found.trace, rotary)},
-        "report": trace_report(found),
+        "errors": {"head": errors.full_head, "rows": errors.whole},
+        "report": traced_view(found).page(),
     }
     documents = {"trace": trace_document(found), "model": model_document(model)}
     command = model.rig.command_unit

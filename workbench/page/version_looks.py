@@ -50,19 +50,19 @@ def export_files(design: str, target: str) -> dict[str, bytes]:
     }
 
 
-def design_report_of(design: str) -> str:
+def design_page(design: str) -> str:
     """The report of a design's document."""
-    from workbench.report.reports import design_report
+    from workbench.report.reports import design_view
 
     with _read(design) as found:
-        return design_report(found, found.motion == "rotary")
+        return design_view(found, found.motion == "rotary").page()
 
 
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     """Designs of versions by their numbers, each as text, side by side."""
     from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
     from workbench.report.controllers import linear_step
-    from workbench.report.design_tables import DESIGN_HEAD, margin_rows
+    from workbench.report.design_tables import DESIGN_HEAD, margins_table
 
     rows: list[Sequence[str]] = []
     lines: list[Line] = []
@@ -70,7 +70,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     for place, (number, text) in enumerate(designs):
         try:
             with _read(text) as found:
-                rows += [(f"version {number}", *row) for row in margin_rows(found)]
+                rows += [(f"version {number}", *row) for row in margins_table(found).whole]
                 for name, one in found.controllers.items():
                     t, y = linear_step(found, one)
                     colour: Colour = "reference" if place else "model"

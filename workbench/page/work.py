@@ -15,9 +15,9 @@ from starlette.requests import Request
 from starlette.responses import FileResponse, Response
 from starlette.routing import Route
 
+from workbench.files import REPORT_FILE
 from workbench.page.dropped import (
     CHARTS_FILE,
-    REPORT_FILE,
     RESULT_FILE,
     card_of,
     results_of,

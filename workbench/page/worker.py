@@ -17,7 +17,7 @@ from datetime import UTC, datetime, timedelta
 from types import FrameType
 
 from identification.errors import UserError
-from workbench.jobs.lease import Patience
+from workbench.jobs.lease import Patience, renewed
 from workbench.jobs.passes import Report
 from workbench.page.dropped import card_of, log_of, results_of, without_path
 from workbench.page.settings import PageSettings
@@ -111,7 +111,7 @@ def _beating(
     bench: Bench, claim: WorkClaim
 ) -> Iterator[tuple[Callable[[float], None], Callable[[str], None]]]:
     """Within the block the task's progress is written, and NotOurs raised once it is not ours."""
-    over, state = threading.Event(), _Progress()
+    state = _Progress()
 
     def advance(step: float) -> None:
         state.share = min(state.share + step, 1.0)
@@ -120,24 +120,15 @@ def _beating(
         state.stage = words
 
     def beat() -> None:
-        while not over.wait(QUEUE_LOOK):
-            try:
-                bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=_now())
-            except RegistryAway:
-                continue  # the next one comes before the lease ends, or the claim is lost
-            except LostClaim:
-                os.kill(os.getpid(), signal.SIGUSR1)
-                if not over.wait(STUBBORN):
-                    os._exit(STUBBORN_STATUS)
-                return
+        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=_now())
 
-    thread = threading.Thread(target=beat, name="beat", daemon=True)
-    thread.start()
-    try:
+    def stop(over: threading.Event) -> None:
+        os.kill(os.getpid(), signal.SIGUSR1)
+        if not over.wait(STUBBORN):
+            os._exit(STUBBORN_STATUS)
+
+    with renewed(beat, QUEUE_LOOK, stop):
         yield advance, told
-    finally:
-        over.set()
-        thread.join()
 
 
 def _raise(_number: int, _frame: FrameType | None) -> None:

@@ -1,4 +1,4 @@
-"""The registry's layout brought up to date by Alembic, by whichever process comes first."""
+"""The registry's layout: a new one as the tables are, an older one brought up by Alembic."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -8,6 +8,7 @@ from sqlalchemy import Connection, inspect, text
 from workbench.registry.errors import BadRegistry
 from workbench.registry.page_tables import PAGE_APPEND_ONLY
 from workbench.registry.tables import APPEND_ONLY, Base
+from workbench.registry.triggers import keep_append_only, keep_pointer
 
 if TYPE_CHECKING:
     from alembic.config import Config
@@ -92,6 +93,7 @@ def _refuse_foreign(connection: Connection, where: str) -> None:
 
 
 def _run(connection: Connection, where: str, found: str | None) -> None:
+    """Lay a new registry out, or bring one of the layout `found` up to today's."""
     from alembic import command
     from alembic.script import ScriptDirectory
 
@@ -103,4 +105,10 @@ def _run(connection: Connection, where: str, found: str | None) -> None:
             " workbench"
         )
     settings.attributes["connection"] = connection
-    command.upgrade(settings, "head")
+    if found is not None:
+        command.upgrade(settings, "head")
+        return
+    Base.metadata.create_all(connection)
+    keep_pointer(connection)
+    keep_append_only(connection, (*APPEND_ONLY, *PAGE_APPEND_ONLY))
+    command.stamp(settings, "head")

@@ -1,22 +1,23 @@
 """The axis test on one page: a light, why, the numbers with their limits, and two pictures."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
 from identification.arrays import Array
 from workbench.cards.readable import in_digits, number, shown_unit, units_of
-from workbench.output import Row, written
+from workbench.output import Row
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
-from workbench.report.page import Section, page
+from workbench.report.page import Section
 from workbench.report.templating import render
-from workbench.screen import Screen, listed, screen, tabled
-from workbench.steps.axis_test import AxisTest, Earlier, Quantity
+from workbench.report.view import View
+from workbench.screen import listed, tabled
+from workbench.steps.axis_test import AxisTest, Earlier, Quantity, axis_document
 
 AXIS_HEAD = ("what", "value", "unit", "95 % interval", "limits", "light")
 LAMPS = {"green": "green", "yellow": "YELLOW", "red": "RED", "": "-"}
 SOURCE_OF_LIMITS = {"card": "card", "registry": "logs", "usual": "usual"}
+AXIS_LEAD = "friction, breakaway, mass and play of one log, each with its limits."
 MOST_REASONS = 4  # on the printed page
 AXIS_HEIGHT = 160
 EACH_DIRECTION = (("F_cp", "positive direction"), ("F_cn", "negative direction"))
@@ -62,19 +63,25 @@ def _row(one: Quantity) -> Row:
     return one.meaning, value, unit, f"{low} to {high}", limits, LAMPS[one.light]
 
 
-def axis_view(test: AxisTest, folder: Path | None) -> Screen:
-    """The light, the numbers and the reasons, for a terminal."""
-    return screen(
+def axis_view(test: AxisTest) -> View:
+    """The light, the numbers and the reasons; a page to be printed."""
+    return View(
+        f"Axis test of {test.machine}",
         axis_sentence(test),
-        tabled(AXIS_HEAD, axis_rows(test)),
-        listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
-        listed((f"note: {line}" for line in test.remarks), most=4),
-        *([] if folder is None else [written(folder, "axis_test.json", "report.html")]),
+        [
+            tabled(AXIS_HEAD, axis_rows(test)),
+            listed(f"{n}. {line}" for n, line in enumerate(test.reasons, 1)),
+            listed((f"note: {line}" for line in test.remarks), most=4),
+        ],
+        lambda: axis_document(test),
+        {"axis_test.json": lambda: axis_document(test)},
+        lambda: _sections(test),
+        lambda: axis_charts(test)[0],
+        lead=f"{test.machine}: {AXIS_LEAD}",
     )
 
 
-def axis_report(test: AxisTest) -> str:
-    """HTML of one printed page."""
+def _sections(test: AxisTest) -> list[Section]:
     log = test.source.log
     facts = [
         f"log {test.source.file}, {number(log.duration, 4)} s at {number(1.0 / log.h, 4)} Hz",
@@ -86,12 +93,9 @@ def axis_report(test: AxisTest) -> str:
         reasons=_few(test.reasons),
         head=AXIS_HEAD, rows=list(zip(axis_rows(test), test.quantities, strict=True)),
     )  # fmt: skip
-    charts = [chart_html(one) for one in axis_charts(test)]
+    drawn = "".join(str(chart_html(one)) for one in axis_charts(test))
     end = render("axis_test_end", facts=[one for one in facts if one], remarks=test.remarks)
-    lead = f"{test.machine}: friction, breakaway, mass and play of one log, each with its limits."
-    drawn = "".join(map(str, charts))
-    parts = [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
-    return page(f"Axis test of {test.machine}", lead, parts)
+    return [Section("Result", body), Section("Friction", drawn), Section("Test", end)]
 
 
 def _few(reasons: Sequence[str]) -> list[str]:

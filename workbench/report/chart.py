@@ -82,7 +82,8 @@ class Part(NamedTuple):
 class Panel:
     """One pair of axes: `x` and `y` are their labels with unit.
 
-    y_range: what the whole view holds (default: all lines); x_range likewise.
+    y_range: what the whole view holds (default: all lines); x_range likewise. names: what stands at
+    x = 0, 1, ... in place of numbers.
     """
 
     x: str
@@ -95,6 +96,8 @@ class Panel:
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     log_x: bool = False
+    log_y: bool = False
+    names: Sequence[str] = ()
     height: int | None = None
 
 
@@ -145,6 +148,9 @@ def chart_assets() -> dict[str, str]:
     return {name.split("/")[1]: (folder / name).read_text("utf-8") for name in names}
 
 
+PANEL_KEYS = ("x", "y", "title", "x_range", "y_range", "log_x", "log_y", "names", "height")
+
+
 class _Column(NamedTuple):
     """A column of numbers to draw; edges of an area come in pairs, the lower first."""
 
@@ -171,8 +177,7 @@ def _panel(panel: Panel, points: int) -> dict[str, Any]:
     groups.sort(key=lambda group: not _dots(*group))  # lines are drawn over dots
     tables = [_table(group, points) for group in groups]
     return {
-        **{key: getattr(panel, key) for key in ("x", "y", "title", "x_range", "y_range", "log_x")},
-        "height": panel.height,
+        **{key: getattr(panel, key) for key in PANEL_KEYS},
         "bands": [band._asdict() for band in panel.bands],
         "marks": [mark._asdict() for mark in panel.marks],
         "tables": tables,

@@ -79,6 +79,10 @@ def _panel(axes: "Axes", panel: Panel) -> None:
         _line(axes, one)
     if panel.log_x:
         axes.set_xscale("log")
+    if panel.log_y:
+        axes.set_yscale("log")
+    if panel.names:
+        axes.set_xticks(range(len(panel.names)), panel.names, rotation=20)
     if panel.x_range:
         axes.set_xlim(panel.x_range)
     if panel.y_range:

@@ -10,41 +10,33 @@ from workbench.cards.parameter_units import shown
 from workbench.documents.design import Controller, Design
 from workbench.report.chart import Chart, Line, Mark, Panel, chart_html
 from workbench.report.design_tables import (
-    DESIGN_HEAD,
-    IN_DRIVES_HEAD,
     design_lines,
     drive_lines,
-    drive_rows,
-    margin_rows,
+    drive_table,
+    margins_table,
     polynomial_lines,
 )
 from workbench.report.loop import LOOP_COLOURS
-from workbench.report.page import Section
-from workbench.report.templating import render
+from workbench.report.page import Section, lines_section, table
 
 MOST_DB = float(20 * np.log10(2.0))  # of |S_yp| at a modulus margin of 0.5
 
 
 def controllers(found: Design, rotary: bool = False) -> Section:
     """Margins of both loops and what they rest on."""
-    html = render(
-        "table", head=DESIGN_HEAD, rows=margin_rows(found), lines=design_lines(found, rotary)
-    )
-    words = drive_rows(found)
-    if words:
-        html += render("table", head=IN_DRIVES_HEAD, rows=words, lines=())
-    return Section("Controllers", html)
+    margins = table(margins_table(found), design_lines(found, rotary))
+    return Section("Controllers", margins + table(drive_table(found)))
 
 
 def coefficients(found: Design) -> Section:
     """The polynomials, for whoever programs the controller."""
     text = [*polynomial_lines(found), "S(z^-1) F_ref = T(z^-1) r - R(z^-1) y"]
-    return Section("Coefficients", render("lines", lines=text))
+    return lines_section("Coefficients", text)
 
 
 def drive_section(found: Design) -> Section:
     """The same as difference equations, in the unit that the drive takes."""
-    return Section("As the drive runs it", render("lines", lines=drive_lines(found)))
+    return lines_section("As the drive runs it", drive_lines(found))
 
 
 def sensitivity_section(found: Design, rotary: bool = False) -> Section:

@@ -1,6 +1,8 @@
 """The demo for a terminal: truth beside estimate, before beside after, and where to go next."""
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from identification.model.estimates import Estimate
 from workbench.cards.parameter_units import shown
@@ -9,7 +11,7 @@ from workbench.documents.design import Design
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
 from workbench.report.notes import notes
-from workbench.report.trace_tables import error_rows, errors_head, logs_of_trace
+from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
 from workbench.report.validation_tables import (
     validation_lines,
@@ -35,11 +37,12 @@ TRUTH_HEAD = ("parameter", "estimate", "unit", "95 % interval", "truth")
 def demo_view(found: Demonstration, folder: Path) -> Screen:
     """The demo for a terminal; with --verbose also what `design` and `validate` say of it."""
     traced, rotary = found.traced, found.traced.model.rotary
-    errors, head = error_rows(traced.trace, rotary), errors_head(True)
+    errors = errors_table(traced.trace, rotary)
+    rows: Any = errors.whole
     parts: list[Part | str] = [
         SIMULATED,
         trace_sentence(traced),
-        tabled(head, [errors[0], errors[2]], whole=errors),
+        replace(errors, entries=(rows[0], rows[2])),
         tabled(TRUTH_HEAD, [*_friction(found), *_effects(found)]),
         LETTERS,
         f"Of mass and plain friction the worst parameter is {number(100 * found.worst_error, 2)} %"

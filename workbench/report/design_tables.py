@@ -1,15 +1,14 @@
 """A design as tables and lines, for a terminal and a report."""
 
-from pathlib import Path
-
 from design.drive_law import DriveLaw
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number
 from workbench.documents.design import Controller, Design
 from workbench.documents.drive import DriveUnits, Output, equation_lines, force_lines
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, instead, listed, more, screen, tabled
+from workbench.report.view import OUT
+from workbench.screen import Part, instead, listed, more, tabled
 from workbench.steps.cascade import filter_words
 from workbench.steps.loop_figures import takes_compensator
 from workbench.steps.recommend import other_figures, own_figures
@@ -37,13 +36,14 @@ MARGINS_SAID = (
 )
 
 
-def margin_rows(found: Design) -> list[Row]:
-    """One row a controller, by `DESIGN_HEAD`."""
-    return [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+def margins_table(found: Design) -> Part:
+    """A row a controller."""
+    rows = [(name.upper(), *_margins(one)) for name, one in found.controllers.items()]
+    return tabled(DESIGN_HEAD, rows)
 
 
-def drive_rows(found: Design) -> list[Row]:
-    """The same in a drive engineer's words, by `IN_DRIVES_HEAD`; none of an older file."""
+def drive_table(found: Design) -> Part:
+    """The same in a drive engineer's words; without rows of an older file."""
     rows = []
     for name, one in found.controllers.items():
         m = one.margins
@@ -56,7 +56,7 @@ def drive_rows(found: Design) -> list[Row]:
             "any" if m.phase_deg is None else f"{number(m.phase_deg)} deg",
             "any" if m.delay_s is None else f"{number(1e3 * m.delay_s)} ms",
         ))  # fmt: skip
-    return rows
+    return tabled(IN_DRIVES_HEAD, rows)
 
 
 def _margins(one: Controller) -> Row:
@@ -182,9 +182,9 @@ def design_sentence(found: Design) -> str:
     return f"{said}{why}."
 
 
-def then_of_design(found: Design, folder: Path | None = None) -> list[str]:
-    """What to do next with a design; `folder` in which it lies."""
-    file = "design.json" if folder is None else str(folder / "design.json")
+def then_of_design(found: Design) -> list[str]:
+    """What to do next with a design."""
+    file = f"{OUT}design.json"
     if found.recommended == "none":
         return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, or log more and"
                 " identify again"]  # fmt: skip
@@ -236,22 +236,18 @@ def polynomial_lines(found: Design) -> list[str]:
     ]
 
 
-def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Screen:
-    """The design for a terminal.
+def design_parts(found: Design, rotary: bool = False) -> list[Part | str]:
+    """The margins, what the design rests on, and remarks.
 
     Behind --verbose: the plant, the other controllers' ramps, and the equations that a drive runs,
     which `export` writes as code.
     """
     chosen = None if found.recommended == "none" else found.recommended
-    said_by_command = folder is not None and chosen is None  # with the names of its files
-    parts: list[Part | str] = [design_sentence(found)]
-    if not said_by_command:
-        parts.extend(map(next_step, then_of_design(found, folder)))
     ramps = set_point_lines(found)
-    parts += [
-        tabled(DESIGN_HEAD, margin_rows(found)),
+    return [
+        margins_table(found),
         MARGINS_SAID,
-        tabled(IN_DRIVES_HEAD, drive_rows(found)),
+        drive_table(found),
         listed(other_lines(found)),
         more(f"plant: {found.plant.source}, {found.plant.why}"),
         listed(loop_lines(found, rotary)),
@@ -261,6 +257,3 @@ def design_view(found: Design, folder: Path | None, rotary: bool = False) -> Scr
         notes(found.remarks),
         *map(more, drive_lines(found, chosen)),
     ]
-    if folder is not None:
-        parts.append(written(folder, "design.json", "report.html"))
-    return screen(*parts)

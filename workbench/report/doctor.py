@@ -3,38 +3,23 @@
 import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification.remarks import Aside
 from workbench.cards.readable import number
-from workbench.cards.units import si_unit
 from workbench.documents.model import Told
 from workbench.remarks import told_once
-from workbench.report.figures import (
-    BAND,
-    MEASURED,
-    MODEL,
-    OTHER,
-    REFERENCE,
-    evenly_spread,
-    figure,
-    label,
-    line,
-    style,
-)
+from workbench.report.chart import Chart
+from workbench.report.chart_figure import chart_figure
+from workbench.report.doctor_chart import doctor_charts, speed_unit, unit_of
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
 from workbench.steps.told_by_log import Way
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
 LABEL_WIDTH = 9
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
-SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 
 
 def doctor_view(found: Examined, out: Path | None) -> Screen:
@@ -139,12 +124,6 @@ def _clock(clock: Clock) -> str:
     )
 
 
-def unit_of(found: Examined, name: str) -> tuple[float, str]:
-    """Factor and unit in which a signal is shown."""
-    unit = found.command_unit if name == "u" else si_unit(name, found.rig.motion) or ""
-    return SCREEN_UNITS.get(unit, (1.0, unit))
-
-
 def _sensor(found: Examined, one: SensorState) -> str:
     factor, unit = unit_of(found, one.name)
     low, high = factor * one.low, factor * one.high
@@ -166,15 +145,11 @@ def _delay(one: Delay) -> str:
 
 
 def _way(found: Examined, one: Way) -> str:
-    factor, unit = _of_speed(found)
+    factor, unit = speed_unit(found)
     return (
         f"{one.seconds:.3g} s in motion at {factor * one.slow:.3g} to {factor * one.fast:.3g}"
         f" {unit}; starts from rest: {one.starts}, with a breakaway force: {one.breakaways}"
     )
-
-
-def _of_speed(found: Examined) -> tuple[float, str]:
-    return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
 
 
 def _not_told(told: Iterable[Told]) -> list[str]:
@@ -197,78 +172,7 @@ def _together(said: Iterable[tuple[str, str]]) -> list[str]:
 
 def doctor_picture(found: Examined, path: Path) -> None:
     """The log as a PNG: position, drive, clock, and the force over the velocity."""
-    with style():
-        drawn = figure(11.0, 7.0)
-        ((place, over_speed), (drive, clock)) = drawn.subplots(
-            2, 2, gridspec_kw={"width_ratios": [2.2, 1.0]}
-        )
-        drawn.suptitle(f"{found.file}: {_verdict(found)}", x=0.01, ha="left", fontsize=11)
-        _draw_position(found, place)
-        _draw_drive(found, drive)
-        _draw_over_speed(found, over_speed)
-        _draw_clock(found, clock)
-        drawn.savefig(path, format="png", dpi=110)
-
-
-def _draw_position(found: Examined, axes: "Axes") -> None:
-    factor, unit = unit_of(found, "y")
-    log = found.log
-    if log is None:
-        axes.text(0.5, 0.5, "no run can be drawn", ha="center", transform=axes.transAxes)
-        return
-    if "r" in log:
-        line(axes, log["t"], factor * log["r"], color=REFERENCE, label="reference")
-    line(axes, log["t"], factor * log["y"], color=MEASURED, label="position")
-    shown = False
-    for one in found.bad[:60]:
-        first, last = max(one.first, log["t"][0]), min(one.last, log["t"][-1])
-        if one.samples > 1 and one.done in ("interpolated", "kept"):
-            continue  # isolated ones, of which only the first and the last are known
-        said, shown = None if shown else "bad samples", True
-        axes.axvspan(first, max(last, first + 2 * log.h), color=BAND, alpha=0.5, lw=0, label=said)
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=3)
-    label(axes, "time [s]", f"position [{unit}]")
-
-
-def _draw_drive(found: Examined, axes: "Axes") -> None:
-    log = found.log
-    if log is None:
-        return
-    name = "F" if "F" in log else "u"
-    factor, unit = unit_of(found, name)
-    line(axes, log["t"], factor * log[name], color=MODEL, label=_words(name))
-    if name == "F" and "u" in log and found.rig.kind != "motor":
-        second = axes.twinx()
-        second.grid(False)
-        line(second, log["t"], log["u"], color=OTHER, alpha=0.6)
-        second.set_ylabel("command", color=OTHER)
-    label(axes, "time [s]", f"{_words(name)} [{unit}]")
-
-
-def _words(name: str) -> str:
-    return {"F": "applied force", "u": "command"}[name]
-
-
-def _draw_over_speed(found: Examined, axes: "Axes") -> None:
-    log, motion = found.log, found.motion
-    if log is None or motion is None or not ("F" in log or "u" in log):
-        axes.text(0.5, 0.5, "no motion to show", ha="center", transform=axes.transAxes)
-        return
-    name = "F" if "F" in log else "u"
-    factor, unit = unit_of(found, name)
-    speed, per = _of_speed(found)
-    at = evenly_spread(len(log))
-    axes.scatter(speed * motion.v[at], factor * log[name][at], s=3, color=MEASURED, alpha=0.3,
-                 linewidths=0)  # fmt: skip
-    sure = 4.0 * speed * motion.v_noise
-    axes.axvspan(-sure, sure, color=BAND, alpha=0.35, lw=0)
-    label(axes, f"velocity [{per}]", f"{_words(name)} [{unit}]", "shaded: within its noise")
-
-
-def _draw_clock(found: Examined, axes: "Axes") -> None:
-    t, h = found.times, found.clock.h
-    step = np.diff(t) / h if h > 0.0 else np.diff(t)
-    line(axes, t[1:], step, color=MEASURED)
-    top = max(2.0, 1.1 * float(np.nanmax(step)))
-    axes.set_ylim(0.0, top)
-    label(axes, "time [s]", f"step of the clock [{1e3 * h:.4g} ms]")
+    panels = [panel for chart in doctor_charts(found) for panel in chart.panels]
+    drawn = chart_figure(Chart("doctor", f"the log {found.file}", panels, columns=2))
+    drawn.suptitle(f"{found.file}: {_verdict(found)}", x=0.01, ha="left", fontsize=11)
+    drawn.savefig(path, format="png", dpi=110)

@@ -1,118 +1,139 @@
-"""The report of a drift test: verdict, parameters before and after, the statistic over the logs."""
+"""A drift test: verdict, parameters before and after, the statistic over the logs."""
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 
+from identification.arrays import Array
+from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.drift_tables import (
-    RUN_HEAD,
-    SHIFT_HEAD,
     drift_notes,
+    drift_parts,
     drift_sentence,
     logs_of_drift,
-    run_rows,
-    shift_rows,
+    run_table,
+    shift_table,
     then_of_drift,
 )
-from workbench.report.figures import BAND, MEASURED, MODEL, REFERENCE, figure, inline, label, style
 from workbench.report.notes import report_notes
-from workbench.report.page import Section, page
-from workbench.report.templating import render
-from workbench.steps.drift import Drifted, Tested
+from workbench.report.page import Section, lines_section, table_section
+from workbench.report.view import View
+from workbench.steps.drift import Drifted, Tested, drift_document
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+WIDEST_CHANGE = 1e4  # half an interval that is drawn [%]
+LEAST_STATISTIC = 1e-3  # over its threshold, that is drawn
+BESIDE = 0.12  # of this log beside the model, in places of the axis of the parameters
+UPRIGHT = 0.01  # half the width of an upright line, which goes on in x
+LINEAR_UP_TO = 10.0  # statistic over threshold up to which the axis is linear
+NAMED_HEIGHT = 280
+THIS_LOG: tuple[tuple[str, bool, Colour], ...] = (
+    ("this log", False, "measured"),
+    ("this log, moved", True, "model"),
+)
+STATISTICS: tuple[tuple[str, str, Colour], ...] = (
+    ("this log", "single", "measured"),
+    ("mean of the logs", "mean", "reference"),
+)
+DRIFT_CAPTION = (
+    "Left: each parameter of this log and of the model in force, with 95 % intervals. Right:"
+    " how far all of them together have moved; above 1 it is drift."
+)
 
-LINEAR_UP_TO = 1.0  # statistic over threshold up to which the axis is linear
+
+def drift_view(found: Drifted, model_name: str) -> View:
+    """Whether the machine has changed, in what, and how the logs before it looked."""
+    return View(
+        f"Drift test of {found.model.card}",
+        drift_sentence(found),
+        drift_parts(found),
+        lambda: drift_document(found, model_name),
+        {"drift.json": lambda: drift_document(found, model_name)},
+        lambda: _sections(found),
+        lambda: drift_chart(found, (_judged(found) or found.tests)[-1]),
+        then_of_drift(found),
+        then_by_command=found.verdict not in ("none", "not_judged"),
+    )
 
 
-def drift_report(found: Drifted) -> str:
-    """HTML: whether the machine has changed, in what, and how the logs before it looked."""
-    sections, logs = [], _table("The logs", RUN_HEAD, run_rows(found))
-    judged = [one for one in found.tests if one.test.shifts]
+def _sections(found: Drifted) -> list[Section]:
+    sections, logs = [], table_section("The logs", run_table(found))
+    judged = _judged(found)
     if judged:
         last = judged[-1]
-        sections += [_pictures(found, last), logs]
-        sections.append(
-            _table(f"Parameters before and after, {last.source.file}", SHIFT_HEAD, shift_rows(last))
-        )
-    else:
-        sections.append(logs)
-    told = report_notes(drift_notes(found), logs_of_drift(found))
-    sections.append(Section("Notes", render("lines", lines=told)))
-    then = then_of_drift(found)
-    return page(f"Drift test of {found.model.card}", drift_sentence(found), sections, then)
+        picture = chart_html(drift_chart(found, last), DRIFT_CAPTION)
+        sections.append(Section("Before and after, and over the logs", picture))
+    sections.append(logs)
+    if judged:
+        title = f"Parameters before and after, {last.source.file}"
+        sections.append(table_section(title, shift_table(last)))
+    notes = report_notes(drift_notes(found), logs_of_drift(found))
+    return [*sections, lines_section("Notes", notes)]
 
 
-def _pictures(found: Drifted, last: Tested) -> Section:
-    with style():
-        drawn = drift_figure(found, last)
-        html = inline(drawn, "drift", "Parameters before and after, and the statistic over logs")
-    caption = (
-        "Left: each parameter of this log and of the model in force, with 95 % intervals. Right:"
-        " how far all of them together have moved; above 1 it is drift."
-    )
-    html = render("figure", svg=html, caption=caption)
-    return Section("Before and after, and over the logs", html)
+def _judged(found: Drifted) -> list[Tested]:
+    return [one for one in found.tests if one.test.shifts]
 
 
-def drift_figure(found: Drifted, last: Tested) -> "Figure":
+def drift_chart(found: Drifted, last: Tested) -> Chart:
     """The parameters of a tested run before and after, and the statistics over the logs."""
-    with style():
-        drawn = figure(9.0, 4.2)
-        left, right = drawn.subplots(1, 2)
-        _changes(left, found, last)
-        _over_logs(right, found)
-    return drawn
+    what = "Parameters before and after, and the statistic over logs"
+    panels = [_changes(found, last), _over_logs(found)]
+    return Chart("drift", what, panels, columns=2, shared_x=False)
 
 
-def _changes(axes: "Axes", found: Drifted, last: Tested) -> None:
+def _changes(found: Drifted, last: Tested) -> Panel:
     """Every judged parameter's change with its interval, the model's own, and the margin."""
     shifts = list(last.test.shifts.values())
-    place = np.arange(len(shifts), dtype=np.float64)
-    margin = 100 * found.settings.margin
-    axes.axvspan(-margin, margin, color=BAND, alpha=0.25, lw=0, label="does not matter")
     moved = {shift.name for shift in last.test.moved}
-    own = [196 * shift.before_sd / max(abs(shift.before), 1e-300) for shift in shifts]
-    axes.errorbar(
-        np.zeros(len(shifts)), place - 0.15, xerr=np.minimum(own, 1e4), fmt="o", ms=4,
-        color=REFERENCE, label="model in force",
+    margin, n = 100 * found.settings.margin, len(shifts)
+    place = np.arange(n, dtype=np.float64)
+    change = np.array([100 * shift.change for shift in shifts])
+    half = np.array([196 * shift.sd for shift in shifts])
+    own = np.array([196 * one.before_sd / max(abs(one.before), 1e-300) for one in shifts])
+    lines = _with_intervals("model in force", place - BESIDE, np.zeros(n), own, "reference")
+    for name, is_moved, colour in THIS_LOG:
+        of = np.array([(shift.name in moved) is is_moved for shift in shifts], dtype=bool)
+        if np.any(of):
+            where = place[of] + BESIDE
+            lines += _with_intervals(name, where, change[of], half[of], colour)
+    return Panel(
+        "", "change [%]", lines, f"{last.source.file}: change from the model in force",
+        bands=[Band("does not matter", -margin, margin, "y", "band")],
+        x_range=(-0.5, n - 0.5), names=[shift.name for shift in shifts], height=NAMED_HEIGHT,
     )  # fmt: skip
-    for at, shift in zip(place, shifts, strict=True):
-        colour = MODEL if shift.name in moved else MEASURED
-        axes.errorbar(
-            100 * shift.change, at + 0.15, xerr=196 * shift.sd, fmt="s", ms=4, color=colour,
-            label="this log" if at == 0 else None,
-        )  # fmt: skip
-    axes.set_yticks(place, [shift.name for shift in shifts])
-    axes.invert_yaxis()
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
-    label(axes, "change from the model in force [%]", "", last.source.file)
 
 
-def _over_logs(axes: "Axes", found: Drifted) -> None:
+def _with_intervals(
+    name: str, place: Array, values: Array, half: Array, colour: Colour
+) -> list[Line]:
+    """Dots, and an upright line through each."""
+    half = np.minimum(half, WIDEST_CHANGE)
+    upright = [
+        Line("", at + np.array([-UPRIGHT, UPRIGHT]), value + np.array([-size, size]), colour)
+        for at, value, size in zip(place, values, half, strict=True)
+    ]
+    return [*upright, Line(name, place, values, colour, "dots")]
+
+
+def _over_logs(found: Drifted) -> Panel:
     """Both statistics over their thresholds, log by log since the model was put in force."""
-    from matplotlib.ticker import MaxNLocator
-
     seen = found.stream.seen
-    number = np.arange(1, len(seen) + 1)
-    for name, values, mark, colour in (
-        ("this log", [one.single for one in seen], "s", MEASURED),
-        ("mean of the logs", [one.mean for one in seen], "o", REFERENCE),
-    ):
-        known = np.array([np.nan if value is None else value for value in values])
-        axes.plot(number, known, mark + "-", ms=4, lw=0.8, color=colour, label=name)
-    other = [n for n, one in zip(number, seen, strict=True) if one.verdict == "structure"]
-    if other:
-        axes.plot(other, np.full(len(other), 1.0), "x", ms=7, color=MODEL, label="other structure")
-    axes.axhline(1.0, color=MODEL, lw=1.0)
-    axes.set_yscale("symlog", linthresh=LINEAR_UP_TO)
-    axes.set_ylim(bottom=-0.05)
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.14), ncols=3)
-    label(axes, "log since the model was put in force", "statistic over its threshold")
+    number = np.arange(1.0, len(seen) + 1.0)
+    lines = []
+    for name, key, colour in STATISTICS:
+        known = _known([getattr(one, key) for one in seen])
+        lines += [Line("", number, known, colour), Line(name, number, known, colour, "dots")]
+    most = max([1.0, *(float(np.nanmax(one.y, initial=0.0)) for one in lines)])
+    wide = most > LINEAR_UP_TO
+    other = number[[one.verdict == "structure" for one in seen]]
+    if len(other):
+        lines.append(Line("other structure", other, np.ones(len(other)), "model", "dots"))
+    return Panel(
+        "log since the model was put in force", "statistic over its threshold", lines,
+        marks=[Mark(1.0)], x_range=(0.5, len(seen) + 0.5), log_y=wide,
+        y_range=None if wide else (0.0, 1.1 * most), height=NAMED_HEIGHT,
+    )  # fmt: skip
 
 
-def _table(title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> Section:
-    return Section(title, render("table", head=head, rows=rows, lines=[]))
+def _known(values: Sequence[float | None]) -> Array:
+    return np.array([np.nan if one is None else max(one, LEAST_STATISTIC) for one in values])

@@ -1,19 +1,16 @@
 """A drift test in words and tables, for a terminal and for its report."""
 
-from pathlib import Path
+from collections.abc import Sequence
 
 from identification.drift.drift_result import DriftTest, Shift, Statistic
 from identification.estimation.estimates import told_estimate
 from workbench.cards.readable import number, shown_unit
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.remarks import told_once
 from workbench.report.model_tables import reasons_once
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, instead, screen, tabled
+from workbench.screen import Part, instead, tabled
 from workbench.steps.drift import Drifted, Tested
-
-RUN_HEAD = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
-SHIFT_HEAD = ("parameter", "before", "after", "unit", "change", "95 % interval")
 
 
 def drift_sentence(found: Drifted) -> str:
@@ -82,9 +79,10 @@ def signed_percent(value: float) -> str:
     return f"{100 * value:+.2f} %" if abs(value) < 0.1 else f"{100 * value:+.1f} %"
 
 
-def run_rows(found: Drifted) -> list[Row]:
+def run_table(found: Drifted) -> Part:
     """Every run's verdict and statistics."""
-    return [_run_row(one) for one in found.tests]
+    head = ("log", "verdict", "this log", "mean of logs", "chi-square", "moved")
+    return tabled(head, [_run_row(one) for one in found.tests], right=(), latest=True)
 
 
 def _run_row(one: Tested) -> Row:
@@ -104,11 +102,13 @@ def _over(found: Statistic | None) -> str:
     return "-" if found is None else f"{found.value:.3g} of {found.threshold:.3g}"
 
 
-def shift_rows(one: Tested) -> list[Row]:
+def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
     """Every parameter of a run before and after; those not judged with the reason."""
+    head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = [_shift_row(shift) for shift in one.test.shifts.values()]
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
-    return rows
+    once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
+    return tabled(head, once, right=(1, 2), whole=rows)
 
 
 def _shift_row(shift: Shift) -> Row:
@@ -176,31 +176,23 @@ def logs_of_drift(found: Drifted) -> tuple[str, ...]:
     return tuple(dict.fromkeys(name for both in names for name in both))
 
 
-def drift_view(found: Drifted, folder: Path | None) -> Screen:
-    """The verdict, every run, the parameters of the last one, for a terminal."""
-    parts: list[Part | str] = [drift_sentence(found)]
-    if folder is None or found.verdict in ("none", "not_judged"):  # else the command says it
-        parts.extend(map(next_step, then_of_drift(found)))
-    parts.append(tabled(RUN_HEAD, run_rows(found), right=(), latest=True))
-    rows, logs = shift_rows(found.tests[-1]), logs_of_drift(found)
-    if rows:
-        once = map(_swapped, reasons_once(map(_swapped, rows), logs, 3))
-        parts.append(tabled(SHIFT_HEAD, once, right=(1, 2), whole=rows))
+def drift_parts(found: Drifted) -> list[Part | str]:
+    """Every run, the parameters of the last one, and what to know of the tests."""
+    logs = logs_of_drift(found)
     legend, seen = what_the_columns_say(found), seen_lines(found)
     # What is not judged, and why, stands in the table too.
     told = told_once((line.partition("; not judged: ")[0] for line in seen), logs)
     short = [line for line in told if line not in drift_sentence(found)]
-    parts.append(instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]))
-    parts.append(
-        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True)
-    )
-    parts.append(notes(found.remarks, logs))
-    if folder is not None:
-        parts.append(written(folder, "drift.json", "report.html"))
-    return screen(*parts)
+    return [
+        run_table(found),
+        shift_table(found.tests[-1], logs),
+        instead([f"note: {legend[0]}"], [f"note: {line}" for line in legend]),
+        instead([f"note: {x}" for x in short], [f"note: {x}" for x in seen], 4, yields=True),
+        notes(found.remarks, logs),
+    ]
 
 
 def _swapped(row: Row) -> Row:
-    """A row of `SHIFT_HEAD` with the unit after the change, as `reasons_once` has it; or back."""
+    """A row of `shift_table` with the unit after the change, as `reasons_once` has it; or back."""
     first, second = row[3:5]
     return (*row[:3], second, first, *row[5:])

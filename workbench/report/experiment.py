@@ -1,35 +1,15 @@
 """An experiment as a reference file, a page with its picture, and a table for a terminal."""
 
-from pathlib import Path
-from typing import TYPE_CHECKING
-
 import numpy as np
 
-from identification.arrays import Array
 from workbench.cards.parameter_units import shown
-from workbench.output import Row, written
-from workbench.report.figures import (
-    BAND,
-    GREY,
-    MEASURED,
-    MODEL,
-    REFERENCE,
-    figure,
-    inline,
-    label,
-    line,
-    style,
-    thinned,
-)
+from workbench.output import Row
+from workbench.report.chart import Area, Chart, Colour, Line, Mark, Panel, chart_html
 from workbench.report.notes import notes
-from workbench.report.page import Section, page
-from workbench.report.templating import render
-from workbench.screen import Screen, listed, more, screen, tabled
-from workbench.steps.experiment.planned import Experiment, Promised
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from workbench.report.page import Section, table, table_section
+from workbench.report.view import View
+from workbench.screen import Part, listed, more, tabled
+from workbench.steps.experiment.planned import Experiment, Promised, experiment_document
 
 PROMISE_HEAD = ("parameter", "value", "unit", "now +-", "after +-", "after / value")
 PIECE_NAMES = {
@@ -41,7 +21,14 @@ PIECE_NAMES = {
     "stairs": "stairs up and down",
     "multisine": "a multisine",
 }
-EXPERIMENT_BAND_POINTS = 600
+PROMISE_LOOKS: tuple[tuple[str, Colour, float, str], ...] = (
+    ("before", "before", -0.1, "now"),
+    ("after", "measured", 0.1, "promised after the run"),
+)
+RUN_CAPTION = (
+    "Reference and simulated run on the model and on machines drawn from what the model leaves open"
+    " (band); broken grey: the limits."
+)
 
 
 def reference_text(found: Experiment) -> str:
@@ -51,9 +38,9 @@ def reference_text(found: Experiment) -> str:
     return "\n".join([f"t [s],r [{unit}]", *rows, ""])
 
 
-def promise_rows(found: Experiment) -> list[Row]:
-    """A row a parameter, by `PROMISE_HEAD`."""
-    return [_row(one) for one in found.promise]
+def promise_table(found: Experiment) -> Part:
+    """A row a parameter."""
+    return tabled(PROMISE_HEAD, map(_row, found.promise), right=(1, 3, 4, 5))
 
 
 def _row(one: Promised) -> Row:
@@ -127,50 +114,44 @@ def search_lines(found: Experiment) -> list[str]:
     return out
 
 
-def experiment_view(found: Experiment, folder: Path | None) -> Screen:
-    """The experiment for a terminal; how it was searched with --verbose."""
-    names = ("reference.csv", "experiment.json", "report.html")
-    return screen(
+def experiment_view(found: Experiment) -> View:
+    """The run, what it promises, its pieces; how it was searched with --verbose."""
+    return View(
+        f"The run to make next on {found.card}",
         experiment_lead(found),
-        tabled(PROMISE_HEAD, promise_rows(found), right=(1, 3, 4, 5)),
-        listed(limit_lines(found)),
-        more(listed(search_lines(found))),
-        notes(found.remarks),
-        *([] if folder is None else [written(folder, *names)]),
+        [
+            promise_table(found),
+            listed(limit_lines(found)),
+            more(listed(search_lines(found))),
+            notes(found.remarks),
+        ],
+        lambda: experiment_document(found),
+        {
+            "reference.csv": lambda: reference_text(found),
+            "experiment.json": lambda: experiment_document(found),
+        },
+        lambda: _sections(found),
+        lambda: run_chart(found),
     )
 
 
-def experiment_report(found: Experiment) -> str:
-    """HTML: the picture, the promise, the pieces, remarks."""
-    with style():
-        svg = inline(experiment_figure(found), "experiment", "reference, motion, speed and force")
-    caption = (
-        "Reference and simulated run on the model (orange) and on machines drawn from what the"
-        " model leaves open (band); broken grey: the limits."
-    )
+def _sections(found: Experiment) -> list[Section]:
     units = shown(found.motion == "rotary")
     pieces = [
-        (
-            str(i + 1),
-            PIECE_NAMES[one.kind],
-            f"{one.amplitude:.4g} {units.position}",
-            _rate(found, i),
-        )
+        (str(i + 1), PIECE_NAMES[one.kind], f"{one.amplitude:.4g} {units.position}",
+         _rate(found, i))
         for i, one in enumerate(found.segments)
-    ]
-    sections = [
-        Section("The run", render("figure", svg=svg, caption=caption)),
-        Section("What it promises", render("table", head=PROMISE_HEAD, rows=promise_rows(found),
-                                           lines=experiment_lines(found))),
     ]  # fmt: skip
+    promised = table(promise_table(found), experiment_lines(found))
+    sections = [
+        Section("The run", chart_html(run_chart(found), RUN_CAPTION)),
+        Section("What it promises", promised + chart_html(promise_chart(found))),
+    ]
     if found.separation:
         apart = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
         between = ("if the machine has", "rival", "deviations of the noise")
-        sections.append(Section("What it tells apart", render("table", head=between, rows=apart,
-                                                              lines=[])))  # fmt: skip
-    head = ("", "piece", "amplitude", "pace")
-    sections.append(Section("Pieces", render("table", head=head, rows=pieces, lines=[])))
-    return page(f"The run to make next on {found.card}", experiment_lead(found), sections)
+        sections.append(table_section("What it tells apart", tabled(between, apart)))
+    return [*sections, table_section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
 
 
 def _rate(found: Experiment, index: int) -> str:
@@ -182,60 +163,42 @@ def _rate(found: Experiment, index: int) -> str:
     return f"{1.0 / one.rate:.3g} s each"
 
 
-def experiment_figure(found: Experiment) -> "Figure":
-    """Position, speed and force along the run, with the limits, and the intervals it promises."""
+def run_chart(found: Experiment) -> Chart:
+    """Position, speed and force along the run, with the limits."""
     units, seen, limits = shown(found.motion == "rotary"), found.traces, found.limits
-    with style():
-        drawn = figure(9.0, 8.6)
-        top, speed, force, promise = drawn.subplots(
-            4, 1, gridspec_kw={"height_ratios": [3, 1.6, 1.6, 1.8]}
-        )
-        for axes, values, name, unit in (
-            (top, seen.y, "position", units.position),
-            (speed, seen.v, "speed", units.velocity),
-            (force, seen.F, "applied force", units.force),
-        ):
-            _band(axes, seen.t, values)
-            line(axes, seen.t, values[0], color=MODEL, lw=1.0, label="the model")
-            label(axes, "", f"{name} [{unit}]")
-            axes.margins(x=0.0)
-        line(top, seen.t, seen.r, color=REFERENCE, lw=0.9, ls=":", label="reference")
-        for axes, edges in (
-            (top, limits.stroke),
-            (speed, (-limits.speed, limits.speed)),
-            (force, (-limits.force, limits.force)),
-        ):
-            for edge in edges if np.all(np.isfinite(edges)) else ():
-                axes.axhline(edge, color=GREY, ls="--", lw=0.9)
-        force.set_xlabel("time [s]")
-        top.legend(loc="upper right", ncols=3)
-        _promise(promise, found)
-    return drawn
+    panels = []
+    for values, name, unit, edges in (
+        (seen.y, "position", units.position, limits.stroke),
+        (seen.v, "speed", units.velocity, (-limits.speed, limits.speed)),
+        (seen.F, "applied force", units.force, (-limits.force, limits.force)),
+    ):
+        low, high = np.min(values, axis=0), np.max(values, axis=0)
+        lines = [Line("the model", seen.t, values[0])]
+        if name == "position":
+            lines.append(Line("reference", seen.t, seen.r, "reference", "dotted"))
+        marks = [Mark(edge) for edge in edges if np.all(np.isfinite(edges))]
+        areas = [Area("machines that it may be", seen.t, low, high)]
+        ends = [float(low.min()), float(high.max()), *(mark.at for mark in marks)]
+        room = 0.05 * (max(ends) - min(ends))
+        panels.append(
+            Panel(
+                "time [s]", f"{name} [{unit}]", lines, areas=areas, marks=marks,
+                y_range=(min(ends) - room, max(ends) + room),
+            )
+        )  # fmt: skip
+    return Chart("experiment", "reference, motion, speed and force", panels)
 
 
-def _band(axes: "Axes", t: Array, values: Array) -> None:
-    low, high = np.min(values, axis=0), np.max(values, axis=0)
-    at, low = thinned(t, low, EXPERIMENT_BAND_POINTS)
-    on, high = thinned(t, high, EXPERIMENT_BAND_POINTS)
-    both = np.union1d(at, on)
-    axes.fill_between(both, np.interp(both, at, low), np.interp(both, on, high), color=BAND,
-                      alpha=0.45, lw=0, label="machines that it may be")  # fmt: skip
-
-
-def _promise(axes: "Axes", found: Experiment) -> None:
-    """Half intervals over the value, now and after the run."""
-    place = np.arange(len(found.promise))
-    for key, colour, shift, name in (
-        ("before", GREY, -0.18, "now"), ("after", MEASURED, 0.18, "promised after the run")
-    ):  # fmt: skip
+def promise_chart(found: Experiment) -> Chart:
+    """Half intervals over the value, now and after the run; none where one is not told."""
+    lines = []
+    for key, colour, shift, name in PROMISE_LOOKS:
         sizes = [getattr(one, key) for one in found.promise]
         told = [i for i, one in enumerate(sizes) if one and found.promise[i].value]
         shares = [100.0 * sizes[i] / abs(found.promise[i].value) for i in told]
-        axes.bar(place[told] + shift, shares, 0.34, color=colour, label=name)
-        for i in (i for i, one in enumerate(sizes) if one is None):
-            axes.text(place[i] + shift, 0.02, "not told", rotation=90, fontsize=7, ha="center",
-                      va="bottom", color=colour, transform=axes.get_xaxis_transform())  # fmt: skip
-    axes.set_yscale("log")
-    axes.set_xticks(place, [one.name for one in found.promise], rotation=20)
-    label(axes, "", "half interval [% of value]")
-    axes.legend(loc="upper right", ncols=2)
+        lines.append(Line(name, np.array(told) + shift, np.array(shares), colour, "dots"))
+    panel = Panel(
+        "", "half interval [% of value]", lines, log_y=True,
+        x_range=(-0.5, len(found.promise) - 0.5), names=[one.name for one in found.promise],
+    )  # fmt: skip
+    return Chart("promise", "half intervals of the parameters, now and after the run", [panel])

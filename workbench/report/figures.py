@@ -1,7 +1,6 @@
-"""Figures of the reports: one look, labelled axes, small inline SVG."""
+"""Figures of matplotlib for notebooks and PNG files: one look, labelled axes."""
 
 import io
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -10,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.arrays import Array, IntArray
-from workbench.report.templating import safe
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -21,17 +19,6 @@ MEASURED, MODEL, REFERENCE, OTHER = "#000000", "#d55e00", "#0072b2", "#009e73"
 BAND = "#e69f00"
 GREY = "#7a7a7a"
 BEFORE = "#8a8a8a"
-# The colours of the pages' style in place of the figures'.
-SCHEME = {
-    "#000000": "var(--measured)",
-    MODEL: "var(--model)",
-    REFERENCE: "var(--reference)",
-    OTHER: "var(--other)",
-    BAND: "var(--band)",
-    GREY: "var(--before)",
-    "#ffffff": "var(--paper)",
-    "#dddddd": "var(--grid)",
-}
 LINE_POINTS = 1200  # of a line; more than a screen shows
 SCATTER = 6000
 SHOWN_SHARE = 0.995  # of the points that axes hold; the rarest would flatten the rest
@@ -77,22 +64,6 @@ def _shown_figure() -> "type[Figure]":
             return out.getvalue()
 
     return ShownFigure
-
-
-def inline(drawn: "Figure", name: str, description: str) -> Any:
-    """The figure as inline SVG with a description; `name` keeps ids apart on a page."""
-    import matplotlib as mpl
-
-    out = io.StringIO()
-    with mpl.rc_context({"svg.hashsalt": name}):
-        drawn.savefig(out, format="svg", dpi=110, metadata={"Date": None, "Creator": None})
-    text = out.getvalue()
-    # Group ids repeat from figure to figure and nothing refers to them.
-    svg = re.sub(r'<g id="[^"]*"', "<g", text[text.index("<svg") :])
-    svg = re.sub(r'<svg [^>]*?(viewBox="[^"]*")', r"<svg \1", svg, count=1)
-    # Colours follow the page's scheme, light or dark.
-    svg = re.sub("|".join(SCHEME), lambda found: SCHEME[found[0]], svg)
-    return safe(svg.replace("<svg ", f'<svg role="img" aria-label="{description}" ', 1))
 
 
 def line(axes: "Axes", x: Array, y: Array, **look: Any) -> None:

@@ -9,9 +9,8 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.readable import number, units_of
 from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
-from workbench.report.page import Section
-from workbench.report.templating import render
-from workbench.report.validation_tables import validation_head, validation_lines, validation_rows
+from workbench.report.page import Section, table_section
+from workbench.report.validation_tables import validation_lines, validation_table
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Traces
 from workbench.steps.validate import Validation
 
@@ -28,10 +27,9 @@ SINCE = "time since the step [s]"
 
 def judged(found: Validation, rotary: bool) -> Section:
     """Every controller on every plant, and what it misses."""
-    lines = validation_lines(found, rotary)
-    head, rows = validation_head(found, rotary), validation_rows(found, rotary)
-    html = render("table", head=head, rows=rows, lines=lines)
-    return Section("Verdict", html)
+    return table_section(
+        "Verdict", validation_table(found, rotary), validation_lines(found, rotary)
+    )
 
 
 def loop(

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterable, Sequence
-from pathlib import Path
 
 from identification.effects._base import Param
 from identification.model.estimates import Estimate
@@ -10,10 +9,10 @@ from workbench.cards.effect_values import known_effect
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
 from workbench.documents.model import Model, used
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.remarks import told_once
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, instead, more, screen, tabled
+from workbench.screen import Part, instead, more, tabled
 
 MODEL_HEAD = ("parameter", "value", "unit", "95 % interval")
 MEANING = {
@@ -86,21 +85,16 @@ def estimate_cells(estimate: Estimate) -> tuple[str, str, str]:
     return value, estimate.unit, f"{low} to {high}"
 
 
-def model_view(model: Model, remarks: Sequence[str], folder: Path | None) -> Screen:
-    """The parameters, what the fit leaves, and remarks, for a terminal."""
+def model_parts(model: Model, remarks: Sequence[str]) -> list[Part | str]:
+    """The parameters, what the fit leaves, and remarks."""
     rows = [row[:4] for row in parameter_rows(model)]
-    logs = logs_of(model)
-    parts: list[Part | str] = [summary(model)]
-    if folder is None:  # the command says it itself, with the names of its files
-        parts.append(next_step(next_of_model(model)))
-    parts.append(tabled(MODEL_HEAD, reasons_once(rows, logs), whole=rows))
-    lines = fit_lines(model)
-    parts.append(instead(told_once(lines, logs), lines))
-    parts.extend(map(more, plant_lines(model)))
-    parts.append(notes((*remarks, *model.fit.remarks), logs))
-    if folder is not None:
-        parts.append(written(folder, "model.json", "report.html"))
-    return screen(*parts)
+    logs, lines = logs_of(model), fit_lines(model)
+    return [
+        tabled(MODEL_HEAD, reasons_once(rows, logs), whole=rows),
+        instead(told_once(lines, logs), lines),
+        *map(more, plant_lines(model)),
+        notes((*remarks, *model.fit.remarks), logs),
+    ]
 
 
 def logs_of(model: Model) -> tuple[str, ...]:

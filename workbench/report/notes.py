@@ -1,6 +1,7 @@
 """Remarks for a screen and a report: told once for all logs that they hold for."""
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 from identification.remarks import Aside
 from workbench.remarks import Merged, merged, told_once
@@ -16,7 +17,8 @@ def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_N
     """
     every = tuple(remarks)
     told = told_once((one for one in every if not isinstance(one, Aside)), logs)
-    return instead(_noted(told), _noted(every), most, yields=True)
+    shown = [one._replace(text=f"note: {one.text}") for one in report_notes(every, logs)]
+    return replace(instead(_noted(told), _noted(every), most, yields=True), merged=shown)
 
 
 def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:

@@ -3,10 +3,12 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
+from typing import Any
 
 from workbench.report.chart import chart_assets
 from workbench.report.symbols import used_symbols
-from workbench.report.templating import render
+from workbench.report.templating import render, safe
+from workbench.screen import Part
 
 
 @dataclass(frozen=True)
@@ -15,6 +17,23 @@ class Section:
 
     title: str
     html: str
+
+
+def table(part: Part, lines: Sequence[Any] = ()) -> Any:
+    """The HTML of a whole table, and of lines below it; "" where it has no rows and none are."""
+    if not part.whole:
+        return safe(render("lines", lines=lines) if lines else "")
+    return safe(render("table", head=part.full_head, rows=part.whole, lines=lines))
+
+
+def table_section(title: str, part: Part, lines: Sequence[Any] = ()) -> Section:
+    """A section that is a table."""
+    return Section(title, table(part, lines))
+
+
+def lines_section(title: str, lines: Sequence[Any]) -> Section:
+    """A section of lines; merged remarks open up."""
+    return Section(title, render("lines", lines=lines))
 
 
 def page(title: str, lead: str, sections: Sequence[Section], then: Sequence[str] = ()) -> str:

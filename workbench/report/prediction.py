@@ -5,12 +5,11 @@ from pathlib import Path
 import numpy as np
 
 from workbench.cards.readable import force, length, units_of
-from workbench.output import next_step, written
 from workbench.report.chart import Chart, Colour, Line, Look, Panel, chart_html
 from workbench.report.notes import notes
-from workbench.report.page import Section
-from workbench.screen import Screen, screen
-from workbench.steps.predict import Predicted
+from workbench.report.page import Section, lines_section
+from workbench.report.view import View
+from workbench.steps.predict import Predicted, prediction_csv
 
 Columns = tuple[tuple[str, Colour, str], ...]
 POSITION_COLUMNS: Columns = (
@@ -22,17 +21,6 @@ FORCE_COLUMNS: Columns = (
     ("force_predicted", "model", "predicted: inverse model"),
     ("force_simulated", "other", "simulated"),
 )
-
-
-def then_of_prediction(log: str, card: str) -> list[str]:
-    """What to do next with a prediction of a log."""
-    return [f"`workbench trace {log} --card {card}`, where that is more than noise"]
-
-
-def prediction_lines(found: Predicted, rotary: bool) -> list[str]:
-    """How far the model lies from the log, and what to know of it, a line each."""
-    remarks = (f"note: {remark}" for remark in found.summary["remarks"])
-    return [*error_lines(found, rotary), *remarks]
 
 
 def error_lines(found: Predicted, rotary: bool) -> list[str]:
@@ -58,20 +46,30 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     return lines
 
 
-def prediction_view(found: Predicted, rotary: bool, log: str, card: str, folder: Path) -> Screen:
-    """The prediction of a log for a terminal."""
-    return screen(
-        *error_lines(found, rotary),
-        *map(next_step, then_of_prediction(log, card)),
-        notes(found.summary["remarks"], (Path(log).name,)),
-        written(folder, "prediction.csv"),
+def prediction_view(found: Predicted, rotary: bool, log: str = "LOG", card: str = "CARD") -> View:
+    """How far a model lies from a log; log, card: as the command to type next names them."""
+    first, *more = error_lines(found, rotary) or ["nothing of this log can be compared"]
+    remarks = found.summary["remarks"]
+
+    def sections() -> list[Section]:
+        lines = [*more, *(f"note: {one}" for one in remarks)]
+        chart = chart_html(prediction_chart(found, rotary), "Nothing is fitted on this log.")
+        drawn = [Section("Over time", chart)]
+        return [*drawn, lines_section("In words", lines)] if lines else drawn
+
+    return View(
+        "Prediction",
+        first,
+        [*more, notes(remarks, (Path(log).name,))],
+        lambda: found.summary,
+        {"prediction.csv": lambda: prediction_csv(found.runs)},
+        sections,
+        lambda: prediction_chart(found, rotary),
+        [f"`workbench trace {log} --card {card}`, where that is more than noise"],
+        has_page=False,
+        lead=first.rstrip(".") + ".",
+        then_below=len(more),
     )
-
-
-def prediction_section(found: Predicted, rotary: bool) -> Section:
-    """Position and force over time."""
-    chart = prediction_chart(found, rotary)
-    return Section("Over time", chart_html(chart, "Nothing is fitted on this log."))
 
 
 def prediction_chart(found: Predicted, rotary: bool) -> Chart:

@@ -1,77 +1,127 @@
-"""The reports that commands write: which sections, in which order, under which words."""
+"""What `identify`, `design` and `validate` show: which tables and pictures, under which words."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import cache
 
+from identification.simulation.free_run import FreeRun
 from workbench.documents.design import Design
+from workbench.documents.design_file import design_document
+from workbench.documents.model_file import model_document
 from workbench.report.bode import bode_section
 from workbench.report.controllers import (
     coefficients,
     controllers,
     drive_section,
     sensitivity_section,
+    step_chart,
     step_response,
 )
-from workbench.report.design_tables import design_sentence, then_of_design
-from workbench.report.fit import fit
+from workbench.report.design_tables import design_parts, design_sentence, then_of_design
+from workbench.report.fit import fit, fit_chart
 from workbench.report.friction import friction_curve
 from workbench.report.loop import judged, loop
+from workbench.report.loop import step_chart as loop_chart
 from workbench.report.model_tables import (
     fit_lines,
     logs_of,
+    model_parts,
     next_of_model,
     plant_lines,
     summary,
 )
 from workbench.report.notes import report_notes
-from workbench.report.page import Section, page
+from workbench.report.page import Section, lines_section
 from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
 from workbench.report.response import over_frequency
-from workbench.report.templating import render
-from workbench.report.validation_tables import then_of_validation, validation_sentence
+from workbench.report.validation_tables import (
+    then_of_validation,
+    validation_parts,
+    validation_sentence,
+)
+from workbench.report.view import View
 from workbench.steps.identify_sources import Identified
 from workbench.steps.loop_figures import Traces
 from workbench.steps.predict import fitted_run
-from workbench.steps.validate import Validation
+from workbench.steps.validate import Validation, validation_document
 
 
-def identification_report(found: Identified) -> str:
-    """HTML: what was identified, how well it follows the log, what it leaves."""
+def identified_view(found: Identified) -> View:
+    """What was identified, how well it follows the log, what it leaves."""
     model, sources = found.model, found.sources
-    runs = [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
-    told = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
-    sections = (
-        residual(model, sources, runs),
-        parameters_section(model),
-        friction_curve(model, found.fit, sources),
-        fit(model, sources, runs),
-        *over_frequency(model, sources),
-        Section("In words", render("lines", lines=report_notes(told, logs_of(model)))),
+
+    @cache
+    def runs() -> list[FreeRun | None]:
+        return [fitted_run(model, one.log, number) for number, one in enumerate(sources)]
+
+    def sections() -> Sequence[Section]:
+        told = (*fit_lines(model), *plant_lines(model), *found.remarks, *model.fit.remarks)
+        return (
+            residual(model, sources, runs()),
+            parameters_section(model),
+            friction_curve(model, found.fit, sources),
+            fit(model, sources, runs()),
+            *over_frequency(model, sources),
+            lines_section("In words", report_notes(told, logs_of(model))),
+        )
+
+    return View(
+        f"Identification of {model.card}",
+        summary(model),
+        model_parts(model, found.remarks),
+        lambda: model_document(model),
+        {"model.json": lambda: model_document(model)},
+        sections,
+        lambda: fit_chart(model, sources, runs()),
+        [next_of_model(model)],
+        then_by_command=True,
     )
-    then = [next_of_model(model)]
-    return page(f"Identification of {model.card}", summary(model), sections, then)
 
 
-def design_report(found: Design, rotary: bool = False) -> str:
-    """HTML: the controllers, their margins, what they do to noise, how fast they are."""
-    sections = (
-        step_response(found),
-        controllers(found, rotary),
-        *bode_section(found),
-        sensitivity_section(found, rotary),
-        coefficients(found),
-        drive_section(found),
+def design_view(found: Design, rotary: bool = False) -> View:
+    """The controllers, their margins, what they do to noise, how fast they are."""
+
+    def sections() -> Sequence[Section]:
+        return (
+            step_response(found),
+            controllers(found, rotary),
+            *bode_section(found),
+            sensitivity_section(found, rotary),
+            coefficients(found),
+            drive_section(found),
+        )
+
+    return View(
+        f"Design for {found.card}",
+        design_sentence(found),
+        design_parts(found, rotary),
+        lambda: design_document(found),
+        {"design.json": lambda: design_document(found)},
+        sections,
+        lambda: step_chart(found),
+        then_of_design(found),
+        then_by_command=found.recommended == "none",
     )
-    lead, then = design_sentence(found), then_of_design(found)
-    return page(f"Design for {found.card}", lead, sections, then)
 
 
-def validation_report(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool
-) -> str:
-    """HTML: whether the design holds in simulation, and what the loop does."""
-    places = dict.fromkeys(place for _, place in traces)
-    drawn = [one for place in places for one in loop(found, traces, place, rotary)]
-    sections = (*drawn[:1], judged(found, rotary), *drawn[1:])
-    lead, then = validation_sentence(found), then_of_validation(found)
-    return page(f"Validation for {found.card}", lead, sections, then)
+def validation_view(
+    found: Validation, traces: Mapping[tuple[str, str], Traces], rotary: bool = False
+) -> View:
+    """Whether the design holds in simulation, and what the loop does."""
+
+    def sections() -> Sequence[Section]:
+        places = dict.fromkeys(place for _, place in traces)
+        drawn = [one for place in places for one in loop(found, traces, place, rotary)]
+        return (*drawn[:1], judged(found, rotary), *drawn[1:])
+
+    return View(
+        f"Validation for {found.card}",
+        validation_sentence(found),
+        validation_parts(found, rotary),
+        lambda: validation_document(found),
+        {"validation.json": lambda: validation_document(found)},
+        sections,
+        lambda: loop_chart(found, traces, "model", rotary),
+        then_of_validation(found),
+        then_by_command=not found.passed,
+    )

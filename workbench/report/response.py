@@ -1,7 +1,7 @@
 """Frequency responses for a terminal and as Bode plots."""
 
 from collections.abc import Sequence
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -15,18 +15,19 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.output import Row, written
 from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
-from workbench.report.page import Section, page
-from workbench.report.templating import render
-from workbench.screen import Part, Screen, listed, screen, tabled
+from workbench.report.page import Section, lines_section, table
+from workbench.report.view import View
+from workbench.screen import Part, listed, tabled
 from workbench.steps.response import (
     Responded,
     decibels,
     degrees,
     ranges,
     respond,
+    response_csv,
+    response_document,
     sure_share,
 )
 
@@ -55,11 +56,12 @@ def response_sentence(found: Responded) -> str:
     return f"{said}, with {_and(named)}."
 
 
-def peak_rows(found: Responded) -> list[Row]:
+def peak_table(found: Responded) -> Part:
     """Resonances and anti-resonances with their intervals, a row each."""
-    return [
+    rows = [
         (one.kind, *_cells(one.frequency, "Hz"), *_cells(one.damping, "1")) for one in found.peaks
     ]
+    return tabled(PEAK_HEAD, rows, right=(1, 3))
 
 
 def _cells(one: Size, unit: str) -> tuple[str, str]:
@@ -142,34 +144,34 @@ def response_lines(found: Responded) -> list[str]:
     ]
 
 
-def response_view(found: Responded, folder: Path | None) -> Screen:
-    """The responses for a terminal."""
-    parts: list[Part | str] = [response_sentence(found)]
-    if found.peaks:
-        parts.append(tabled(PEAK_HEAD, peak_rows(found), right=(1, 3)))
-    parts.append(listed(response_lines(found)))
-    parts.append(notes(found.remarks, tuple(one["file"] for one in found.logs)))
-    if folder is not None:
-        parts.append(written(folder, "response.json", "response.csv", "report.html"))
-    return screen(*parts)
+def response_view(found: Responded) -> View:
+    """The responses with their resonances and margins."""
+    logs, lines = tuple(one["file"] for one in found.logs), response_lines(found)
+    return View(
+        f"Frequency response of {found.card}",
+        response_sentence(found),
+        [peak_table(found), listed(lines), notes(found.remarks, logs)],
+        lambda: response_document(found),
+        {
+            "response.json": lambda: response_document(found),
+            "response.csv": lambda: response_csv(found),
+        },
+        lambda: _sections(found, logs),
+        lambda: plant_chart(found),
+    )
 
 
-def response_report(found: Responded) -> str:
-    """The responses as a page."""
-    sections = [Section("Plant", plant_html(found))]
+def _sections(found: Responded, logs: Sequence[str]) -> list[Section]:
+    sections = [
+        Section("Plant", plant_html(found)),
+        Section("Resonances and margins", table(peak_table(found), response_lines(found))),
+    ]
     if found.open_loop is not None:
         sections.append(Section("Open loop", loop_html(found)))
     if found.found.controller is not None:
         sections.append(Section("Controller", controller_html(found)))
-    table = render(
-        "table", head=PEAK_HEAD, rows=peak_rows(found), lines=response_lines(found)
-    ) if found.peaks else render("lines", lines=response_lines(found))  # fmt: skip
-    sections.insert(1, Section("Resonances and margins", table))
-    told = report_notes(found.remarks, tuple(one["file"] for one in found.logs))
-    if told:
-        sections.append(Section("Notes", render("lines", lines=told)))
-    title = f"Frequency response of {found.card}"
-    return page(title, response_sentence(found), sections)
+    told = report_notes(found.remarks, logs)
+    return [*sections, lines_section("Notes", told)] if told else sections
 
 
 def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
@@ -183,17 +185,14 @@ def over_frequency(model: Model, runs: Sequence[Source]) -> list[Section]:
     except UserError:
         return []
     lines = [response_sentence(found), friction_line(found)]
-    said = render("lines", lines=lines)
-    if found.peaks:
-        said = render("table", head=PEAK_HEAD, rows=peak_rows(found), lines=lines)
-    return [Section("Over frequency", plant_html(found) + said)]
+    return [Section("Over frequency", plant_html(found) + table(peak_table(found), lines))]
 
 
-def plant_html(found: Responded) -> str:
+def plant_html(found: Responded) -> Any:
     """The plant's Bode plot with its caption."""
     without = "" if found.left_in else " Grey: the same with friction left in the force."
     model = "" if found.curves is None else " Dashed: the model's mass, friction and springs."
-    return str(chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}"))
+    return chart_html(plant_chart(found), f"{COHERENCE_SAID}{model}{without}")
 
 
 def plant_chart(found: Responded) -> Chart:

@@ -1,43 +1,37 @@
 """A robust design as a table for a terminal and as a page: shares of machines, and their curves."""
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
-from workbench.output import Row, written
+from workbench.documents.design_file import design_document
+from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
 from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
-from workbench.report.figures import (
-    GREY,
-    MEASURED,
-    MODEL,
-    REFERENCE,
-    figure,
-    inline,
-    label,
-    line,
-    style,
-)
 from workbench.report.notes import notes
-from workbench.report.page import Section, page
-from workbench.report.templating import render
-from workbench.screen import Screen, listed, screen, tabled
+from workbench.report.page import Section, lines_section, table, table_section
+from workbench.report.view import View
+from workbench.screen import Part, listed, tabled
 from workbench.steps.loop_figures import PRESENT
+from workbench.steps.robust.document import robust_document
 from workbench.steps.robust.outcomes import MEASURES, Measure
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
 ROBUST_HEAD = ("over the machines drawn", "limit", "kept", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that keeps the limit", "robust", "nominal", "present")
-CURVE_LOOKS = {ROBUST: (MODEL, "-"), NOMINAL: (GREY, ":"), PRESENT: (MEASURED, "-.")}
+CURVE_LOOKS: dict[str, tuple[Colour, Look]] = {
+    ROBUST: ("model", "line"),
+    NOMINAL: ("before", "dotted"),
+    PRESENT: ("measured", "dashed"),
+}
+ROBUST_CAPTION = (
+    "Share of the machines drawn (upwards) on which a measure is at most the value (to the right):"
+    " the robust loop, the nominal design's, the present one. Broken: the limit."
+)
+UPWARDS = 1e-7  # of the largest value, from machine to machine
 AXIS_WIDEST = 12.0  # times the middle of all curves, to which an axis goes
 
 
@@ -64,9 +58,9 @@ def robust_sentence(found: Robust) -> str:
     )
 
 
-def promise_rows(found: Robust, rotary: bool) -> list[Row]:
-    """A row a measure of the robust loop, by `ROBUST_HEAD`."""
-    return [
+def promise_table(found: Robust, rotary: bool) -> Part:
+    """A row a measure of the robust loop."""
+    rows = [
         (
             one.words,
             "" if spread.limit is None else _limit(one, spread.limit, rotary),
@@ -75,14 +69,16 @@ def promise_rows(found: Robust, rotary: bool) -> list[Row]:
         )
         for one, spread in _of(found.promises[ROBUST])
     ]
+    return tabled(ROBUST_HEAD, rows, right=(2, 3, 4, 5))
 
 
-def beside_rows(found: Robust, rotary: bool) -> list[Row]:
-    """The medians of every loop, and the shares, by `BESIDE_HEAD`."""
-    return [
+def beside_table(found: Robust, rotary: bool) -> Part:
+    """The medians of every loop, and the shares."""
+    rows = [
         (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_LOOKS))
         for one, _ in _of(found.promises[ROBUST])
     ]
+    return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
 
 
 def _beside(one: Measure, promise: Promise | None, rotary: bool) -> str:
@@ -142,41 +138,45 @@ def choice_lines(found: Robust, rotary: bool) -> list[str]:
     ]
 
 
-def robust_view(found: Robust, folder: Path | None, rotary: bool) -> Screen:
-    """The robust design for a terminal."""
-    names = ("design.json", "robust.json", "report.html")
-    return screen(
+def robust_view(found: Robust, rotary: bool) -> View:
+    """The shares of the machines, the curves over them, the controllers and their equations."""
+    return View(
+        f"Robust design for {found.design.card}",
         robust_sentence(found),
-        tabled(ROBUST_HEAD, promise_rows(found, rotary), right=(2, 3, 4, 5)),
-        tabled(BESIDE_HEAD, beside_rows(found, rotary), right=(1, 2, 3)),
-        listed(choice_lines(found, rotary)),
-        notes(robust_remarks(found)),
-        *([] if folder is None else [written(folder, *names)]),
+        [
+            promise_table(found, rotary),
+            beside_table(found, rotary),
+            listed(choice_lines(found, rotary)),
+            notes(robust_remarks(found)),
+        ],
+        lambda: robust_document(found),
+        {
+            "design.json": lambda: design_document(found.design),
+            "robust.json": lambda: robust_document(found),
+        },
+        lambda: _sections(found, rotary),
+        lambda: robust_chart(found, rotary),
+        _then(found),
+        then_by_command=True,
     )
 
 
-def robust_report(found: Robust, rotary: bool) -> str:
-    """HTML: the curves over the machines, the shares, the controllers and their equations."""
-    with style():
-        svg = inline(robust_figure(found, rotary), "robust", "shares of machines by measure")
-    caption = (
-        "Share of the machines drawn (upwards) on which a measure is at most the value (to the"
-        " right): the robust loop, the nominal design's, the present one. Broken: the limit."
-    )
-    design = found.design
-    sections = [
-        Section("Over the machines that there may be", render("figure", svg=svg, caption=caption)
-                + render("table", head=ROBUST_HEAD, rows=promise_rows(found, rotary),
-                         lines=robust_lines(found, rotary))),
-        Section("Beside the nominal design and the present controller",
-                render("table", head=BESIDE_HEAD, rows=beside_rows(found, rotary), lines=[])),
+def _sections(found: Robust, rotary: bool) -> list[Section]:
+    design, chart = found.design, robust_chart(found, rotary)
+    lines = robust_lines(found, rotary)
+    promised = table(promise_table(found, rotary), lines)
+    picture = chart_html(chart, ROBUST_CAPTION) if chart.panels else ""
+    return [
+        Section("Over the machines that there may be", picture + promised),
+        table_section(
+            "Beside the nominal design and the present controller",
+            beside_table(found, rotary),
+        ),
         controllers(design, rotary),
         coefficients(design),
         drive_section(design),
-        Section("Notes", render("table", head=(), rows=(), lines=design_lines(design, rotary))),
+        lines_section("Notes", design_lines(design, rotary)),
     ]  # fmt: skip
-    then = _then(found)
-    return page(f"Robust design for {design.card}", robust_sentence(found), sections, then)
 
 
 def _then(found: Robust) -> list[str]:
@@ -187,22 +187,12 @@ def _then(found: Robust) -> list[str]:
             " design.json --to c` writes the code"]  # fmt: skip
 
 
-def robust_figure(found: Robust, rotary: bool) -> "Figure":
+def robust_chart(found: Robust, rotary: bool) -> Chart:
     """The share of machines over each measure's value, for every loop."""
     wanted = [one for one, _ in _of(found.promises[ROBUST]) if _varies(found, one.name)]
-    rows = max(-(-len(wanted) // 3), 1)
-    with style():
-        drawn = figure(9.0, 0.9 + 2.3 * rows)
-        every = np.atleast_1d(drawn.subplots(rows, 3, sharey=True)).ravel()
-        for axes, one in zip(every, wanted, strict=False):
-            _shares(axes, found, one, rotary)
-        for axes in every[len(wanted) :]:
-            axes.remove()
-        for axes in every[::3]:
-            axes.set_ylabel("share of machines [%]")
-        handles, names = every[0].get_legend_handles_labels()
-        drawn.legend(handles, names, loc="outside upper center", ncols=4)
-    return drawn
+    panels = [_shares(found, one, rotary) for one in wanted]
+    what = "shares of machines by measure"
+    return Chart("robust", what, panels, columns=2, shared_x=False)
 
 
 def _varies(found: Robust, name: str) -> bool:
@@ -217,10 +207,10 @@ def _finite(values: Array) -> Array:
     return values[np.isfinite(values)]
 
 
-def _shares(axes: "Axes", found: Robust, one: Measure, rotary: bool) -> None:
+def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
     factor, unit = _axis(one, rotary)
     limit = found.promises[ROBUST].measures[one.name].limit
-    told: list[Array] = []
+    lines = []
     for name, promise in found.promises.items():
         values = promise.found.values.get(one.name)
         if values is None:
@@ -228,26 +218,28 @@ def _shares(axes: "Axes", found: Robust, one: Measure, rotary: bool) -> None:
         at = np.sort(factor * values)
         share = 100.0 * np.arange(1, len(at) + 1) / len(at)
         keep = np.isfinite(at)
-        told.append(at[keep])
-        line(axes, np.repeat(at[keep], 2), np.repeat(share[keep], 2), color=CURVE_LOOKS[name][0],
-             ls=CURVE_LOOKS[name][1], lw=1.2, label=name)  # fmt: skip
-    if limit is not None:
-        axes.axvline(factor * limit, color=REFERENCE, ls="--", lw=1.0, label="limit")
-    _within(axes, told, None if limit is None else factor * limit)
-    axes.set_ylim(-3.0, 103.0)
-    label(axes, f"{one.words.split(',')[0]}{unit}", "")
+        at, share = at[keep], share[keep]
+        # Where many machines have one value the line goes up, which an axis takes as going on.
+        apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
+        lines.append(Line(name, at + apart, share, *CURVE_LOOKS[name]))
+    return Panel(
+        f"{one.words.split(',')[0]}{unit}", "share of machines [%]", lines,
+        marks=[] if limit is None else [Mark(factor * limit, "x")],
+        x_range=_within([line.x for line in lines], None if limit is None else factor * limit),
+        y_range=(-3.0, 103.0),
+    )  # fmt: skip
 
 
-def _within(axes: "Axes", told: Sequence[Array], limit: float | None) -> None:
+def _within(told: Sequence[Array], limit: float | None) -> tuple[float, float] | None:
     """The axis to the curves, but not to the far end of one that runs off."""
     every = np.concatenate([*told, [] if limit is None else [limit]])
     if every.size == 0:
-        return
+        return None
     low, high = float(np.min(every)), float(np.max(every))
     middle = max(float(np.median(np.abs(every))), limit or 0.0)
     high = min(high, AXIS_WIDEST * middle) if middle > 0.0 else high
     room = 0.05 * max(high - low, 1e-9 * max(abs(high), 1.0))
-    axes.set_xlim(low - room, high + room)
+    return low - room, high + room
 
 
 def _axis(one: Measure, rotary: bool) -> tuple[float, str]:

@@ -1,35 +1,33 @@
 """The report of a trace: verdict, residual before and after, what explains it, rivals."""
 
-from workbench.output import Row
+from workbench.documents.model_file import model_document
+from workbench.report.chart import Chart
 from workbench.report.free_curves import free_curves
 from workbench.report.notes import report_notes
-from workbench.report.page import Section, page
+from workbench.report.page import Section, lines_section, table_section
 from workbench.report.response import over_frequency
-from workbench.report.templating import render
-from workbench.report.trace_friction import friction_before_after
+from workbench.report.trace_friction import friction_before_after, friction_chart
 from workbench.report.trace_pictures import (
     Picture,
     against_signal,
     in_equation,
     over_time,
     pictures,
+    signal_chart,
 )
 from workbench.report.trace_tables import (
-    DRIFT_HEAD,
-    EFFECT_HEAD,
-    RIVAL_HEAD,
-    change_head,
-    change_rows,
-    drift_rows,
+    changes_table,
+    differences_table,
     effect_lines,
-    effect_rows,
-    error_rows,
-    errors_head,
+    effects_table,
+    errors_table,
     logs_of_trace,
-    rival_rows,
+    rivals_table,
+    trace_parts,
 )
 from workbench.report.trace_words import then_of, trace_sentence, words
-from workbench.steps.trace import Traced
+from workbench.report.view import View
+from workbench.steps.trace import Traced, trace_document
 
 EVERY_EQUATION = ("mechanical", "actuator")
 HIDDEN = (
@@ -38,41 +36,57 @@ HIDDEN = (
 )
 
 
-def trace_report(traced: Traced) -> str:
-    """HTML: what is missing, how it shows, and the errors before and after."""
+def traced_view(traced: Traced) -> View:
+    """What is missing, how it shows, and the errors before and after."""
+    return View(
+        f"Trace of {traced.model.card}",
+        trace_sentence(traced),
+        trace_parts(traced),
+        lambda: trace_document(traced),
+        {
+            "trace.json": lambda: trace_document(traced),
+            "model.json": lambda: model_document(traced.model),
+        },
+        lambda: _sections(traced),
+        lambda: _telling_chart(traced),
+        then_of(traced),
+    )
+
+
+def _telling_chart(traced: Traced) -> Chart:
+    """The residual against the signal that explains it, else the friction before and after."""
+    drawn, rig = pictures(traced.trace), traced.model.rig
+    if drawn:
+        return signal_chart(drawn[0], traced.model.rotary, rig.command_unit)
+    return friction_chart(traced)
+
+
+def _sections(traced: Traced) -> list[Section]:
     found, model = traced.trace, traced.model
     drawn = pictures(found)
     logs = [source.file for source in traced.train]
     sections = [*_drawn(traced, drawn), *_hidden(traced, drawn)]
     if found.run is not None:
         sections.append(over_time(found.run, model.rotary, logs))
-    sections.append(
-        _table(
-            "Before and after",
-            errors_head(bool(traced.test)),
-            error_rows(found, model.rotary),
-        )
-    )
+    errors = errors_table(found, model.rotary, bool(traced.test))
+    sections.append(table_section("Before and after", errors))
     if found.effects:
         title = "The effect" if len(found.effects) == 1 else "The effects"
-        rows = effect_rows(found, model.rig)
-        sections.append(_table(title, EFFECT_HEAD, rows, effect_lines(found)))
+        effects = effects_table(found, model.rig)
+        sections.append(table_section(title, effects, effect_lines(found)))
     if found.curves:
         sections.append(free_curves(found.curves, model.rotary, model.rig.command_unit))
     sections.append(friction_before_after(traced))
     plain = "Parameters before and after" if found.effects else "Parameters"
-    for title, head, rows in (
-        ("Rivals, by the force that they leave", RIVAL_HEAD, rival_rows(found, model.rotary)),
-        (plain, change_head(found), change_rows(found)),
-        ("Drift between training and test logs", DRIFT_HEAD, drift_rows(found)),
-    ):
-        if rows:
-            sections.append(_table(title, head, rows))
+    tables = {
+        "Rivals, by the force that they leave": rivals_table(found, model.rotary),
+        plain: changes_table(found),
+        "Drift between training and test logs": differences_table(found),
+    }
+    sections += [table_section(title, one) for title, one in tables.items() if one.whole]
     sections += over_frequency(model, traced.train)
     notes = report_notes((*traced.remarks, *found.remarks), logs_of_trace(traced))
-    if notes:
-        sections.append(Section("Notes", render("lines", lines=notes)))
-    return page(f"Trace of {model.card}", trace_sentence(traced), sections, then_of(traced))
+    return [*sections, lines_section("Notes", notes)] if notes else sections
 
 
 def _drawn(traced: Traced, drawn: list[Picture]) -> list[Section]:
@@ -91,8 +105,4 @@ def _hidden(traced: Traced, drawn: list[Picture]) -> list[Section]:
         for e in traced.trace.effects
         if in_equation(e.effect) not in (seen if traced.trace.residuals else EVERY_EQUATION)
     ]
-    return [Section("Where it shows", render("lines", lines=lines))] if lines else []
-
-
-def _table(title: str, head: Row, rows: list[Row], lines: list[str] | None = None) -> Section:
-    return Section(title, render("table", head=head, rows=rows, lines=lines or []))
+    return [lines_section("Where it shows", lines)] if lines else []

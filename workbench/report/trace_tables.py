@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 from identification.effects._base import Param
 from identification.log import Rig
@@ -23,11 +22,11 @@ from workbench.cards.readable import (
     small,
     units_of,
 )
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.model_tables import is_left_out, reasons_once
 from workbench.report.notes import notes
-from workbench.report.trace_words import percent, then_of, trace_sentence, words
-from workbench.screen import Part, Screen, more, screen, tabled
+from workbench.report.trace_words import percent, words
+from workbench.screen import Part, more, tabled
 from workbench.steps.trace import Traced, effect_estimates
 
 EFFECT_HEAD = ("effect", "value", "unit", "95 % interval", "meaning")
@@ -38,23 +37,19 @@ DRIFT_HEAD = ("parameter", "training", "test", "unit", "change")
 FLOOR = 1.0 / (DRAWS + 1)  # least chance that draws can show
 
 
-def errors_head(tested: bool) -> Row:
-    """Head of the table of errors; tested: on test logs, not on stretches left out."""
+def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
+    """Errors before and after, on training and held-out logs; not tested: on stretches left out."""
     test = "held out" if tested else "left out"
-    return ("error", "train before", "after", f"{test} before", "after", "sensors' noise")
-
-
-def error_rows(found: Trace, rotary: bool) -> list[Row]:
-    """Errors before and after, on training and held-out logs."""
+    head = ("error", "train before", "after", f"{test} before", "after", "sensors' noise")
     unit, position = shown(rotary).force, units_of(rotary).position
-    rows = (
+    errors = (
         ("force_rms", f"force, equation of motion [{unit}]", 1.0, found.noise_force),
         ("force_relative", "the same, of the applied force [%]", 100.0, None),
         ("position_rms", f"position, free run of 2 s [{position.name}]", position.factor,
          found.noise_y),
         ("actuator_rms", f"actuator equation [{unit}/s]", 1.0, found.noise_actuator),
     )  # fmt: skip
-    return [
+    rows: list[Row] = [
         (
             name,
             *(
@@ -64,24 +59,29 @@ def error_rows(found: Trace, rotary: bool) -> list[Row]:
             ),
             "" if floor is None else small(factor * floor),
         )
-        for key, name, factor, floor in rows
+        for key, name, factor, floor in errors
     ]
+    return tabled(head, _telling(rows), whole=rows)
 
 
 def _cell(value: float | None, factor: float) -> str:
     return "-" if value is None else small(factor * value)
 
 
-def effect_rows(found: Trace, rig: Rig) -> list[Row]:
-    """Every effect's parameters."""
-    out: list[Row] = []
+def effects_table(found: Trace, rig: Rig, logs: Sequence[str] = ()) -> Part:
+    """Every effect's parameters; of one effect alone a screen has room for what they mean."""
+    rows: list[Row] = []
     for e in found.effects:
         estimates = effect_estimates(e, rig)
         for p in shown_params(e):
             value, interval = _value_cells(estimates[p.name])
             unit = "" if p.unit == "1" else as_shown(estimates[p.name]).unit
-            out.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
-    return out
+            rows.append((f"{words(e.effect.key)} {p.name}", value, unit, interval, p.meaning))
+    once = effects_once(rows, found, logs)
+    if len(found.effects) == 1:
+        return tabled(EFFECT_HEAD, once, whole=rows)
+    short = tabled(EFFECT_HEAD[:-1], [row[:-1] for row in once])
+    return replace(short, whole=tuple(rows), whole_head=EFFECT_HEAD)
 
 
 def shown_params(of: FoundEffect) -> list[Param]:
@@ -102,7 +102,7 @@ def _value_cells(estimate: Estimate) -> tuple[str, str]:
 
 
 def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row]:
-    """The rows of `effect_rows` for one screen: a row names the effect, those of its parameters
+    """The rows of `effects_table` for one screen: a row names the effect, those of its parameters
     follow."""
     out: list[Row] = []
     left = iter(rows)
@@ -115,15 +115,6 @@ def effects_once(rows: list[Row], found: Trace, logs: Sequence[str]) -> list[Row
             short = [row if row[1] != "-" else (*row[:3], "", row[4]) for row in short]
         out += [(f"  {row[0]}", *row[1:]) for row in reasons_once(short, logs)]
     return out
-
-
-def _effects(found: Trace, rows: list[Row], logs: Sequence[str]) -> Part:
-    """The table of the effects; of one effect alone there is room for what its parameters mean."""
-    once = effects_once(rows, found, logs)
-    if len(found.effects) == 1:
-        return tabled(EFFECT_HEAD, once, whole=rows)
-    short = tabled(EFFECT_HEAD[:-1], [row[:-1] for row in once])
-    return replace(short, whole=tuple(rows), whole_head=EFFECT_HEAD)
 
 
 def effect_lines(found: Trace) -> list[str]:
@@ -145,14 +136,14 @@ def _worth(e: FoundEffect) -> str:
     )
 
 
-def rival_rows(found: Trace, rotary: bool) -> list[Row]:
+def rivals_table(found: Trace, rotary: bool) -> Part:
     """Rivals in the order of the force error that they leave; last those that leave none."""
     unit = shown(rotary).force
 
     def left(rival: EffectRival) -> float:
         return math.inf if rival.test_force_rms is None else rival.test_force_rms
 
-    return [
+    rows = [
         (
             words(r.key),
             "-" if r.test_force_rms is None else f"{number(r.test_force_rms)} {unit}",
@@ -160,10 +151,11 @@ def rival_rows(found: Trace, rotary: bool) -> list[Row]:
         )
         for r in sorted(found.rivals, key=left)
     ]
+    return tabled(RIVAL_HEAD, rows)
 
 
-def change_rows(found: Trace) -> list[Row]:
-    """The plain parameters; before and after the effects joined, where any did (`change_head`)."""
+def changes_table(found: Trace, logs: Sequence[str] = ()) -> Part:
+    """The plain parameters; before and after the effects joined, where any did."""
     out: list[Row] = []
     for name, after in found.parameters_after.items():
         value, interval = _value_cells(after)
@@ -179,17 +171,13 @@ def change_rows(found: Trace) -> list[Row]:
             (was,) = in_digits((shown_before.value,), shown_before.value, shown_before.sd)
             change = percent(shown_before.value, after.value)
             out.append((name, was, value, after.unit, interval, change))
-    return out
+    told = reasons_once(out, logs, 2 if found.effects else 1)
+    return tabled(CHANGE_HEAD if found.effects else SAME_HEAD, told, whole=out)
 
 
-def change_head(found: Trace) -> Row:
-    """Head of the table of the plain parameters."""
-    return CHANGE_HEAD if found.effects else SAME_HEAD
-
-
-def drift_rows(found: Trace) -> list[Row]:
+def differences_table(found: Trace) -> Part:
     """Parameters that differ between training and test logs."""
-    return [
+    rows = [
         (
             c.name,
             number(factor * c.before, 4),
@@ -200,32 +188,24 @@ def drift_rows(found: Trace) -> list[Row]:
         for c in found.drift
         for unit, factor in (shown_unit(c.unit),)
     ]
+    return tabled(DRIFT_HEAD, rows)
 
 
-def trace_view(traced: Traced, folder: Path | None) -> Screen:
-    """The verdict, errors before and after, effects, parameters and drift, for a terminal.
+def trace_parts(traced: Traced) -> list[Part | str]:
+    """Errors before and after, effects, parameters and drift.
 
     Behind --verbose: the effects' equations and sources, and the rivals.
     """
-    found, rotary = traced.trace, traced.model.rotary
-    plain, logs = change_rows(found), logs_of_trace(traced)
-    parts: list[Part | str] = [trace_sentence(traced)]
-    parts.extend(next_step(line) for line in then_of(traced, folder))
-    errors = error_rows(found, rotary)
-    parts.append(tabled(errors_head(bool(traced.test)), _telling(errors), whole=errors))
-    if found.effects:
-        rows = effect_rows(found, traced.model.rig)
-        parts.append(_effects(found, rows, logs))
-        parts += map(more, effect_lines(found))
-    parts.append(more(tabled(RIVAL_HEAD, rival_rows(found, rotary))))
-    told = reasons_once(plain, logs, 2 if found.effects else 1)
-    parts.append(tabled(change_head(found), told, whole=plain))
-    if found.drift:
-        parts.append(tabled(DRIFT_HEAD, drift_rows(found)))
-    parts.append(notes((*traced.remarks, *found.remarks), logs))
-    if folder is not None:
-        parts.append(written(folder, "trace.json", "model.json", "report.html"))
-    return screen(*parts)
+    found, rotary, logs = traced.trace, traced.model.rotary, logs_of_trace(traced)
+    return [
+        errors_table(found, rotary, bool(traced.test)),
+        effects_table(found, traced.model.rig, logs),
+        *map(more, effect_lines(found)),
+        more(rivals_table(found, rotary)),
+        changes_table(found, logs),
+        differences_table(found),
+        notes((*traced.remarks, *found.remarks), logs),
+    ]
 
 
 def logs_of_trace(traced: Traced) -> tuple[str, ...]:
@@ -237,17 +217,3 @@ def _telling(errors: list[Row]) -> list[Row]:
     """The errors in newtons and millimetres that are known; those that fell, where any did."""
     known = [row for row in errors if set(row[1:5]) != {"-"} and "%" not in row[0]]
     return [row for row in known if row[1] != row[2] or row[3] != row[4]] or known
-
-
-def trace_parts(traced: Traced) -> list[tuple[Sequence[str], list[Row], list[str]]]:
-    """Errors before and after, effects, rivals, parameters and drift: head, rows and lines each;
-    those without rows are left out."""
-    found, rotary = traced.trace, traced.model.rotary
-    parts: list[tuple[Sequence[str], list[Row], list[str]]] = [
-        (errors_head(bool(traced.test)), error_rows(found, rotary), []),
-        (EFFECT_HEAD, effect_rows(found, traced.model.rig), effect_lines(found)),
-        (RIVAL_HEAD, rival_rows(found, rotary), []),
-        (change_head(found), change_rows(found), []),
-        (DRIFT_HEAD, drift_rows(found), []),
-    ]
-    return [part for part in parts if part[1]]

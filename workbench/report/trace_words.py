@@ -2,12 +2,12 @@
 
 import math
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import NamedTuple
 
 from identification.tracing.result import Change, Dependence, Errors, Trace
 from identification.tracing.verdict import listed
 from workbench.cards.readable import force, length, number, shown_unit
+from workbench.report.view import OUT
 from workbench.steps.trace import Traced
 
 LEFT_IN_FORCE = 0.8  # of the force error; an effect that leaves more shows in another error
@@ -230,11 +230,10 @@ def _changed(change: Change) -> str:
     return f"{change.name} from {before} to {after} {unit}{f' ({by})' if by else ''}"
 
 
-def then_of(traced: Traced, folder: Path | None = None) -> list[str]:
-    """What to do next, and the command that does it; `folder` in which the model lies."""
+def then_of(traced: Traced) -> list[str]:
+    """What to do next, and the command that does it."""
     found = traced.trace
-    model = "model.json" if folder is None else str(folder / "model.json")
-    design = f"`workbench design {model}` makes a controller"
+    design = f"`workbench design {OUT}model.json` makes a controller"
     out = []
     if found.not_tried:
         out.append("trace again with a larger `--budget`, to try what was left out")

@@ -1,19 +1,27 @@
 """A validation as tables and lines, for a terminal and a report."""
 
-from pathlib import Path
-
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length
-from workbench.output import Row, next_step, written
+from workbench.output import Row
 from workbench.report.notes import notes
-from workbench.screen import Part, Screen, listed, more, screen, tabled
+from workbench.screen import Part, listed, more, tabled
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, LoopFigures
 from workbench.steps.recommend import in_thousandths, other_figures, own_figures, percent, settled
 from workbench.steps.validate import Validation
 
 
-def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
-    """Names of the columns of `validation_rows`."""
+def validation_table(found: Validation, rotary: bool = False) -> Part:
+    """A row a controller and plant."""
+    alone = len(found.figures[found.judged]) == 1
+    rows = [
+        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
+        for name, places in found.figures.items()
+        for place, one in places.items()
+    ]
+    return tabled(_head(found, rotary), rows, right=())
+
+
+def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
     units, one = shown(rotary), _any(found)
     where = ("on",) if len(found.figures[found.judged]) > 1 else ()
     command = () if one.command_peak is None else (f"command {one.command_unit}",)
@@ -31,21 +39,6 @@ def validation_head(found: Validation, rotary: bool = False) -> tuple[str, ...]:
         *command,
         "limit cycle",
     )
-
-
-def validation_rows(found: Validation, rotary: bool = False) -> list[Row]:
-    """One row a controller and plant, by `validation_head`."""
-    alone = len(found.figures[found.judged]) == 1
-    return [
-        (_shown(name), *(() if alone else (place,)), *_row(one, shown(rotary)))
-        for name, places in found.figures.items()
-        for place, one in places.items()
-    ]
-
-
-def validation_table(found: Validation, rotary: bool = False) -> Part:
-    """The table for a terminal."""
-    return tabled(validation_head(found, rotary), validation_rows(found, rotary), right=())
 
 
 def _any(found: Validation) -> LoopFigures:
@@ -152,21 +145,14 @@ def then_of_validation(found: Validation) -> list[str]:
     return ["`workbench design MODEL --poles W_N,ZETA` with slower poles, and validate again"]
 
 
-def validation_view(found: Validation, folder: Path | None, rotary: bool = False) -> Screen:
-    """The validation for a terminal; what controllers miss that are not judged, with --verbose."""
-    said_by_command = folder is not None and not found.passed  # with the names of its files
+def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
+    """The figures of each loop; what controllers miss that are not judged, with --verbose."""
     others = other_figures(found.why)
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
-    parts: list[Part | str] = [validation_sentence(found)]
-    if not said_by_command:
-        parts.extend(map(next_step, then_of_validation(found)))
-    parts += [
+    return [
         validation_table(found, rotary),
         *([more(others)] if others else []),
         *(more(listed(_missed(found, name))) for name in alone),
         columns_line(found, rotary),
         notes(found.remarks),
     ]
-    if folder is not None:
-        parts.append(written(folder, "validation.json", "report.html"))
-    return screen(*parts)

@@ -1,23 +1,26 @@
 """Results of a rig whose velocity follows the command: one screen each, and a report."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.velocity.rivals import STRUCTURES, is_noise
 from workbench.cards.readable import length, number
+from workbench.documents.velocity import VelocityDesign, VelocityModel, velocity_document
 from workbench.ending import Step, step
-from workbench.output import Row, written
+from workbench.output import Row
 from workbench.report.model_tables import MODEL_HEAD, estimate_cells
 from workbench.report.notes import notes
-from workbench.report.page import Section, page
-from workbench.report.templating import render
-from workbench.screen import Screen, screen, tabled
-
-if TYPE_CHECKING:
-    from workbench.documents.velocity import VelocityDesign, VelocityModel
-    from workbench.steps.velocity import VelocityPrediction, VelocityTraced
-    from workbench.steps.velocity_loop import VelocityValidation
+from workbench.report.page import Section, lines_section, table_section
+from workbench.report.view import View
+from workbench.screen import Part, tabled
+from workbench.steps.velocity import (
+    VelocityPrediction,
+    VelocityTraced,
+    prediction_summary,
+    velocity_trace_document,
+)
+from workbench.steps.velocity_loop import VelocityValidation, velocity_validation_document
 
 VALVE_MEANING = {
     "g_p": "gain, positive direction",
@@ -49,7 +52,7 @@ SLOWER_MODULUS, MOST_MODULUS = 1.3, 0.9  # asked for next; times the one before
 RIVAL_ROWS = ("rival", "held out, 2 s", "0.2 s", "chance", "clearly better")
 
 
-def valve_rows(model: "VelocityModel") -> list[Row]:
+def valve_rows(model: VelocityModel) -> list[Row]:
     """Number, value, unit, 95 % interval (or why there is none) and meaning, a row each."""
     every = {**model.valve, **{k: v for own in model.effects.values() for k, v in own.items()}}
     return [
@@ -57,7 +60,7 @@ def valve_rows(model: "VelocityModel") -> list[Row]:
     ]
 
 
-def _errors(model: "VelocityModel") -> str:
+def _errors(model: VelocityModel) -> str:
     fit, rotary = model.fit, model.rotary
     return (
         f"position predicted by the command alone, on stretches that no fit has seen: within"
@@ -67,7 +70,7 @@ def _errors(model: "VelocityModel") -> str:
     )
 
 
-def _summary(model: "VelocityModel") -> str:
+def _summary(model: VelocityModel) -> str:
     known = [name for name, one in model.valve.items() if one.known]
     lost = [name for name in model.valve if name not in known]
     many = "All six" if not lost else f"{len(known)} of the six"
@@ -75,30 +78,36 @@ def _summary(model: "VelocityModel") -> str:
     return f"{said} Not told: {', '.join(lost)}." if lost else said
 
 
-def _logs(model: "VelocityModel") -> tuple[str, ...]:
+def _logs(model: VelocityModel) -> tuple[str, ...]:
     return tuple(dict.fromkeys(entry.file for entry in model.log))
 
 
-def velocity_model_view(model: "VelocityModel", folder: Path) -> Screen:
+def valve_section(model: VelocityModel) -> Section:
+    """The numbers with their meaning."""
+    return table_section("The valve", tabled((*MODEL_HEAD, "meaning"), valve_rows(model)))
+
+
+def valve_table(model: VelocityModel) -> Part:
+    """The numbers for a terminal."""
+    return tabled(MODEL_HEAD, [row[:4] for row in valve_rows(model)])
+
+
+def velocity_model_view(model: VelocityModel) -> View:
     """The six numbers, what they predict, and remarks."""
-    return screen(
+    return View(
+        f"Identification of {model.card}",
         _summary(model),
-        tabled(MODEL_HEAD, [row[:4] for row in valve_rows(model)]),
-        _errors(model),
-        notes(model.remarks, _logs(model)),
-        written(folder, "model.json", "report.html"),
+        [valve_table(model), _errors(model), notes(model.remarks, _logs(model))],
+        lambda: velocity_document(model),
+        {"model.json": lambda: velocity_document(model)},
+        lambda: [
+            valve_section(model),
+            lines_section("In words", [_errors(model), *model.remarks]),
+        ],
     )
 
 
-def velocity_report(model: "VelocityModel") -> str:
-    """HTML: the numbers, what they predict, remarks."""
-    table = render("table", head=(*MODEL_HEAD, "meaning"), rows=valve_rows(model), lines=())
-    lines = render("lines", lines=[_errors(model), *model.remarks])
-    sections = (Section("The valve", table), Section("In words", lines))
-    return page(f"Identification of {model.card}", _summary(model), sections)
-
-
-def after_velocity(model: "VelocityModel", logs: Sequence[str], card: str, folder: Path) -> Step:
+def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
     """Look for what is missing where more than noise is left; add a run; else design."""
     if any(not model.valve[name].known for name in ("g_p", "g_n", "d_p", "d_n")):
         return step("with a run that tells the rest added", "identify", *logs, "--card", card)
@@ -107,7 +116,7 @@ def after_velocity(model: "VelocityModel", logs: Sequence[str], card: str, folde
     return step("a controller for it", "design", folder / "model.json")
 
 
-def _verdict(found: "VelocityTraced") -> str:
+def _verdict(found: VelocityTraced) -> str:
     left, rotary = found.left, found.model.rotary
     over = f"{length(left.held.rms[0], rotary)} rms of held-out position over 2 s"
     match left.verdict:
@@ -127,7 +136,7 @@ def _verdict(found: "VelocityTraced") -> str:
             return f"unknown: {over}, and no richer structure predicts it clearly better"
 
 
-def velocity_trace_view(found: "VelocityTraced", folder: Path) -> Screen:
+def velocity_trace_view(found: VelocityTraced) -> View:
     """The verdict, the rivals, and the numbers."""
     rotary = found.model.rotary
     rows = [
@@ -135,28 +144,28 @@ def velocity_trace_view(found: "VelocityTraced", folder: Path) -> Screen:
          number(one.p_value, 2), "yes" if one.better else "no")
         for one in found.left.rivals
     ]  # fmt: skip
-    return screen(
+    untried = [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else []
+    view = View(
+        f"Trace of {found.model.card}",
         _verdict(found),
-        tabled(RIVAL_ROWS, rows, (1, 2, 3)),
-        tabled(MODEL_HEAD, [row[:4] for row in valve_rows(found.model)]),
-        notes(
-            [f"not tried: {', '.join(found.left.not_tried)}"] if found.left.not_tried else [],
-        ),
-        notes(found.model.remarks, _logs(found.model)),
-        written(folder, "trace.json", "model.json", "report.html"),
+        [
+            tabled(RIVAL_ROWS, rows, (1, 2, 3)),
+            valve_table(found.model),
+            notes(untried),
+            notes(found.model.remarks, _logs(found.model)),
+        ],
+        lambda: velocity_trace_document(found),
+        {
+            "trace.json": lambda: velocity_trace_document(found),
+            "model.json": lambda: velocity_document(found.model),
+        },
     )
+    words = view.screen().text(verbose=True).splitlines()
+    lines = lines_section("In words", [one for one in words if one.strip()])
+    return replace(view, sections=lambda: [valve_section(found.model), lines])
 
 
-def velocity_trace_report(found: "VelocityTraced") -> str:
-    """HTML: the verdict, the rivals, the numbers."""
-    shown = velocity_trace_view(found, Path()).text(verbose=True)
-    table = render("table", head=(*MODEL_HEAD, "meaning"), rows=valve_rows(found.model), lines=())
-    lines = render("lines", lines=[one for one in shown.splitlines() if one.strip()])
-    sections = (Section("The valve", table), Section("In words", lines))
-    return page(f"Trace of {found.model.card}", _verdict(found), sections)
-
-
-def velocity_csv(runs: "Sequence[VelocityPrediction]") -> str:
+def velocity_csv(runs: Sequence[VelocityPrediction]) -> str:
     """prediction.csv: time [s], measured and simulated position [m (rad)]."""
     lines = ["t,position_measured,position_simulated"]
     for one in runs:
@@ -167,21 +176,26 @@ def velocity_csv(runs: "Sequence[VelocityPrediction]") -> str:
 
 
 def velocity_prediction_view(
-    summary: "Mapping[str, float | int | None]", rotary: bool, folder: Path
-) -> Screen:
-    """How far the simulated position is from the measured one."""
-    window = summary["window"]
+    runs: Sequence[VelocityPrediction], window: float | None, rotary: bool
+) -> View:
+    """How far the simulated position is from the measured one; window [s]: after which it begins
+    anew."""
+    summary = prediction_summary(runs, window)
     anew = f", anew every {window:g} s" if window else " from the first sample on"
     off, worst = (
         length(float(summary[k] or 0.0), rotary) for k in ("position_rms", "position_worst")
     )
-    return screen(
+    return View(
+        "Prediction",
         f"position by the command alone{anew}: within {off} rms, {worst} at most",
-        written(folder, "prediction.csv"),
+        [],
+        lambda: summary,
+        {"prediction.csv": lambda: velocity_csv(runs)},
+        has_page=False,
     )
 
 
-def _margins(margins: "dict[str, float | None]") -> str:
+def _margins(margins: dict[str, float | None]) -> str:
     def said(name: str, unit: str) -> str:
         value = margins.get(name)
         return "none needed" if value is None else f"{number(value)}{unit}"
@@ -192,7 +206,7 @@ def _margins(margins: "dict[str, float | None]") -> str:
     )
 
 
-def design_lines(found: "VelocityDesign") -> list[str]:
+def design_lines(found: VelocityDesign) -> list[str]:
     """The controller in words and numbers."""
     meaning = {**VALVE_MEANING, **LAW_MEANING}
     numbers = [
@@ -207,25 +221,24 @@ def design_lines(found: "VelocityDesign") -> list[str]:
     ]
 
 
-def velocity_design_view(found: "VelocityDesign", folder: Path) -> Screen:
+def velocity_design_view(found: VelocityDesign) -> View:
     """The controller and its margins."""
-    return screen(
-        *design_lines(found), notes(found.remarks), written(folder, "design.json", "report.html")
-    )
-
-
-def velocity_design_report(found: "VelocityDesign") -> str:
-    """HTML: the controller and its margins."""
     first, *rest = design_lines(found)
-    lines = render("lines", lines=[*rest, *found.remarks])
-    return page(f"Design for {found.card}", first, [Section("The controller", lines)])
+    return View(
+        f"Design for {found.card}",
+        first,
+        [*rest, notes(found.remarks)],
+        lambda: velocity_document(found),
+        {"design.json": lambda: velocity_document(found)},
+        lambda: [lines_section("The controller", [*rest, *found.remarks])],
+    )
 
 
 VALIDATED = ("plant", "standstill", "overshoot", "tracking", "modulus", "delay", "misses")
 
 
-def _validation_rows(found: "VelocityValidation") -> list[Row]:
-    rows = []
+def _validation_table(found: VelocityValidation) -> Part:
+    rows: list[Row] = []
     for place, one in found.figures.items():
         m = one.margins or {}
         shown = [
@@ -234,10 +247,10 @@ def _validation_rows(found: "VelocityValidation") -> list[Row]:
         ]
         shares = [f"{100 * value:.2g} %" for value in (one.standstill, one.overshoot, one.tracking)]
         rows.append((place, *shares, *shown, "; ".join(one.misses) or "nothing"))
-    return rows
+    return tabled(VALIDATED, rows, (1, 2, 3, 4, 5))
 
 
-def _passed(found: "VelocityValidation") -> str:
+def _passed(found: VelocityValidation) -> str:
     many = len(found.figures)
     if found.passed:
         return f"Passed: the loop keeps every limit on {many} plants."
@@ -245,22 +258,19 @@ def _passed(found: "VelocityValidation") -> str:
     return f"Not passed: on {failed} of {many} plants a limit is missed."
 
 
-def velocity_validation_view(found: "VelocityValidation", folder: Path) -> Screen:
+def velocity_validation_view(found: VelocityValidation) -> View:
     """Whether the loop keeps its limits, on each plant."""
-    return screen(
+    return View(
+        f"Validation for {found.card}",
         _passed(found),
-        tabled(VALIDATED, _validation_rows(found), (1, 2, 3, 4, 5)),
-        written(folder, "validation.json", "report.html"),
+        [_validation_table(found)],
+        lambda: velocity_validation_document(found),
+        {"validation.json": lambda: velocity_validation_document(found)},
+        lambda: [table_section("The loop", _validation_table(found))],
     )
 
 
-def velocity_validation_report(found: "VelocityValidation") -> str:
-    """HTML: the same."""
-    table = render("table", head=VALIDATED, rows=_validation_rows(found), lines=())
-    return page(f"Validation for {found.card}", _passed(found), [Section("The loop", table)])
-
-
-def after_velocity_validation(found: "VelocityValidation", model_file: Path) -> Step | None:
+def after_velocity_validation(found: VelocityValidation, model_file: Path) -> Step | None:
     """A slower loop where a limit is missed."""
     if found.passed:
         return None

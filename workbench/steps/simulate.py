@@ -89,7 +89,7 @@ def _in_loop(
     assert loop is not None
     force = ForcePI(loop.force.k_i, loop.force.T_i) if loop.force else None
     noise = LoopNoise.draw(len(reference), recipe.noise_y, recipe.noise_F, rng)
-    cascade = Cascade(_position(recipe), force, loop.control_limit)
+    cascade = Cascade(_position(recipe), force, loop.control_limit_v)
     parts = (recipe.plant, cascade, reference, recipe.h)
     beside = compensation(recipe, recipe.h)
     run: LoopRun
@@ -241,9 +241,15 @@ def truth(
         "seed": recipe.seed if seed is None else seed,
         "duration_s": recipe.duration,
         "h_s": recipe.h,
-        "loop": asdict(recipe.loop) if recipe.loop else None,
+        "loop": _loop(recipe.loop) if recipe.loop else None,
         **({"controller": plain(controller)} if controller and recipe.by_card else {}),
     }
+
+
+def _loop(loop: recipes.LoopSpec) -> dict[str, Any]:
+    """The loop of a recipe as the truth has it."""
+    found = loop.model_dump(exclude={"position": {"kind"}})
+    return {"control_limit": found.pop("control_limit_v"), **found}
 
 
 def _exact(value: float, unit: str) -> dict[str, Any]:
@@ -254,12 +260,12 @@ def _position(recipe: Recipe) -> RST:
     """The recipe's position controller as RST at the recipe's period; volts for a motor."""
     assert recipe.loop is not None and recipe.loop.position is not None
     match recipe.loop.position:
-        case recipes.RecipePD(k_d, T_d, eps):
-            found = pd_to_rst(k_d, T_d, eps, recipe.h)
-        case recipes.RecipePID(k_R, T_d, T_i, eps):
-            found = pid_to_rst(k_R, T_i, T_d, eps, recipe.h)
-        case recipes.RecipeRST(R, S, T):
-            found = RST(np.array(R), np.array(S), np.array(T), recipe.h)
+        case recipes.RecipePD() as pd:
+            found = pd_to_rst(pd.k_d, pd.T_d, pd.eps, recipe.h)
+        case recipes.RecipePID() as pid:
+            found = pid_to_rst(pid.k_R, pid.T_i, pid.T_d, pid.eps, recipe.h)
+        case recipes.RecipeRST() as rst:
+            found = RST(np.array(rst.R), np.array(rst.S), np.array(rst.T), recipe.h)
     actuator = recipe.plant.actuator
     if isinstance(actuator, Motor):
         return RST(found.R / actuator.k_a, found.S, found.T / actuator.k_a, recipe.h)

@@ -38,7 +38,7 @@ def recipe_loop(recipe: Recipe, given: CardController, rig: Rig) -> DrivenLoop:
         raise BadCard('an actuator takes no force; add controller.force, or output = "command"')
     if isinstance(drive, Motor) and now.force is not None:
         raise BadCard("a motor has no force loop; leave controller.force out")
-    limits = (rig.control_limit, asked.control_limit if asked else None)
+    limits = (rig.control_limit, asked.control_limit_v if asked else None)
     loop = DrivenLoop(
         law=now.law,
         force=now.force,
@@ -66,7 +66,7 @@ def compensation(recipe: Recipe, h: float) -> Compensation | None:
     asked = recipe.loop.compensator if recipe.loop else None
     if asked is None:
         return None
-    known = asked.friction or recipe.plant.friction
+    known = asked.friction.value if asked.friction else recipe.plant.friction
     return Compensation(Compensator(known, asked.N_c, asked.e_T), filters_at(h))
 
 

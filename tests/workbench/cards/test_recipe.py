@@ -50,8 +50,8 @@ def test_a_recipe_is_read_whole(tmp_path: Path) -> None:
     ]
     assert found.reference == Steps((0.0, 0.1), 0.5)
     assert found.loop is not None
-    assert found.loop.position == RecipePD(200.0, 0.1, 0.2)
-    assert found.loop.force == RecipeForcePI(0.02, 0.05)
+    assert found.loop.position == RecipePD(kind="PD", k_d=200.0, T_d=0.1, eps=0.2)
+    assert found.loop.force == RecipeForcePI(k_i=0.02, T_i=0.05)
     assert (found.seed, found.noise_F, found.noise_y) == (7, 0.01, 0.0)
     assert len(found.t) == 2001
     assert found.t[-1] == pytest.approx(2.0)
@@ -94,8 +94,14 @@ def test_every_reference(tmp_path: Path, text: str, value: object) -> None:
 @pytest.mark.parametrize(
     ("text", "value"),
     [
-        ('{ kind = "PID", k_R = 9, T_d = 0.1, T_i = 1, eps = 0.2 }', RecipePID(9.0, 0.1, 1.0, 0.2)),
-        ('{ kind = "RST", R = [1, 2], S = [1], T = [3] }', RecipeRST((1.0, 2.0), (1.0,), (3.0,))),
+        (
+            '{ kind = "PID", k_R = 9, T_d = 0.1, T_i = 1, eps = 0.2 }',
+            RecipePID(kind="PID", k_R=9.0, T_d=0.1, T_i=1.0, eps=0.2),
+        ),
+        (
+            '{ kind = "RST", R = [1, 2], S = [1], T = [3] }',
+            RecipeRST(kind="RST", R=(1.0, 2.0), S=(1.0,), T=(3.0,)),
+        ),
     ],
 )
 def test_every_position_controller(tmp_path: Path, text: str, value: object) -> None:

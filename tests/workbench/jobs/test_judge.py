@@ -20,7 +20,7 @@ from workbench.documents.model_file import read_model
 from workbench.jobs import judge
 from workbench.jobs.challenge import Terms
 from workbench.jobs.drift_by_chart import drift_by_chart
-from workbench.jobs.drift_verdict import Drift, drift_by_refit
+from workbench.jobs.drift_verdict import Drift
 from workbench.jobs.judge import Chain, divided
 from workbench.jobs.passes import Task
 from workbench.logs.sources import Sources, read_sources
@@ -117,22 +117,6 @@ def test_the_first_model_is_one_that_passes(first: Judgement) -> None:
     assert first.candidate.model["friction"]["F_cp"]["value"] == pytest.approx(12.0, rel=1e-2)
     assert first.candidate.design is not None and first.candidate.validation is not None
     assert first.candidate.validation["passed"] is True
-
-
-@pytest.mark.slow
-def test_the_refit_tells_a_changed_machine_from_the_same(
-    shop: Path, first: Judgement, tmp_path: Path
-) -> None:
-    model, rng = model_of(first, tmp_path), np.random.default_rng(1)
-    for name, verdict, names in (
-        ("same", "none", set()),
-        ("drifted", "drift", {"F_cp", "F_vp", "F_sp"}),
-    ):
-        sources = read_sources([str(shop / f"{name}.csv")], str(shop / "card.toml"))
-        found = drift_by_refit(model, sources, rng, {})
-        assert (found.verdict, {one.name for one in found.moved}) == (verdict, names)
-    (moved,) = (one for one in found.moved if one.name == "F_cp")
-    assert (moved.before, moved.after) == pytest.approx((12.0, 16.0), rel=1e-2)
 
 
 @pytest.mark.slow

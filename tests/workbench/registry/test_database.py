@@ -42,7 +42,8 @@ def test_the_last_step_is_the_one_that_is_expected() -> None:
 
 
 @pytest.mark.slow
-def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> None:
+@pytest.mark.parametrize("layout", ["0001", "0002"])
+def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str, layout: str) -> None:
     log = SeenLog("f" * 64, "a.csv", 1, 1)
     moved = {"name": "F_cp", "before": 10.0, "after": 12.0}
     found = Judgement("structure", "r", evidence={"drift": {"moved": [moved]}})
@@ -57,7 +58,9 @@ def test_a_registry_from_before_the_outbox_is_brought_up_to_date(where: str) -> 
         with registry.database.writing() as session:
             for table in ("outbox", *PAGE_TABLES):
                 session.execute(text(f"DROP TABLE {table}"))
-            session.execute(text("UPDATE alembic_version SET version_num = '0002'"))
+            if layout == "0001":
+                session.execute(text("ALTER TABLE claim DROP COLUMN lease_ms"))
+            session.execute(text(f"UPDATE alembic_version SET version_num = '{layout}'"))
     with Registry(where) as registry:
         test_steps_and_tables_agree(registry)
         assert [v.number for v in registry.versions("a")] == [1]

@@ -13,11 +13,10 @@ from workbench.cards.parameter_units import friction_units
 from workbench.report.figures import LINE_POINTS, evenly_spread, thinned
 from workbench.report.in_a_row import liveliest
 from workbench.report.page import Section, page
-from workbench.report.reports import design_report, identification_report, validation_report
+from workbench.report.reports import design_view, identified_view, validation_view
 from workbench.report.validation_tables import (
-    validation_head,
     validation_lines,
-    validation_rows,
+    validation_table,
 )
 from workbench.steps.identify_sources import Identified
 from workbench.steps.validate import validate
@@ -62,7 +61,7 @@ def checked(html: str, figures: int) -> str:
 
 
 def test_identification_report() -> None:
-    html = checked(identification_report(identified()), 4)
+    html = checked(identified_view(identified()).page(), 4)
     for text in ("position [mm]", "applied force [N]", "velocity [mm/s]", "friction force [N]",
                  "time [s]", "moving mass", "95 % interval", "short.csv", "a remark",
                  "Over frequency", "from force to position [m/N]"):  # fmt: skip
@@ -71,7 +70,7 @@ def test_identification_report() -> None:
 
 def test_a_rotary_report_shows_rotary_units() -> None:
     found = turned(identified())
-    html = checked(identification_report(found), 4)
+    html = checked(identified_view(found).page(), 4)
     for text in ("position [rad]", "applied force [N m]", "velocity [rad/s]", "N m s/rad",
                  "kg m^2", "moment of inertia", "breakaway torque", "N m/(V s)"):  # fmt: skip
         assert text in html
@@ -97,7 +96,7 @@ def turned(found: Identified) -> Identified:
 def test_a_rotary_design_and_validation_show_rotary_units() -> None:
     model = turned(identified()).model
     found = designed(model)
-    html = checked(design_report(found, model.rotary), 2)
+    html = checked(design_view(found, model.rotary).page(), 2)
     assert "[dB, N m/rad]" in html and " V/(N m)," in html
     assert "N/m" not in html and "V/N," not in html
     result, _ = validate(model, found, np.random.default_rng(0))
@@ -106,7 +105,7 @@ def test_a_rotary_design_and_validation_show_rotary_units() -> None:
 
 
 def test_design_report() -> None:
-    html = checked(design_report(designed(identified().model)), 2)
+    html = checked(design_view(designed(identified().model)).page(), 2)
     for text in (
         "frequency [rad/s]",
         "|S_yp| [dB]",
@@ -121,9 +120,9 @@ def test_design_report() -> None:
 def test_validation_report_shows_both_plants() -> None:
     model, other = (model_of(TABLES[f"paper_table{k}"], Actuator(19530, 10405)) for k in (1, 2))
     result, traces = validate(model, designed(model), np.random.default_rng(0), plant=other)
-    html = checked(validation_report(result, traces, rotary=False), 4)
+    html = checked(validation_view(result, traces, rotary=False).page(), 4)
     assert "Steps on the identified plant" in html and "Steps on the other plant" in html
-    rotary = validation_report(result, traces, rotary=True)
+    rotary = validation_view(result, traces, rotary=True).page()
     assert "position [rad]" in rotary and "force N m" in rotary
 
 
@@ -167,6 +166,6 @@ def test_the_liveliest_part_is_where_it_moves() -> None:
 def test_a_rotary_validation_has_rotary_columns() -> None:
     model = turned(identified()).model
     result, _ = validate(model, designed(model), np.random.default_rng(0))
-    head = validation_head(result, rotary=True)
-    assert "force N m" in head and "force N" in validation_head(result)
-    assert all(len(row) == len(head) for row in validation_rows(result, rotary=True))
+    found = validation_table(result, rotary=True)
+    assert "force N m" in found.head and "force N" in validation_table(result).head
+    assert all(len(row) == len(found.head) for row in found.whole)

@@ -15,7 +15,7 @@ from tests.screens import one_screen
 from workbench.cards.card_tables import CardFile
 from workbench.cards.limits import LimitsSection
 from workbench.logs.sources import Source, Sources
-from workbench.report.axis_test import axis_charts, axis_report, axis_sentence, axis_view
+from workbench.report.axis_test import axis_charts, axis_sentence, axis_view
 from workbench.steps.axis_limits import Allowed, own_limits
 from workbench.steps.axis_test import (
     AxisTest,
@@ -149,14 +149,14 @@ def test_its_document_page_and_screen(tmp_path: Path) -> None:
     assert document["quantities"]["m"]["limits"]["logs"] == 30
     assert document["quantities"]["backlash"]["value"] is None
     assert document["version"] == 3
-    html = axis_report(test)
+    html = axis_view(test).page()
     assert '<div class="lamp red"' in html and "@page { size: A4" in html and ">signature<" in html
     along, past = axis_charts(test)
     assert len(along.panels) == 1 and len(past.panels) == 2
     assert list(past.panels[0].lines[0].x) == [float(k) for k in range(-30, 1)]
     assert past.panels[0].bands[0].low == 8.0
     assert len(axis_charts(axis_test(sources()))) == 1
-    text = one_screen(axis_view(test, tmp_path))
+    text = one_screen(axis_view(test).screen(tmp_path))
     assert text.startswith("RED: ") and "written: " in text
 
 

@@ -322,7 +322,8 @@ def test_a_recording_is_its_seed_s_and_the_truth_is_beside_it() -> None:
 def test_a_loop_that_runs_away_is_no_log() -> None:
     _, recipe = short_recipe(1.0)
     assert recipe.loop is not None
-    wild = replace(recipe.loop, position=RecipePID(1e9, 0.018, 0.072, 0.2), control_limit=None)
+    far = RecipePID(kind="PID", k_R=1e9, T_d=0.018, T_i=0.072, eps=0.2)
+    wild = recipe.loop.model_copy(update={"position": far, "control_limit_v": None})
     with pytest.raises(BadCard, match=r"runs away after 0\.0\d+ s"):
         record("wild", replace(recipe, loop=wild))
 

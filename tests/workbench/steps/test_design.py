@@ -10,7 +10,7 @@ from identification.model.plant import Actuator, Motor
 from tests.chain import EMPS, TABLES, designed, model_of
 from workbench.documents.design import Design
 from workbench.documents.model import Model
-from workbench.report.design_tables import design_view
+from workbench.report.reports import design_view
 from workbench.steps.closed_loop import run_loop
 from workbench.steps.design import reference_demand
 from workbench.steps.validate import validate
@@ -175,6 +175,6 @@ def test_a_design_has_crossover_and_bandwidth_of_each_loop() -> None:
         assert m.crossover_hz is not None and m.bandwidth_hz is not None
         assert 0.3 < m.bandwidth_hz / m.crossover_hz < 3.0
         assert m.gain_up is not None and m.gain_db == pytest.approx(20 * np.log10(m.gain_up))
-    (head, *rows) = (line.split() for line in design_view(found, None).text().splitlines()
+    (head, *rows) = (line.split() for line in design_view(found).screen().text().splitlines()
                      if "drive's" in line or ("Hz" in line and "deg" in line))  # fmt: skip
     assert head[:3] == ["in", "a", "drive's"] and len(rows) == len(found.controllers)

@@ -66,7 +66,7 @@ def test_no_drift_is_status_0_and_a_report(shop: Path, tmp_path: Path) -> None:
     assert set(after) == {"value", "unit", "sd", "low", "high"}
     assert list(broken_in(found)) == []
     report = (tmp_path / "d/report.html").read_text(encoding="utf-8")
-    assert "<svg" in report and "No drift" in report
+    assert '<figure class="chart"' in report and "No drift" in report
 
 
 def test_what_could_not_have_been_seen_is_status_0_and_loud(

@@ -1,7 +1,7 @@
 """Effects from a recipe to its log and truth, and from a model to its prediction."""
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +17,7 @@ from tests.chain import EMPS, designed, model_of, short_recipe
 from workbench.cards.card import load_card
 from workbench.cards.effect_values import exact
 from workbench.cards.recipe import (
+    FrictionSection,
     LoopSpec,
     Recipe,
     RecipeCompensator,
@@ -116,7 +117,7 @@ def test_a_motor_s_force_is_that_of_the_command_that_reaches_it(key: str) -> Non
     recipe = with_effects(acting(key))
     motor = replace(recipe.plant, actuator=Motor(300.0))
     assert recipe.loop is not None
-    loop = LoopSpec(recipe.loop.position)
+    loop = LoopSpec(position=recipe.loop.position)
     recipe = replace(recipe, plant=motor, loop=loop, noise_F=0.0)
     log = record(key, recipe)
     as_read = log.with_signals(F=300.0 * log["u"])
@@ -255,7 +256,8 @@ def test_effects_whose_signals_no_simulation_makes_are_left_out_with_a_word() ->
 
 
 def test_a_recipe_s_compensator_takes_the_error_at_rest_away() -> None:
-    loop = LoopSpec(RecipePD(200.0, 0.1, 0.2), RecipeForcePI(0.02, 0.05))
+    pd = RecipePD(kind="PD", k_d=200.0, T_d=0.1, eps=0.2)
+    loop = LoopSpec(position=pd, force=RecipeForcePI(k_i=0.02, T_i=0.05))
     recipe = replace(RECIPE, loop=loop, reference=Steps((0.0, 0.05), 2.0), duration=8.0)
 
     def left(one: Recipe) -> float:
@@ -263,8 +265,11 @@ def test_a_recipe_s_compensator_takes_the_error_at_rest_away() -> None:
         still = slice(round(3.5 / one.h), round(4.0 / one.h))
         return float(np.max(np.abs(log["r"] - log["y"])[still]))
 
-    own = replace(recipe, loop=replace(loop, compensator=RecipeCompensator(2.0, 0.003)))
+    own = replace(
+        recipe, loop=loop.model_copy(update={"compensator": RecipeCompensator(e_T=0.003)})
+    )
     assert left(own) < 0.1 * left(recipe)
     wrong = replace(recipe.plant.friction, F_sp=0.3, F_sn=-0.3, F_cp=0.2, F_cn=0.2)
-    blind = replace(loop, compensator=RecipeCompensator(2.0, 0.003, wrong))
+    beside = RecipeCompensator(e_T=0.003, friction=FrictionSection(**asdict(wrong)))
+    blind = loop.model_copy(update={"compensator": beside})
     assert left(replace(recipe, loop=blind)) > 0.5 * left(recipe)

@@ -20,7 +20,7 @@ from tests.chain import TABLES, model_of
 from workbench.cards.controller import CardController
 from workbench.documents.drive import DriveUnits, present_file
 from workbench.documents.model import Model
-from workbench.report.experiment import experiment_report, reference_text
+from workbench.report.experiment import experiment_view, reference_text
 from workbench.steps.drawn import drawn_plants, in_loop
 from workbench.steps.experiment.machines import bench_of
 from workbench.steps.experiment.plan import experiment
@@ -103,7 +103,9 @@ def test_what_it_writes(planned: Experiment) -> None:
     read: Array = np.array([[float(x) for x in row.split(",")] for row in rows])
     assert read[:, 1] == pytest.approx(planned.r, abs=1e-9)
     assert np.diff(read[:, 0]) == pytest.approx(2e-3)
-    assert "What it promises" in experiment_report(planned)
+    page = experiment_view(planned).page()
+    assert "What it promises" in page and "&lt;t" not in page
+    assert page.count('<figure class="chart"') == 2
 
 
 def test_the_parameters_asked_for_are_known() -> None:

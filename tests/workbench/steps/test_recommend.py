@@ -13,7 +13,7 @@ from workbench.cards.controller import CardController
 from workbench.documents.design import Design, Recommendation
 from workbench.documents.drive import DriveUnits, present_file
 from workbench.documents.model import Model
-from workbench.report.validation_tables import validation_head, validation_rows
+from workbench.report.validation_tables import validation_table
 from workbench.steps import recommend
 from workbench.steps.design import with_choice
 from workbench.steps.limit_cycle import LimitCycle
@@ -113,7 +113,8 @@ def test_the_present_controller_is_the_first_row_on_every_plant() -> None:
     result, traces = validate(model, found, np.random.default_rng(0), plant=model)
     assert next(iter(result.figures)) == PRESENT
     assert set(result.figures[PRESENT]) == {"model", "plant"} and (PRESENT, "plant") in traces
-    row = dict(zip(validation_head(result), validation_rows(result)[0], strict=True))
+    table = validation_table(result)
+    row = dict(zip(table.head, table.whole[0], strict=True))
     assert row["loop"] == "present" and row["ok"] == "no"
     # A PD against Coulomb friction stays off by up to F_c/(k_a k_d).
     off = result.figures[PRESENT]["model"].standstill

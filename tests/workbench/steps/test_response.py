@@ -29,7 +29,6 @@ from workbench.report.response import (
     loop_line,
     over_frequency,
     plant_chart,
-    response_report,
     response_sentence,
     response_view,
 )
@@ -269,9 +268,9 @@ def test_several_logs_narrow_the_band() -> None:
 def test_words_and_pictures() -> None:
     found = responded(TWO)
     assert "an anti-resonance at 4" in response_sentence(found)
-    text = response_view(found, None).text()
+    text = response_view(found).screen().text()
     assert "Hz" in text.splitlines()[0] and "friction: taken off the force" in text
-    html = response_report(found)
+    html = response_view(found).page()
     assert html.count('<figure class="chart"') == 3
     for title in ("Plant", "Resonances and margins", "Open loop", "Controller"):
         assert f">{title}<" in html

@@ -26,7 +26,7 @@ from tests.workbench.report.test_report import checked
 from tests.workbench.trace_values import residual, sources, trace_of, traced
 from workbench.documents.model_file import model_document, read_model
 from workbench.output import dumps
-from workbench.report.trace import trace_report
+from workbench.report.trace import traced_view
 from workbench.report.trace_friction import sliding_friction
 from workbench.report.trace_pictures import (
     along_rows,
@@ -37,13 +37,11 @@ from workbench.report.trace_pictures import (
     share_inside,
 )
 from workbench.report.trace_tables import (
-    change_head,
-    change_rows,
-    drift_rows,
-    effect_rows,
-    error_rows,
-    rival_rows,
-    trace_view,
+    changes_table,
+    differences_table,
+    effects_table,
+    errors_table,
+    rivals_table,
 )
 from workbench.report.trace_words import percent, trace_sentence
 from workbench.steps import trace as tracing
@@ -112,7 +110,7 @@ def test_a_rotary_machine_has_rotary_units() -> None:
     document = trace_document(found)
     assert document["effects"][0]["params"]["v_s"]["unit"] == "rad/s"
     assert found.model.effects["spring"]["k"].unit == "N m/rad"
-    assert [row[2] for row in effect_rows(found.trace, Rig("force", motion="rotary"))] == [
+    assert [row[2] for row in effects_table(found.trace, Rig("force", motion="rotary")).whole] == [
         "N m",
         "rad/s",
         "",
@@ -120,8 +118,8 @@ def test_a_rotary_machine_has_rotary_units() -> None:
         "N m/rad",
         "N m/rad**3",
     ]
-    assert "[rad]" in str(error_rows(found.trace, True)) and "N m" in trace_sentence(found)
-    html = checked(trace_report(found), 5)
+    assert "[rad]" in str(errors_table(found.trace, True).whole) and "N m" in trace_sentence(found)
+    html = checked(traced_view(found).page(), 5)
     assert "velocity [rad/s]" in html and "residual [N m]" in html and "[mm/s]" not in html
 
 
@@ -239,18 +237,18 @@ def test_the_error_in_which_an_effect_shows_is_told() -> None:
 
 def test_rows_of_the_tables() -> None:
     found = trace_of("drift")
-    assert error_rows(found, False)[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
-    assert [row[0] for row in rival_rows(found, False)] == [
+    assert errors_table(found, False).whole[0][1:] == ("1.83", "0.07", "1.83", "0.07", "0.069")
+    assert [row[0] for row in rivals_table(found, False).whole] == [
         "spring",
         "nonlinear viscous",
         "cogging",
     ]
-    changed = {row[0]: row[-1] for row in change_rows(found)}
+    changed = {row[0]: row[-1] for row in changes_table(found).whole}
     assert changed["F_cp"] == "-8.3 %" and changed["m"] == "0 %"
-    assert len(change_head(found)) == len(change_rows(found)[0])
+    assert len(changes_table(found).head) == len(changes_table(found).whole[0])
     plain = trace_of("none", ())
-    assert len(change_head(plain)) == len(change_rows(plain)[0]) == 4
-    assert drift_rows(found) == [("F_cp", "12", "14.4 ± 0.2", "N", "+20 %")]
+    assert len(changes_table(plain).head) == len(changes_table(plain).whole[0]) == 4
+    assert differences_table(found).whole == (("F_cp", "12", "14.4 ± 0.2", "N", "+20 %"),)
 
 
 def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
@@ -261,7 +259,8 @@ def test_parameters_that_are_held_or_at_a_bound_say_so() -> None:
         **effect.params,
         "v_s": of_effect(v_s, v_s.high, 1.0),
     }
-    rows = effect_rows(replace(found, effects=(replace(effect, params=params),)), Rig("force"))
+    sized = replace(found, effects=(replace(effect, params=params),))
+    rows = effects_table(sized, Rig("force")).whole
     assert [row[1] for row in rows[1:3]] == ["-", "0"]
     assert rows[1][3].startswith("at its bound 100: ")
     assert rows[2][3] == HELD
@@ -277,7 +276,7 @@ def test_changes_in_percent(before: float, after: float, said: str) -> None:
 
 
 def test_the_view_for_a_terminal() -> None:
-    view = trace_view(traced(trace_of("unknown")), Path("out"))
+    view = traced_view(traced(trace_of("unknown"))).screen(Path("out"))
     first, whole = (" ".join(view.text(verbose=one).split()) for one in (False, True))
     for part in ("Found in part: stribeck", "What is left depends on y", "held out before",
                  "stribeck", "F_s 3.50 N", "next: record more, the same stroke at several",
@@ -294,7 +293,7 @@ def test_the_view_for_a_terminal() -> None:
 )  # fmt: skip
 def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) -> None:
     found = traced(trace_of(verdict, keys))
-    html = checked(trace_report(found), figures)
+    html = checked(traced_view(found).page(), figures)
     assert re.sub("[<>'&]", "", trace_sentence(found))[:20] in html
     wanted = ["residual [N]", "95 % of its points in the band", "moving towards +", "Parameters"]
     if keys:
@@ -310,7 +309,7 @@ def test_the_report(verdict: TraceVerdict, keys: tuple[str, ...], figures: int) 
 
 
 def test_an_effect_without_a_picture_is_named() -> None:
-    html = checked(trace_report(traced(trace_of("effect", ("rising_stiction",)))), 2)
+    html = checked(traced_view(traced(trace_of("effect", ("rising_stiction",)))).page(), 2)
     assert "rising stiction shows in neither equation" in html
     assert pictures(replace(trace_of(), residuals=())) == []
 
@@ -319,17 +318,17 @@ def test_the_free_run_is_drawn_before_and_after() -> None:
     found = trace_of("effect", ("rising_stiction",))
     t, one = np.linspace(0.0, 40.0, 400), np.ones(400)
     run = Residual("position", t, np.floor(t / 20.1), 9e-5 * one, 1e-5 * one, 1e-5 * one, {})
-    html = checked(trace_report(traced(replace(found, run=run))), 3)
+    html = checked(traced_view(traced(replace(found, run=run))).page(), 3)
     assert "rising stiction shows in neither" in html and "residual [mm]" in html
     assert "0 % (before), 100 % (after)" in html and "in windows of 2 s" in html
-    assert "residual [rad]" in trace_report(traced(replace(found, run=run), rotary=True))
+    assert "residual [rad]" in traced_view(traced(replace(found, run=run), rotary=True)).page()
 
 
 def test_a_law_is_drawn_beside_what_the_logs_say_without_it() -> None:
     at = np.linspace(0.01, 0.3, 12)
     curve = FreeCurve("stribeck", "mechanical", "v", at, np.exp(-at), 0.01 + 0 * at, np.exp(-at))
     found = replace(trace_of("effect", ("stribeck",)), curves=(curve,))
-    html = checked(trace_report(traced(found)), 5)
+    html = checked(traced_view(traced(found)).page(), 5)
     for text in ("Law and logs", "stribeck [N]", "by the logs alone", "velocity [mm/s]"):
         assert text in html
 

@@ -108,10 +108,18 @@ const servoCharts = (() => {
       const seen = u.scales.x;
       const all = seen.min === null || (seen.min <= whole[0] && seen.max >= whole[1]);
       if (panel.y_range && all) return panel.y_range;
-      if (low === null) return panel.y_range || [0, 1];
+      if (low === null) return panel.y_range || [panel.log_y ? 0.1 : 0, 1];
+      if (panel.log_y) return [low / 1.5, high * 1.5];
       const pad = 0.06 * (high - low) || Math.abs(0.1 * high) || 1;
       return [low - pad, high + pad];
     };
+  }
+
+  /* Names in place of numbers at 0, 1, ... of x. */
+  function named(panel) {
+    if (!panel.names.length) return {};
+    const at = () => panel.names.map((_, k) => k);
+    return {size: 56, rotate: -30, splits: at, values: (u, ticks) => ticks.map((v) => panel.names[v])};
   }
 
   function optionsOf(panel, width, data, sync, onZoom) {
@@ -125,11 +133,11 @@ const servoCharts = (() => {
       legend: {live: true}, cursor: {sync: sync ? {key: sync, setSeries: false} : undefined, drag: {x: true, y: false}},
       scales: {
         x: {time: false, distr: panel.log_x ? 3 : 1, range: xRange},
-        y: {range: yRange(panel, whole)},
+        y: {distr: panel.log_y ? 3 : 1, range: yRange(panel, whole)},
       },
       axes: [
-        axisOf(panel.x || null, {size: 30, labelSize: 18, ...(panel.log_x ? {} : {values: plain})}),
-        axisOf(panel.y, {size: 58, labelSize: 18, values: plain}),
+        axisOf(panel.x || null, {size: 30, labelSize: 18, ...(panel.log_x ? {} : {values: plain}), ...named(panel)}),
+        axisOf(panel.y, {size: 58, labelSize: 18, ...(panel.log_y ? {} : {values: plain})}),
       ],
       hooks: {drawAxes: [shading(panel, "x")], draw: [shading(panel, "y")], setScale: [(u, key) => key === "x" && onZoom(u)]},
       whole,

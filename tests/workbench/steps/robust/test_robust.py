@@ -15,7 +15,7 @@ from tests.chain import TABLES, model_of
 from workbench.documents.design_file import design_document
 from workbench.documents.model import Model
 from workbench.output import dumps
-from workbench.report.robust import robust_lines, robust_report, robust_sentence
+from workbench.report.robust import robust_lines, robust_sentence, robust_view
 from workbench.steps.closed_loop import driven_loop
 from workbench.steps.loop_figures import Limits
 from workbench.steps.robust.document import robust_document
@@ -146,8 +146,9 @@ def test_the_document_is_json_and_names_every_loop() -> None:
 
 
 def test_the_report_shows_the_shares_and_the_design() -> None:
-    text = robust_report(found(), rotary=False)
-    assert text.count("<svg") == 1
+    text = robust_view(found(), rotary=False).page()
+    assert text.count('<figure class="chart"') == 1
+    assert "&lt;t" not in text
     assert "modulus margin" in text and "nominal" in text
     assert any("drawn anew" in line for line in robust_lines(found(), rotary=False))
 

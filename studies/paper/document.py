@@ -4,12 +4,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from studies.paper.claims import claims
+from studies.paper.measures import Case, Figures
+from studies.paper.settings import PRINTED_SUMS
+from studies.paper.study import Study
 from workbench.documents.versions import versions
 from workbench.output import Row, written
-from workbench.paper.claims import claims
-from workbench.paper.measures import Case, Figures
-from workbench.paper.settings import PRINTED_SUMS
-from workbench.paper.study import Study
 from workbench.screen import Screen, more, screen, tabled
 
 CLAIMS = ("where", "paper", "here", "")

@@ -10,14 +10,14 @@ from design.rst import RST, design_rst
 from design.specification import RSTSpecification
 from identification.estimation.fit import fit_plant
 from identification.model.karnopp import NAMES
+from studies.paper.beyond import Ours, beyond
+from studies.paper.figures_rig import RigFigures, rig_figures
+from studies.paper.figures_simulation import SimulationFigures, simulation_figures
+from studies.paper.rivals import RivalServo, rivals
+from studies.paper.sensitivity import Sensitivity, sensitivity
+from studies.paper.settings import DOMINANT, PRINTED_A, PRINTED_B, TABLE_1_ESTIMATED, friction_of
 from workbench.cards.card import load_card
 from workbench.logs.fetch import card_path
-from workbench.paper.beyond import Ours, beyond
-from workbench.paper.figures_rig import RigFigures, rig_figures
-from workbench.paper.figures_simulation import SimulationFigures, simulation_figures
-from workbench.paper.rivals import RivalServo, rivals
-from workbench.paper.sensitivity import Sensitivity, sensitivity
-from workbench.paper.settings import DOMINANT, PRINTED_A, PRINTED_B, TABLE_1_ESTIMATED, friction_of
 from workbench.steps.simulate import record
 
 ZEROS = ((100.0, 0.1), (200.0, 0.05), (314.0, 0.05))  # (w [rad/s], zeta) of H_R, worked out

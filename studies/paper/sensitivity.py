@@ -9,8 +9,8 @@ from design.loop import LoopNoise
 from design.servo import simulate_servo
 from identification.arrays import Array
 from identification.model.karnopp import NAMES, Karnopp
-from workbench.paper.measures import figures_of, measure
-from workbench.paper.settings import NOISE_F, NOISE_Y, friction_of, simulation, simulation_pd
+from studies.paper.measures import figures_of, measure
+from studies.paper.settings import NOISE_F, NOISE_Y, friction_of, simulation, simulation_pd
 
 N_CS = (1.2, 1.5, 2.0, 3.0, 5.0, 10.0)
 E_TS = (0.2e-3, 0.5e-3, 1e-3, 2e-3, 3e-3, 5e-3, 10e-3)  # m

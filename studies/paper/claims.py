@@ -6,9 +6,9 @@ from typing import Literal
 
 import numpy as np
 
-from workbench.paper.measures import Case
-from workbench.paper.settings import PRINTED_R, PRINTED_S, PRINTED_SUMS, PRINTED_T
-from workbench.paper.study import Study
+from studies.paper.measures import Case
+from studies.paper.settings import PRINTED_R, PRINTED_S, PRINTED_SUMS, PRINTED_T
+from studies.paper.study import Study
 
 ClaimVerdict = Literal["reproduced", "partly", "not reproduced", "beaten", "kept", "short"]
 REPRODUCED_WITHIN = 0.1  # of a printed ratio

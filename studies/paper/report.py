@@ -6,11 +6,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from design.servo import ServoRun
-from workbench.paper.claims import claims
-from workbench.paper.document import CLAIMS, FIGURES, case_rows, claim_rows, rival_servo_rows
-from workbench.paper.measures import Case
-from workbench.paper.sensitivity import Sensitivity
-from workbench.paper.study import Study
+from studies.paper.claims import claims
+from studies.paper.document import CLAIMS, FIGURES, case_rows, claim_rows, rival_servo_rows
+from studies.paper.measures import Case
+from studies.paper.sensitivity import Sensitivity
+from studies.paper.study import Study
+from studies.paper.svg import inline, picture
 from workbench.report.figures import (
     BAND,
     MEASURED,
@@ -18,13 +19,12 @@ from workbench.report.figures import (
     OTHER,
     REFERENCE,
     figure,
-    inline,
     label,
     line,
     style,
 )
-from workbench.report.page import Section, page
-from workbench.report.templating import render
+from workbench.report.page import Section, page, table
+from workbench.screen import tabled
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -53,8 +53,8 @@ def paper_report(found: Study) -> str:
     return page("The paper in simulation", lead, sections)
 
 
-def _table(head: tuple[str, ...], rows: Any, lines: tuple[str, ...] = ()) -> str:
-    return render("table", head=head, rows=rows, lines=lines)
+def _table(head: tuple[str, ...], rows: Any, lines: tuple[str, ...] = ()) -> Any:
+    return table(tabled(head, rows), lines)
 
 
 def _figure_6(found: Study) -> Section:
@@ -68,7 +68,7 @@ def _figure_6(found: Study) -> Section:
         svg = inline(drawn, "figure-6", "steps under PD with and without compensator")
     caption = "PD on the plant of table 1, compensator on the paper's estimates of it."
     rows = _table(FIGURES, case_rows(cases))
-    return Section("Figure 6", render("figure", svg=svg, caption=caption) + rows)
+    return Section("Figure 6", picture(svg, caption) + rows)
 
 
 def _figure_7(found: Study) -> Section:
@@ -84,7 +84,7 @@ def _figure_7(found: Study) -> Section:
         label(axes[1], "time [s]", "velocity (5) [m/s]")
         svg = inline(drawn, "figure-7", "compensation force and velocity")
     caption = "Eq. (4) behind and before filter C, and the velocity it works with."
-    return Section("Figure 7", render("figure", svg=svg, caption=caption))
+    return Section("Figure 7", picture(svg, caption))
 
 
 def _figure_8(found: Study) -> Section:
@@ -109,7 +109,7 @@ def _figure_8(found: Study) -> Section:
     caption = "PID, the last 10 s of a stand of 60 s: what goes on moving is a limit cycle."
     rows = _table(FIGURES, case_rows(found.simulation.pid))
     more = _table(FIGURES, case_rows(found.simulation.pid_table_3))
-    return Section("Figure 8", render("figure", svg=svg, caption=caption) + rows + more)
+    return Section("Figure 8", picture(svg, caption) + rows + more)
 
 
 def _drift(found: Study) -> Section:
@@ -135,7 +135,7 @@ def _drift(found: Study) -> Section:
     rows = [row for name, cases in rig.drifted.items() for row in _named(name, cases)]
     return Section(
         "Figures 11 to 22",
-        render("figure", svg=svg, caption=caption)
+        picture(svg, caption)
         + _table(FIGURES, rows)
         + _table(FIGURES, _named("PD before the drift", rig.before)),
     )
@@ -180,7 +180,7 @@ def _maps(maps: Sensitivity) -> Section:
         "PD and compensator (4) on table 1. Chatter: standard deviation of F_comp's change from"
         " sample to sample. Noise in units of the paper's."
     )
-    return Section("Sensitivity to N_c, e_T and noise", render("figure", svg=svg, caption=caption))
+    return Section("Sensitivity to N_c, e_T and noise", picture(svg, caption))
 
 
 def _wrong(maps: Sensitivity) -> Section:
@@ -193,7 +193,7 @@ def _wrong(maps: Sensitivity) -> Section:
         label(axes, "parameter over its true value", "squared error over that with all true")
         svg = inline(drawn, "wrong", "squared error against one wrong parameter")
     caption = "One parameter of the compensator wrong at a time; m and F_v are not in eq. (4)."
-    return Section("Sensitivity to wrong parameters", render("figure", svg=svg, caption=caption))
+    return Section("Sensitivity to wrong parameters", picture(svg, caption))
 
 
 def _beyond(found: Study) -> Section:
@@ -213,7 +213,7 @@ def _beyond(found: Study) -> Section:
         f" {ours.tuned.dominant[1]:g}; compensator: {ours.chosen}. Squared error"
         f" {ours.ratio:.3f} of the paper's design with new parameters."
     )
-    return Section("Our design", render("figure", svg=svg, caption=caption))
+    return Section("Our design", picture(svg, caption))
 
 
 def _positions(axes: "Axes", cases: Mapping[str, Case]) -> None:

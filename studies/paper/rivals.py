@@ -13,8 +13,8 @@ from design.rivals import DisturbanceObserver, Dither, FrictionObserver, Integra
 from design.servo import Servo
 from identification.errors import BadModel
 from identification.model.karnopp import Karnopp
-from workbench.paper.measures import Case, measure
-from workbench.paper.settings import (
+from studies.paper.measures import Case, measure
+from studies.paper.settings import (
     NOISE_Y,
     TABLE_1_ESTIMATED,
     SetUp,

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 
 from design.compensator import Inner
 from design.servo import Compensation, Servo
-from workbench.paper.measures import Case, compare
-from workbench.paper.settings import (
+from studies.paper.measures import Case, compare
+from studies.paper.settings import (
     TABLE_1_ESTIMATED,
     SetUp,
     friction_of,

@@ -1,20 +1,21 @@
-"""The doctor's picture as charts that zoom: position, drive, clock, and the force over speed."""
+"""The doctor's picture as charts: position, drive, clock, and the force over speed."""
 
 import numpy as np
 
 from identification.signals.differentiate import differentiate
 from workbench.cards.units import si_unit
 from workbench.report.chart import Band, Chart, Line, Panel
-from workbench.report.doctor import SCREEN_UNITS
 from workbench.report.figures import evenly_spread
-from workbench.steps.doctor import Looked
+from workbench.steps.doctor import Examined, Looked
 
+Seen = Looked | Examined
+SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 MOST_BANDS = 60
 NOISE_WIDTHS = 4.0  # of the velocity, within which a direction is not sure
 DRIVE_WORDS = {"F": "applied force", "u": "command"}
 
 
-def chart_of(found: Looked) -> list[Chart]:
+def doctor_charts(found: Seen) -> list[Chart]:
     """The pictures of a log that was looked at; fewer where nothing of it can be drawn."""
     clock = _clock(found)
     if found.log is None:
@@ -27,15 +28,21 @@ def chart_of(found: Looked) -> list[Chart]:
     return [time] if over is None else [time, over]
 
 
-def _unit(found: Looked, name: str) -> tuple[float, str]:
+def unit_of(found: Seen, name: str) -> tuple[float, str]:
+    """Factor and unit in which a signal is shown."""
     unit = found.command_unit if name == "u" else si_unit(name, found.rig.motion) or ""
     return SCREEN_UNITS.get(unit, (1.0, unit))
 
 
-def _position(found: Looked) -> Panel:
+def speed_unit(found: Seen) -> tuple[float, str]:
+    """Factor and unit in which a speed is shown."""
+    return (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
+
+
+def _position(found: Seen) -> Panel:
     log = found.log
     assert log is not None
-    factor, unit = _unit(found, "y")
+    factor, unit = unit_of(found, "y")
     t = log["t"]
     lines = [Line("position", t, factor * log["y"], "measured")]
     if "r" in log:
@@ -50,20 +57,20 @@ def _position(found: Looked) -> Panel:
     return Panel("", f"position [{unit}]", lines, bands=bands)
 
 
-def _drive(found: Looked) -> list[Panel]:
+def _drive(found: Seen) -> list[Panel]:
     log = found.log
     assert log is not None
     out = []
     for name in ("F", "u"):
         if name in log and not (name == "F" and found.rig.kind == "motor"):
-            factor, unit = _unit(found, name)
+            factor, unit = unit_of(found, name)
             line = Line(DRIVE_WORDS[name], log["t"], factor * log[name], "model")
             out.append(Panel("", f"{DRIVE_WORDS[name]} [{unit}]", [line], height=170))
     return out
 
 
-def _clock(found: Looked) -> Panel:
-    t, h = found.raw["t"], found.clock.h
+def _clock(found: Seen) -> Panel:
+    t, h = found.times if isinstance(found, Examined) else found.raw["t"], found.clock.h
     step = np.diff(t) / h if h > 0.0 else np.diff(t)
     top = max(2.0, 1.1 * float(np.nanmax(step))) if len(step) else 2.0
     line = Line("step", t[1:], step, "quiet")
@@ -71,15 +78,15 @@ def _clock(found: Looked) -> Panel:
     return Panel("time [s]", label, [line], y_range=(0.0, top), height=130)
 
 
-def _over_speed(found: Looked) -> Chart | None:
+def _over_speed(found: Seen) -> Chart | None:
     log = found.log
     assert log is not None
     name = "F" if "F" in log else "u"
     if name not in log:
         return None
     motion = differentiate(log["y"], log.h)
-    factor, unit = _unit(found, name)
-    speed, per = (1.0, "rad/s") if found.rig.motion == "rotary" else SCREEN_UNITS["m/s"]
+    factor, unit = unit_of(found, name)
+    speed, per = speed_unit(found)
     at = evenly_spread(len(log))
     sure = NOISE_WIDTHS * speed * motion.v_noise
     dots = Line(DRIVE_WORDS[name], speed * motion.v[at], factor * log[name][at], "measured", "dots")

@@ -16,8 +16,8 @@ from identification.model.estimates import KarnoppFit
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator
 from identification.signals.excitation import RandomSteps, reference_signal
-from workbench.paper.measures import Case, compare
-from workbench.paper.settings import (
+from studies.paper.measures import Case, compare
+from studies.paper.settings import (
     NOISE_F,
     NOISE_Y,
     SetUp,

@@ -23,9 +23,9 @@ from identification.errors import BadSpecification
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.plant import Actuator
 from identification.signals.filters import RIG_A, RIG_C
-from workbench.paper.figures_rig import IdentifiedRig
-from workbench.paper.measures import Case, measure
-from workbench.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst
+from studies.paper.figures_rig import IdentifiedRig
+from studies.paper.measures import Case, measure
+from studies.paper.settings import NOISE_Y, SetUp, friction_of, rig, rig_rst
 from workbench.steps.design import NOISE_SHARE
 
 PARAMETER_SPREAD = 0.05  # of every parameter, on the machines near the identified one

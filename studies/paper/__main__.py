@@ -1,15 +1,19 @@
-"""`workbench paper`: the paper in simulation, each figure and number beside ours."""
+"""The paper in simulation, each figure and number beside ours: `make paper`."""
 
+import sys
 from datetime import datetime
 from pathlib import Path
 
 import click
 
-from workbench.ending import StatusCommand
+from studies.paper.document import paper_document, paper_view
+from studies.paper.report import paper_report
+from studies.paper.study import study
+from workbench.cli import verdict
 from workbench.output import OutputFolder, emit, output_options, progress
 
 
-@click.command(cls=StatusCommand, epilog="Example: workbench paper --out paper")
+@click.command(epilog="Example: python -m studies.paper --out paper")
 @click.option(
     "--seed", type=click.IntRange(min=0), default=1, show_default=True,
     help="First of the noise's seeds; what is tuned is tuned on this one + 100.",
@@ -27,10 +31,6 @@ def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
     sensitivity to N_c, e_T, noise and wrong parameters. Writes paper.json and report.html. Takes
     one to two minutes.
     """
-    from workbench.paper.document import paper_document, paper_view
-    from workbench.paper.report import paper_report
-    from workbench.paper.study import study
-
     with OutputFolder("paper", out, now=datetime.now()) as folder:
         with progress("paper", 1.0, as_json=as_json) as advance:
             done = 0.0
@@ -45,3 +45,18 @@ def command(seed: int, runs: int, as_json: bool, out: Path | None) -> None:
         folder.write_json("paper.json", document)
         folder.write_text("report.html", paper_report(found))
     emit({**document, "out": folder.final}, as_json, lambda: paper_view(found, folder.final))
+
+
+def main() -> int:
+    """Exit status; an error as one line, as every command of the workbench has it."""
+    try:
+        command.main(prog_name="python -m studies.paper", standalone_mode=False)
+    except (Exception, KeyboardInterrupt) as error:
+        status, message = verdict(error)
+        click.echo(message, err=True)
+        return status
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -13,14 +13,12 @@ from design.servo import Compensation
 from identification.arrays import Array
 from identification.model.karnopp import Karnopp
 from identification.simulation.karnopp_step import F_CN, F_CP, F_SN, F_SP
-from tests.screens import one_screen
-from workbench.output import dumps
-from workbench.paper.claims import claims
-from workbench.paper.document import paper_document, paper_view
-from workbench.paper.figures_rig import RigFigures
-from workbench.paper.measures import figures_of, measure, standing
-from workbench.paper.report import paper_report
-from workbench.paper.settings import (
+from studies.paper.claims import claims
+from studies.paper.document import paper_document, paper_view
+from studies.paper.figures_rig import RigFigures
+from studies.paper.measures import figures_of, measure, standing
+from studies.paper.report import paper_report
+from studies.paper.settings import (
     PRINTED_A,
     PRINTED_B,
     TABLE_1_ESTIMATED,
@@ -33,7 +31,9 @@ from workbench.paper.settings import (
     simulation_pid,
     steps,
 )
-from workbench.paper.study import Study, study
+from studies.paper.study import Study, study
+from tests.screens import one_screen
+from workbench.output import dumps
 
 pytestmark = pytest.mark.slow
 

@@ -1,0 +1,115 @@
+"""A result as everyone is shown it, made once: a terminal, a page, a notebook and a picture."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from workbench.ending import Step
+from workbench.files import REPORT_FILE
+from workbench.output import OutputFolder, dumps, emit, next_step, written
+from workbench.report.chart import Chart
+from workbench.report.page import Section, page, table
+from workbench.report.templating import render
+from workbench.screen import Part, Screen, screen
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+OUT = "\0"  # in what to do next: the folder of the files, where they are written
+
+
+def no_sections() -> Sequence[Section]:
+    """Of a result that has no page."""
+    return ()
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """A result: what was found in a sentence, what to do next, and what stands below.
+
+    parts: tables, lines and notes in their order. sections, chart: of the page, and the telling
+    picture, drawn when they are asked for. content: the document by which other programs read it;
+    files: what the command writes, by name, a text or a document, and the page where it has_page.
+    then_by_command: its command ends with the step to type, so that its screen leaves `then` out.
+    lead: of the page, where that is another sentence. then_below: so many parts stand above `then`.
+    """
+
+    title: str
+    sentence: str
+    parts: Sequence[Part | str]
+    content: Callable[[], Mapping[str, Any]]
+    files: Mapping[str, Callable[[], object]]
+    sections: Callable[[], Sequence[Section]] = no_sections
+    chart: Callable[[], Chart] | None = None
+    then: Sequence[str] = ()
+    then_by_command: bool = False
+    has_page: bool = True
+    lead: str = ""
+    then_below: int = 0
+
+    @cached_property
+    def document(self) -> Mapping[str, Any]:
+        """The result as plain values."""
+        return self.content()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The files that the command writes."""
+        return (*self.files, REPORT_FILE) if self.has_page else tuple(self.files)
+
+    def screen(self, folder: Path | None = None) -> Screen:
+        """The result for a terminal; folder: where its command has written the files."""
+        then = () if folder is not None and self.then_by_command else self._then(folder)
+        where = () if folder is None else (written(folder, *self.names),)
+        first, rest = self.parts[: self.then_below], self.parts[self.then_below :]
+        return screen(self.sentence, *first, *map(next_step, then), *rest, *where)
+
+    def page(self) -> str:
+        """The result as a page of HTML that needs no network."""
+        return page(self.title, self.lead or self.sentence, self.sections(), self._then(None))
+
+    def html(self) -> str:
+        """The result for a notebook: all that a terminal shows, uncut."""
+        then = "".join(f" Next: {line}." for line in self._then(None))
+        shown = [render("lead", sentence=self.sentence + then)]
+        for part in self.parts:
+            if isinstance(part, str):
+                shown.append(render("lines", lines=[part]))
+            elif part.full_head:
+                shown.append(table(part))
+            elif lines := part.merged or part.whole:
+                shown.append(render("lines", lines=lines))
+        return "\n".join(shown)
+
+    def figure(self) -> "Figure":
+        """The telling picture, a figure of matplotlib."""
+        from workbench.report.chart_figure import chart_figure
+
+        assert self.chart is not None
+        return chart_figure(self.chart())
+
+    def write(self, folder: OutputFolder, page_name: str = REPORT_FILE) -> None:
+        """Write the files of the result."""
+        for name, content in self.files.items():
+            folder.write_text(name, text_of(content()))
+        if self.has_page:
+            folder.write_text(page_name, self.page())
+
+    def _then(self, folder: Path | None) -> list[str]:
+        where = "" if folder is None else f"{folder}/"
+        return [line.replace(OUT, where) for line in self.then]
+
+
+def text_of(content: object) -> str:
+    """A file's text; a document as JSON."""
+    return content if isinstance(content, str) else dumps(content) + "\n"
+
+
+def show(view: View, folder: Path, as_json: bool, then: Step | None = None, **more: object) -> None:
+    """Print a result that lies in the folder: as JSON, with `more` in it, or on one screen.
+
+    then: the command to type next.
+    """
+    emit({**view.document, **more, "out": folder}, as_json, lambda: view.screen(folder), then)
