@@ -146,30 +146,26 @@ def command(
     from workbench.documents.model_file import read_model
     from workbench.documents.velocity import is_velocity_model
     from workbench.options import parse_auxiliary, parse_poles
+    from workbench.steps.elastic import with_response
     from workbench.steps.loop_figures import Limits
     from workbench.steps.present import with_card
+    from workbench.steps.robust.robust import RobustAsked
 
+    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     if is_velocity_model(model_file):
         refuse_for_velocity(*NOT_FOR_VELOCITY)
-        asked_of = Limits(modulus, delay, overshoot=overshoot)
-        return _velocity(model_file, asked_of, (integrator, design_period), as_json, out)
+        return _velocity(model_file, limits, (integrator, design_period), as_json, out)
     model = with_card(read_model(model_file, library(effects)), card)
     asked = Asked(parse_poles(poles), parse_auxiliary(auxiliary), integrator)
-    limits = Limits(modulus, delay, standstill, tracking, overshoot, force)
     _refuse_beside(click.get_current_context(), robust, "p-pi" in structures and not integrator)
     if robust:
-        from workbench.steps.robust.robust import RobustAsked
-
-        seen = _drift(where, machine) if machine else None
-        wanted = RobustAsked(draws, probability, limits, staircase, seen, seed)
+        drift = _drift(where, machine) if machine else None
+        wanted = RobustAsked(draws, probability, limits, staircase, drift, seed)
         return _robust(model, model_file, wanted, asked, (source, design_period), as_json, out)
-    _only_robust(click.get_current_context())
-    from workbench.steps.elastic import with_response
-
-    model = with_response(model, response_file)
     kept = _kept(integrator, source, design_period, card, effects, structures, response_file)
+    given = (model_file, card, kept)
     plant = (source, design_period, structures)
-    return _nominal(model, (model_file, card, kept), limits, asked, plant, as_json, out)
+    return _nominal(with_response(model, response_file), given, limits, asked, plant, as_json, out)
 
 
 def _nominal(
@@ -243,6 +239,8 @@ def _refuse_beside(context: click.Context, robust: bool, without_integrator: boo
             and given is click.core.ParameterSource.COMMANDLINE
         ):
             raise click.UsageError(f"{option.opts[0]} has no meaning with --robust; leave it out.")
+    if not robust:
+        _only_robust(context)
 
 
 def _robust(
