@@ -18,6 +18,8 @@ from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
     OF_FORCE,
+    MotionLog,
+    mechanical,
     motion_log,
 )
 from identification.estimation.regression.motion_rows import (
@@ -40,6 +42,7 @@ FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
+NOTHING_KNOWN = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 SPEED_COLUMNS = (
@@ -201,22 +204,26 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
 
     Raises NotIdentifiable where they go both ways, or hardly slide.
     """
-    rows = _rows(recorded)
-    ups = np.concatenate([_ups(part) for part in rows])
-    way = _way(ups)
+    moved = _moved(recorded.plain, recorded.held)
+    way = _way(moved)
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
-    data = [_kept(part, _ups(part) == way) for part in rows]
+    data = [_kept(mechanical(one, NOTHING_KNOWN), one.up == way) for one in moved]
     return _made(_solved(data, ONE_WAY[way]), data, recorded, rng, why, ())
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
     """Whether logs move up alone (True) or down alone (False); None: both ways, or hardly."""
-    moved = [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
-    return _way(np.concatenate([one.up for one in moved]))
+    return _way(_moved(logs, held))
 
 
-def _way(up: BoolArray) -> bool | None:
+def _moved(logs: Sequence[Log], held: bool) -> list[MotionLog]:
+    """The logs with their motion, smoothed until its direction is sure."""
+    return [motion_log(one, held=held, by_command=False, imposed=True) for one in logs]
+
+
+def _way(moved: Sequence[MotionLog]) -> bool | None:
+    up = np.concatenate([one.up for one in moved])
     share = float(np.mean(up)) if len(up) else 0.5
     return share > 0.5 if len(up) >= FEWEST_JUDGED and is_one_way(share) else None
 
@@ -248,7 +255,7 @@ def _kept(rows: Rows, kept: BoolArray) -> Rows:
 def _rows(recorded: RecordedLogs) -> list[Rows]:
     """The equation of motion of each log."""
     moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
-    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    theta = NOTHING_KNOWN
     for _ in range(ROUNDS):
         theta = solve_rows(stacked(motion_rows(moved, theta))).theta
     return motion_rows(moved, theta)
