@@ -134,7 +134,7 @@ def reference_limits(
     most = min(model.force_peak, _limit_force(model, force))
     rate = SPEED_BEYOND_LOGS * seen
     if viscous > 0.0:
-        rate = min(rate, max(SHARE_OF_FORCE * (most - coulomb) / viscous, seen))
+        rate = min(rate, max(SHARE_OF_FORCE * (most - coulomb) / viscous, 0.1 * seen))
     # Where friction takes all that the logs have shown, a tenth of it accelerates.
     left = most - coulomb - viscous * min(seen, rate)
     return rate, SHARE_OF_FORCE * max(left, 0.1 * most) / ahead.m
