@@ -263,12 +263,20 @@ def _rows(recorded: RecordedLogs) -> list[Rows]:
 
 def _best(data: Sequence[Rows]) -> ForceFit:
     """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
-    than those that leave least; a mass that comes out below 0 is none."""
-    every = _solved(data, COLUMN_SETS[-1])
-    sets = [used for used in COLUMN_SETS if 0 not in used or every.theta[0] > 0.0]
-    left = [_unseen(data, used) for used in sets]
-    used = next(x for x, one in zip(sets, left, strict=True) if predicts_as_much(one, min(left)))
-    return replace(_solved(data, used), share=every.share)
+    than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
+    that would take Coulomb friction below 0: at speeds alike it stands for anything."""
+    every = [_solved(data, used) for used in COLUMN_SETS]
+    fits = [one for one in every if _may_be(one)]
+    left = [_unseen(data, one.used) for one in fits]
+    best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
+    return replace(best, share=every[-1].share)
+
+
+def _may_be(fit: ForceFit) -> bool:
+    """Whether a body can have these parameters; a constant force alone may stand in F_c."""
+    found = dict(zip(fit.used, fit.theta, strict=True))
+    coulomb = all(found[level] >= 0.0 for level, v in ((1, 3), (2, 4)) if v in found)
+    return coulomb and not found.get(0, 1.0) < 0.0
 
 
 def predicts_as_much(left: float, least: float) -> bool:

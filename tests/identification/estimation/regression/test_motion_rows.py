@@ -113,3 +113,12 @@ def test_terms_that_predict_nothing_are_left_out() -> None:
     assert plain["F_vp"] is None and plain["m"] is None
     whole = told(swinging((2.0, 4.0, 3.0, 8.0, 6.0), noise_F=0.2))
     assert [whole[name] for name in FIVE] == pytest.approx([2.0, 4.0, 3.0, 8.0, 6.0], rel=0.03)
+
+
+def test_viscous_friction_takes_no_coulomb_friction_below_nothing() -> None:
+    """At speeds alike a steep line through them stands for whatever else varies."""
+    log = swinging((0.0, -1.0, -1.0, 30.0, 30.0), noise_F=0.2)
+    fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
+    assert fit.estimates["F_vp"].value is None and fit.estimates["F_vn"].value is None
+    assert (fit.friction.F_vp, fit.friction.F_vn) == (0.0, 0.0)
+    assert min(fit.friction.F_cp, fit.friction.F_cn) > 1.0  # the level at these speeds
