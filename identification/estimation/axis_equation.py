@@ -11,7 +11,12 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.regression.equation_rows import MotionLog, mechanical, motion_log
+from identification.estimation.regression.equation_rows import (
+    NOTHING_KNOWN,
+    MotionLog,
+    mechanical,
+    motion_log,
+)
 from identification.estimation.regression.motion_rows import OF_EQUATION
 from identification.estimation.regression.standstill import breakaways
 from identification.estimation.regression.weighted_rows import (
@@ -89,7 +94,7 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
 
 def _settled(one: MotionLog) -> tuple[Rows, Array]:
     """The rows, and the parameters of their least squares."""
-    theta = np.array([1.0, 0.0, 0.0, 0.0, 0.0])
+    theta = NOTHING_KNOWN
     for _ in range(SETTLING_ROUNDS):
         theta = solve_rows(mechanical(one, np.maximum(theta, 0.0))).theta
     return mechanical(one, np.maximum(theta, 0.0)), theta

@@ -14,7 +14,7 @@ from scipy.stats import norm
 from identification.arrays import Array, IntArray
 from identification.effects._base import AT_REST, Acting, Param
 from identification.log import Rig
-from identification.model.estimates import Estimate
+from identification.model.estimates import NORMAL_95, Estimate
 from identification.model.karnopp import NAMES, NEGATIVE
 from identification.model.plant import units_of
 from identification.simulation.karnopp_step import BAND_N, BAND_P, SLIP_N, SLIP_P, STUCK
@@ -23,7 +23,6 @@ from identification.thresholds import EVENTS_NEEDED, NOTHING_OF, WIDEST_SD
 SLIDING_SAMPLES = 50  # samples of sliding a direction needs
 NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
-NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
 HELD = "held at its default: the logs call for no other value"

@@ -271,7 +271,7 @@ def finished(
     search, other, settle = rng.spawn(3)
     if found.imposed and led_by_rig(recorded):
         return fit_imposed(recorded, settle, IMPOSED_WHY)
-    if not (quick or search_is_vain(found, recorded)):
+    if not (quick or needs_no_search(found, recorded)):
         found = searched(found, recorded, search, report, 1 if recorded.held else WIDER_SEARCHES)
     if by is None and recorded.by_command and found.misfit > COMPLETE:
         said = _not_linear(recorded)
@@ -331,7 +331,7 @@ def _unless_unexplained(fit: KarnoppFit, left: tuple[float, float, float]) -> Ka
     return untold(fit, share) if is_unexplained(share) else fit
 
 
-def search_is_vain(found: FittedStructure, recorded: RecordedLogs) -> bool:
+def needs_no_search(found: FittedStructure, recorded: RecordedLogs) -> bool:
     """Whether no search for the plain plant is made: it is followed, or that is hopeless."""
     open_to_more = found.imposed or found.misfit > COMPLETE
     return not open_to_more or search_is_hopeless(found, recorded)

@@ -6,54 +6,53 @@ those that only a free body shows (mass in slow motion, stick limits, band) are 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from identification.arrays import Array, BoolArray
-from identification.arx.residual_tests import effective_samples
+from identification.arrays import Array
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import NORMAL_SETS, Events, estimates, normal_samples
+from identification.estimation.estimates import (
+    NORMAL_SETS,
+    Events,
+    estimates,
+    normal_samples,
+    told_estimate,
+)
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
     FIVE,
+    NOTHING_KNOWN,
     OF_FORCE,
     MotionLog,
     mechanical,
     motion_log,
 )
-from identification.estimation.regression.motion_rows import (
-    OF_EQUATION,
-    motion_rows,
-    rows_and_windows,
-)
+from identification.estimation.regression.force_terms import ForceFit, fewest_terms, fitted
+from identification.estimation.regression.motion_rows import motion_rows, rows_and_windows
+from identification.estimation.regression.row_fit import rms
 from identification.estimation.regression.three_step import FirstEstimate, first_estimate
-from identification.estimation.regression.weighted_rows import Rows, solve_rows, stacked
+from identification.estimation.regression.weighted_rows import (
+    Rows,
+    left_unseen,
+    solve_rows,
+    stacked,
+)
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES, ROTARY_UNITS, UNITS, VISCOUS_NAMES, Karnopp
 from identification.model.plant import Motor, Plant, units_of
 from identification.signals.initial_state import measured_start
 from identification.signals.one_way import is_one_way
-from identification.thresholds import HARDLY_MORE, MOST_UNEXPLAINED
+from identification.thresholds import MOST_UNEXPLAINED
 
 INERTIA_SHARE = 0.1  # share of the force below which inertia says nothing of a free body
 FEWEST_OF_DIRECTION = 4  # in each direction
 FEWEST_JUDGED = 48  # windows of sliding, by which a fit is held against the equation
 WIDEST_ASSUMED = 0.06  # of the fastest motion, a stick band that no run has shown
 SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
-NOTHING_KNOWN = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
-SPEED_COLUMNS = (
-    (),
-    (3,),
-    (4,),
-    (3, 4),
-)  # columns of viscous friction that may stand beside the others
-COLUMN_SETS = tuple(
-    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in SPEED_COLUMNS), key=len)
-)
 WHY_NOT = {
     "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
     "F_v": "constant friction predicts as much of these logs; add runs at other speeds to tell"
@@ -65,20 +64,6 @@ FALLS_WHY = (
     "found {:.3g} {}: friction falls with speed, which viscous friction does not; 'workbench trace'"
     " looks for why"
 )
-
-
-@dataclass(frozen=True)
-class ForceFit:
-    """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia in the
-    force."""
-
-    used: tuple[int, ...]
-    theta: Array
-    covariance: Array
-    residuals: tuple[Array, ...]
-    rms: float
-    relative: float
-    share: float
 
 
 def fit_imposed(
@@ -143,6 +128,7 @@ def _made(
         ),
         command_period=recorded.command_period,
         left=(fit.relative, fit.rms),
+        falling=_falling(fit, recorded),
     )
     return untold(made, fit.relative) if is_unexplained(fit.relative) else made
 
@@ -179,24 +165,20 @@ def force_fit(recorded: RecordedLogs) -> tuple[ForceFit, list[Rows]]:
     Raises NotIdentifiable where no log slides enough in both directions.
     """
     rows = _rows(recorded)
-    up, down = (sum(int(np.count_nonzero(way(part))) for part in rows) for way in (_ups, _downs))
+    up, down = _ways(rows)
     if min(up, down) < FEWEST_OF_DIRECTION:
         raise NotIdentifiable(
             f"{recorded.name}: {up} windows of sliding in positive and {down} in negative"
             f" direction, at least {FEWEST_OF_DIRECTION} of each needed; log strokes in both"
             " directions"
         )
-    return _best(rows), rows
+    return fewest_terms(rows), rows
 
 
-def _ups(rows: Rows) -> BoolArray:
-    """Rows in which the body mostly moves up."""
-    return np.asarray(rows.X[:, 1] > 0.5)
-
-
-def _downs(rows: Rows) -> BoolArray:
-    """Rows in which it mostly moves down."""
-    return np.asarray(rows.X[:, 2] < -0.5)
+def _ways(rows: Sequence[Rows]) -> tuple[int, int]:
+    """Windows in which the body mostly moves up, and down."""
+    up = sum(int(np.count_nonzero(part.X[:, 1] > 0.5)) for part in rows)
+    return up, sum(int(np.count_nonzero(part.X[:, 2] < -0.5)) for part in rows)
 
 
 def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> KarnoppFit:
@@ -208,8 +190,8 @@ def fit_one_way(recorded: RecordedLogs, rng: np.random.Generator, why: str) -> K
     way = _way(moved)
     if way is None:
         raise NotIdentifiable(f"{recorded.name}: no motion one way alone, or hardly any")
-    data = [_kept(mechanical(one, NOTHING_KNOWN), one.up == way) for one in moved]
-    return _made(_solved(data, ONE_WAY[way]), data, recorded, rng, why, ())
+    data = [mechanical(one, NOTHING_KNOWN).at(one.up == way) for one in moved]
+    return _made(fitted(data, ONE_WAY[way]), data, recorded, rng, why, ())
 
 
 def way_of(logs: Sequence[Log], *, held: bool) -> bool | None:
@@ -245,13 +227,6 @@ def of_one_way(fit: KarnoppFit, up: bool, rig: Rig) -> KarnoppFit:
     return replace(fit, estimates={**fit.estimates, name: both})
 
 
-def _kept(rows: Rows, kept: BoolArray) -> Rows:
-    return replace(
-        rows, b=rows.b[kept], X=rows.X[kept], sd=rows.sd[kept], block=rows.block[kept],
-        speed=rows.speed[kept],
-    )  # fmt: skip
-
-
 def _rows(recorded: RecordedLogs) -> list[Rows]:
     """The equation of motion of each log."""
     moved = [motion_log(one, held=recorded.held, by_command=False) for one in recorded.plain]
@@ -259,67 +234,6 @@ def _rows(recorded: RecordedLogs) -> list[Rows]:
     for _ in range(ROUNDS):
         theta = solve_rows(stacked(motion_rows(moved, theta))).theta
     return motion_rows(moved, theta)
-
-
-def _best(data: Sequence[Rows]) -> ForceFit:
-    """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
-    than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
-    that would take Coulomb friction below 0: at speeds alike it stands for anything."""
-    every = [_solved(data, used) for used in COLUMN_SETS]
-    fits = [one for one in every if _may_be(one)]
-    left = [_unseen(data, one.used) for one in fits]
-    best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
-    return replace(best, share=every[-1].share)
-
-
-def _may_be(fit: ForceFit) -> bool:
-    """Whether a body can have these parameters; a constant force alone may stand in F_c."""
-    found = dict(zip(fit.used, fit.theta, strict=True))
-    coulomb = all(found[level] >= 0.0 for level, v in ((1, 3), (2, 4)) if v in found)
-    return coulomb and not found.get(0, 1.0) < 0.0
-
-
-def predicts_as_much(left: float, least: float) -> bool:
-    """Whether fewer columns, which leave this of a force that they have not seen, will do."""
-    return left <= HARDLY_MORE * least
-
-
-def _unseen(data: Sequence[Rows], used: tuple[int, ...]) -> float:
-    """Force that least squares of these columns leave on blocks that they have not seen."""
-    every = stacked(data)
-    some = replace(every, X=every.X[:, used])
-    left = np.zeros(len(some.b))
-    for block in np.unique(some.block):
-        out = some.block == block
-        left[out] = (some.b - some.X @ solve_rows(some, ~out).theta)[out]
-    return float(np.sqrt(np.mean(left**2)))
-
-
-def _solved(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
-    """Weighted least squares of these columns."""
-    noise = np.concatenate([part.sd for part in data])
-    columns = np.concatenate([part.X for part in data])[:, used]
-    force = np.concatenate([part.b for part in data])
-    weight = np.median(noise) / noise
-    chosen = columns * weight[:, np.newaxis]
-    size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
-    theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
-    residual = force - columns @ theta
-    parts = tuple(np.split(residual, np.cumsum([len(part.b) for part in data])[:-1]))
-    independent = effective_samples([part for part in parts if len(part) > 8])
-    inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
-    square = float(np.mean((weight * residual) ** 2))
-    variance = square * len(residual) / max(independent - len(used), 1.0)
-    inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / max(np.std(force), 1e-300)
-    return ForceFit(
-        used=used,
-        theta=theta,
-        covariance=inverse * variance + np.diag((OF_EQUATION * theta) ** 2),
-        residuals=parts,
-        rms=float(np.sqrt(np.mean(residual**2))),
-        relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),
-        share=float(inertia),
-    )
 
 
 def _slightest_mass(data: Sequence[Rows]) -> float:
@@ -347,13 +261,11 @@ def _estimates(
     fit: ForceFit, nine: Array, samples: Array, data: Sequence[Rows], recorded: RecordedLogs
 ) -> dict[str, Estimate]:
     """The five with intervals, the others with the reason."""
-    up = int(sum(np.count_nonzero(part.X[:, 1] > 0.5) for part in data))
-    down = int(sum(np.count_nonzero(part.X[:, 2] < -0.5) for part in data))
     fastest = float(max(np.max(np.abs(part.X[:, 3:]), initial=0.0) for part in data))
     shown = [i for i in fit.used if i != 0 or fit.share >= INERTIA_SHARE]
     values = np.array([fit.theta[fit.used.index(i)] for i in shown])
     names = [FIVE[i] for i in shown]
-    told = _of_sliding(names, values, samples[:, shown], (up, down), fastest, recorded)
+    told = _of_sliding(names, values, samples[:, shown], _ways(data), fastest, recorded)
     return _reasoned(told, nine, fit.share, recorded)
 
 
@@ -372,16 +284,9 @@ def left_by(p: Karnopp, recorded: RecordedLogs) -> tuple[float, float, float] | 
     fast = np.concatenate([one.outside(p) for one in made])
     if np.count_nonzero(fast) < FEWEST_JUDGED:
         return None
-    own = (rows.b - rows.X @ theta)[fast]
-    unseen = np.zeros(len(rows.b))
-    for block in np.unique(rows.block[fast]):
-        out = rows.block == block
-        best = solve_rows(rows, fast & ~out).theta
-        unseen[out] = (rows.b - rows.X @ best)[out]
-    own_rms, unseen_rms, whole = (
-        float(np.sqrt(np.mean(x**2))) for x in (own, unseen[fast], rows.b[fast])
-    )
-    return own_rms, unseen_rms, whole
+    rows = rows.at(fast)
+    own = rows.b - rows.X @ theta
+    return rms(own), rms(left_unseen(rows)), rms(rows.b)
 
 
 def imposed_estimates(
@@ -413,9 +318,16 @@ def _of_sliding(
     return estimates(names, values, samples, events, recorded.rig, recorded.name)
 
 
-def _falls(name: str, one: Estimate) -> bool:
-    """Whether friction falls with speed, which predicts a motion but cannot be simulated."""
-    return name in VISCOUS_NAMES and one.assumed is not None and one.assumed < 0.0
+def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
+    """Slopes below 0 with which friction falls with speed: they predict a motion, but would drive a
+    body that is simulated."""
+    units = units_of(recorded.rig.motion)
+    found = zip(fit.used, fit.theta, np.sqrt(np.diag(fit.covariance)), strict=True)
+    return {
+        FIVE[i]: told_estimate(float(slope), units[FIVE[i]], float(sd))
+        for i, slope, sd in found
+        if FIVE[i] in VISCOUS_NAMES and slope < 0.0
+    }
 
 
 def _reasoned(
@@ -429,10 +341,10 @@ def _reasoned(
     for key, value in zip(NAMES, nine, strict=True):
         if key in told:
             one = told[key]  # not told: what is assumed has the sign that a friction has
-            if _falls(key, one):
-                one = replace(one, reason=FALLS_WHY.format(one.assumed, units[key]))
-            elif one.value is None:
-                one = replace(one, assumed=float(value))
+            if one.value is None:
+                falls = key in VISCOUS_NAMES and one.assumed is not None and one.assumed < 0.0
+                why = FALLS_WHY.format(one.assumed, units[key]) if falls else one.reason
+                one = replace(one, reason=why, assumed=float(value))
             out[key] = one
             continue
         kind = key if key == "m" else ("F_v" if key.startswith("F_v") else "stick")

@@ -9,6 +9,7 @@ from identification.arrays import Array
 from identification.errors import BadLog, NotIdentifiable
 from identification.estimation.regression.equation_rows import (
     MECHANICAL,
+    NOTHING_KNOWN,
     MotionLog,
     actuator,
     motion_log,
@@ -29,8 +30,6 @@ from identification.remarks import Aside
 from identification.signals.check import check_driven
 from identification.signals.thin import at_needed_rate
 from identification.thresholds import LINEAR_ACTUATOR
-
-NO_NOISE = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # of a body of 1 kg without friction, k1 alone
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +164,9 @@ def plain_share(recorded: RecordedLogs) -> float:
             return 0.0
         return share_between(recorded.logs, sliding.rows, sliding.slowest)
     if recorded.by_command:
-        first = solve_rows(stacked([actuator(one, NO_NOISE[:3]) for one in recorded.logs])).theta
+        first = solve_rows(
+            stacked([actuator(one, NOTHING_KNOWN[:3]) for one in recorded.logs])
+        ).theta
         rows = [actuator(one, first) for one in recorded.logs]
         return share_between(recorded.logs, stacked(rows))
     return 0.0

@@ -20,6 +20,7 @@ from identification.errors import NotIdentifiable, UserError
 from identification.estimation.estimates import of_effect, told_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
+    NOTHING_KNOWN,
     MotionLog,
     mechanical,
     motion_log,
@@ -55,7 +56,6 @@ PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
 WHOLE_NUMBER = "exact: a whole number of times in a turn"
-NO_FIRST = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # before any parameter is known
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,7 +306,7 @@ def _squares(moved: Sequence[MotionLog], turns: bool, held: bool) -> _Squares | 
     own, cross, square, rows = [], [], [], 0
     slow = float(np.quantile(np.concatenate([one.speed for one in moved]), SLOWEST_PART))
     for one in moved:
-        w, plain = one.sliding, mechanical(one, NO_FIRST)
+        w, plain = one.sliding, mechanical(one, NOTHING_KNOWN)
         mean = w.held if held else w.mean
         at, F, y = np.arange(len(one.log)), np.asarray(one.log["F"]), np.asarray(one.log["y"])
         X = plain.X

@@ -11,7 +11,6 @@ import numpy as np
 
 from identification.effects._library import Library
 from identification.errors import UserError
-from identification.estimation.estimates import NORMAL_95
 from identification.estimation.plain_search.actuator_fit import fit_actuator
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.three_step import first_estimate
@@ -19,6 +18,7 @@ from identification.estimation.windowed_run.run_errors import judge
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.experiment.information import information
 from identification.experiment.structures import looked_for, structures, told_apart
+from identification.model.estimates import NORMAL_95
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
 from identification.thresholds import GATE_MARGIN, WIDEST_SD

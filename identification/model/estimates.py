@@ -1,7 +1,7 @@
 """What an identification gives: estimates with intervals, and the reason where there is none."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -14,6 +14,7 @@ from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.bad_samples import BadSamples
 
 Drive = Literal["command", "force"]
+NORMAL_95 = 1.96  # deviations to either side that hold 95 % of a normal spread
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ class KarnoppFit:
     that it is sooner than the next sample. surroundings: what acts beside the applied force, which
     was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
     left: share and root mean square [N] of the force that the equation of motion leaves, where it
-    was fitted alone.
+    was fitted alone; falling: slopes below 0 [N s/m] with which friction falls with speed there, as
+    F_vp and F_vn, which predict a motion and are not simulated.
     """
 
     friction: Karnopp
@@ -95,6 +97,7 @@ class KarnoppFit:
     command_period: float | None = None
     surroundings: Surroundings = NO_SURROUNDINGS
     left: tuple[float, float] | None = None
+    falling: Mapping[str, Estimate] = field(default_factory=dict)
 
     @property
     def imposed(self) -> bool:

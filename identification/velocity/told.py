@@ -8,8 +8,8 @@ from scipy.stats import t as student
 
 from identification.arrays import BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import NORMAL_95, told_estimate
-from identification.model.estimates import Estimate
+from identification.estimation.estimates import told_estimate
+from identification.model.estimates import NORMAL_95, Estimate
 from identification.thresholds import EVENTS_NEEDED
 from identification.velocity.fit import WIDEST_ZONE, ValveFit, bounds_of
 from identification.velocity.model import NUMBERS, Valve

@@ -35,7 +35,7 @@ from identification.estimation.fit import (
     leaves_much,
 )
 from identification.estimation.gauss_newton import Minimum
-from identification.estimation.imposed_motion import is_unexplained, predicts_as_much
+from identification.estimation.imposed_motion import is_unexplained
 from identification.estimation.recorded_logs import chosen_drive, recorded_logs
 from identification.estimation.regressed_plant import inertia_is_lost
 from identification.estimation.regression.effect_rows import EffectRows
@@ -46,6 +46,7 @@ from identification.estimation.regression.equation_rows import (
     REST,
     MotionLog,
 )
+from identification.estimation.regression.force_terms import predicts_as_much
 from identification.estimation.regression.held_command import told_share
 from identification.estimation.regression.row_fit import RowFit, rough
 from identification.estimation.regression.weighted_rows import Fitted, Rows

@@ -177,6 +177,7 @@ class ModelFile:
     identifiability: tuple[Told, ...] = ()
     lag: Estimate | None = None
     resonance: Mapping[str, Estimate] | None = None
+    falling: Mapping[str, Estimate] = field(default_factory=dict)
     schema: Literal["model/1"] = "model/1"
 
     def __post_init__(self) -> None:
@@ -188,8 +189,12 @@ class ModelFile:
         for name in NAMES:
             if name not in self.friction:
                 raise BadModel(f"[friction] has no {name!r}; add it with a value, or null")
+        for name in self.falling:
+            if name not in VISCOUS_NAMES:
+                raise BadModel(f"[falling] unknown key {name!r}{nearest(name, VISCOUS_NAMES)}")
         effects = {f"effects.{key}": found for key, found in self.effects.items()}
-        tables = {"friction": self.friction, "actuator": self.actuator or {}, **effects}
+        drive, falling = self.actuator or {}, self.falling
+        tables = {"friction": self.friction, "actuator": drive, "falling": falling, **effects}
         for table, found in tables.items():
             for name, estimate in found.items():
                 _check_estimate(f"[{table}.{name}]", estimate)
@@ -206,7 +211,9 @@ class Model(ModelFile):
     the logs lie from the model, each alone; bad_samples: what was set aside of them; controller:
     the one that the machine has now; identifiability: what the logs could tell before a fit, empty
     where not asked; lag: of the motion behind the force's column [s], None where none shows;
-    resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`).
+    resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`);
+    falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed: of a motion
+    that is predicted, never of one that is simulated.
     library: where the effects' equations are. read: what to say of its file, a
     line for each value in another unit than ours.
     """
@@ -220,18 +227,8 @@ class Model(ModelFile):
 
     @property
     def karnopp(self) -> Karnopp:
-        """The nine that simulations use; assumed ones where the log does not tell them.
-
-        Friction that falls with speed is constant there: it would drive the body.
-        """
-        values = {name: used(self.friction[name]) for name in NAMES}
-        return Karnopp(**{k: max(x, 0.0) if k in VISCOUS_NAMES else x for k, x in values.items()})
-
-    @property
-    def falling(self) -> tuple[float, float]:
-        """Slopes at most 0 [N s/m] with which friction up and down falls with speed."""
-        up, down = (min(used(self.friction[name]), 0.0) for name in VISCOUS_NAMES)
-        return up, down
+        """The nine that simulations use; assumed ones where the log does not tell them."""
+        return Karnopp(**{name: used(self.friction[name]) for name in NAMES})
 
     @property
     def simulated(self) -> Plant:

@@ -30,6 +30,7 @@ def model_document(model: Model) -> dict[str, Any]:
         key: {name: as_number(value) for name, value in found.items()}
         for key, found in model.effects.items()
     }
+    document["falling"] = {name: as_number(one) for name, one in model.falling.items()}
     document["lag"] = None if model.lag is None else as_number(model.lag)
     if model.resonance is not None:
         document["resonance"] = {name: as_number(one) for name, one in model.resonance.items()}
@@ -80,6 +81,7 @@ def in_si(found: ModelFile, library: Library) -> Model:
     in_units = replace(
         found,
         friction={n: in_unit(e, friction[n], f"[friction.{n}]") for n, e in found.friction.items()},
+        falling={n: in_unit(e, friction[n], f"[falling.{n}]") for n, e in found.falling.items()},
         actuator=drive
         and {n: in_unit(e, actuator[n], f"[actuator.{n}]") for n, e in drive.items()},
         effects=effects,

@@ -112,6 +112,7 @@ def identify(
         effects=surrounding_effects(fit.surroundings, rig),
         lag=lag_estimate(fit.surroundings),
         resonance=resonance_of(fit.surroundings, rig),
+        falling=fit.falling,
     )
     known = with_own_logs(model_in_force(model, ""), logs, alone)
     return replace(model, own_logs=known.own_logs), fit

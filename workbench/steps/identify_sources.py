@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import NORMAL_95, told_estimate
-from identification.model.estimates import Estimate, KarnoppFit
+from identification.estimation.estimates import told_estimate
+from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, without_end
 from workbench.documents.model import Model

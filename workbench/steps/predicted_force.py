@@ -11,12 +11,13 @@ from identification.effects._places import Place
 from identification.errors import BadLog
 from identification.log import Log
 from identification.model.inverse_model import SURE_SLIDING, Smoothing, force_predicted
+from identification.model.karnopp import VISCOUS_NAMES
 from identification.model.plant import Motor, Plant
 from identification.signals.differentiate import Motion, differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
 from identification.simulation.effect_table import effect_table, signal_table
-from workbench.documents.model import Model
+from workbench.documents.model import Model, used
 
 REVERSALS = 2  # substitutions by which a transducer's reading is inverted
 
@@ -35,7 +36,8 @@ def seen_moving(model: Model, log: Log) -> Plant:
 
 def force_by_model(model: Model, log: Log, how: Smoothing) -> Array:
     """Force that the model needs for a motion that was measured [N], (n,)."""
-    return force_needed(log, seen_moving(model, log), how, model.falling)
+    up, down = (used(model.falling[k]) if k in model.falling else 0.0 for k in VISCOUS_NAMES)
+    return force_needed(log, seen_moving(model, log), how, (up, down))
 
 
 def force_needed(

@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 
 from identification.effects._library import built_in
 from identification.errors import BadLog, NotIdentifiable
-from identification.estimation.estimates import NORMAL_95
 from identification.estimation.first_look import FirstLook, first_look
 from identification.estimation.recorded_logs import led_by_rig, recorded_logs
 from identification.estimation.regression.standstill import MEAN, breakaways, rest_stretches
 from identification.estimation.regression.three_step import first_estimate
 from identification.experiment.identifiability import tellable_effects
 from identification.log import Log, Rig
-from identification.model.estimates import Drive, KarnoppFit
+from identification.model.estimates import NORMAL_95, Drive, KarnoppFit
 from identification.model.surroundings import NO_SURROUNDINGS, Surroundings
 from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples

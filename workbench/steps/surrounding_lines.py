@@ -2,8 +2,8 @@
 
 import math
 
-from identification.estimation.estimates import NORMAL_95
 from identification.log import Rig
+from identification.model.estimates import NORMAL_95
 from identification.model.plant import units_of
 from identification.model.resonance import Resonance
 from identification.model.size import Size

@@ -45,6 +45,7 @@ STILL_UNSURE = 0.8  # of the others, at most, that more smoothing may leave; a b
 MECHANICAL, ACTUATOR, REST, BREAKAWAY = "mechanical", "actuator", "rest", "breakaway"
 EQUATIONS = (MECHANICAL, ACTUATOR, REST, BREAKAWAY)
 FIVE = ("m", "F_cp", "F_cn", "F_vp", "F_vn")
+NOTHING_KNOWN = np.array([1.0, 0.0, 0.0, 0.0, 0.0])  # a body of 1 kg alone, before a first estimate
 CONTROL_LAGS = 25  # samples of the position that a controller's force is taken to depend on
 OF_FILTER = 0.01  # of the fast content, that a filter cut short and roundoff may leave
 OF_FORCE = 1e-5  # of the force's spread, noise of it that is of no account
@@ -236,7 +237,7 @@ def _left_of_force(one: MotionLog) -> float:
     No more than that is noise: what its controller makes of a noise that no signal shows was given
     to the motor too, and is none.
     """
-    rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+    rows = mechanical(one, NOTHING_KNOWN)
     if len(rows.b) < FEWEST_LEFT:
         return np.inf
     rest = rows.b - rows.X @ np.linalg.lstsq(rows.X, rows.b, rcond=1e-12)[0]

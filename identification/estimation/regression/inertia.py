@@ -5,7 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.arrays import Array
-from identification.estimation.regression.equation_rows import MotionLog, mechanical
+from identification.estimation.regression.equation_rows import (
+    NOTHING_KNOWN,
+    MotionLog,
+    mechanical,
+)
 
 # Of the force's quick changes, that inertia explains of a body that is free
 SHOWN_BY_INERTIA = 0.15
@@ -30,7 +34,7 @@ def inertia_has_no_part(logs: Sequence[MotionLog]) -> bool:
     """
     columns, forces, noise = [], [], 0.0
     for one in logs:
-        rows = mechanical(one, np.array([1.0, 0.0, 0.0, 0.0, 0.0]))
+        rows = mechanical(one, NOTHING_KNOWN)
         start = one.sliding.start
         after = np.searchsorted(start, start + one.sliding.length)
         pairs = np.flatnonzero(after < len(start))

@@ -14,6 +14,7 @@ from identification.estimation.regression.equation_rows import (
     BREAKAWAY,
     EQUATIONS,
     MECHANICAL,
+    NOTHING_KNOWN,
     REST,
     MotionLog,
 )
@@ -154,7 +155,7 @@ def first_stage(
     logs: Sequence[MotionLog], by_command: bool
 ) -> tuple[EffectRows, dict[str, RowFit]]:
     """The model without effects."""
-    first = np.array([1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0])
+    first = NOTHING_KNOWN, np.array([0.0, 0.0, 0.0])
     return settled_fits(EffectRows(tuple(logs), *first, by_command))
 
 

@@ -1,7 +1,7 @@
 """Weighted rows of a regression, and their least squares with parameters never below 0."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,13 @@ class Rows:
     names: tuple[str, ...]
     lost: float = 0.0
     positive: frozenset[str] = NEVER_NEGATIVE
+
+    def at(self, kept: BoolArray) -> "Rows":
+        """The rows of a mask (r,)."""
+        return replace(
+            self, b=self.b[kept], X=self.X[kept], sd=self.sd[kept], block=self.block[kept],
+            speed=self.speed[kept],
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +74,15 @@ def solve_rows(
     theta = non_negative(least_squares, A.shape[1], none if positive is None else positive)
     residual = c - A @ theta
     return Fitted(theta, residual, float(np.sum(residual[mask] ** 2)))
+
+
+def left_unseen(rows: Rows) -> Array:
+    """What is left (r,) of each block by the least squares of all others."""
+    left = np.zeros(len(rows.b))
+    for block in np.unique(rows.block):
+        out = rows.block == block
+        left[out] = (rows.b - rows.X @ solve_rows(rows, ~out).theta)[out]
+    return left
 
 
 def spread_of_left_out(each: Array) -> Array:

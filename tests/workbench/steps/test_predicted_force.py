@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.log import Log
+from identification.model.estimates import Estimate
 from identification.model.inverse_model import Smoothing
 from identification.model.karnopp import Karnopp
 from tests.chain import model_of
@@ -49,12 +50,11 @@ def test_a_band_that_no_log_told_holds_no_body_that_is_seen_to_slide() -> None:
 def test_friction_that_falls_with_speed_predicts_and_is_not_simulated() -> None:
     log, how = swing(), Smoothing()
     narrow = replace(WIDE, dv_p=1e-3, dv_n=-1e-3, F_vp=0.0)
-    falls = not_told(model_of(narrow), F_vp=-20.0)
-    assert falls.falling == (-20.0, 0.0)
+    falls = replace(model_of(narrow), falling={"F_vp": Estimate(-20.0, "N s/m", 1.0, -22.0, -18.0)})
     assert falls.karnopp.F_vp == 0.0
     up = 0.3 * np.cos(3.0 * log["t"]) > 0.28
     constant = force_needed(log, falls.simulated, how)
     assert force_by_model(falls, log, how)[up] - constant[up] == pytest.approx(-5.8, abs=0.3)
-    steep = not_told(model_of(narrow), F_vp=-1e3)
+    steep = replace(falls, falling={"F_vp": Estimate(-1e3, "N s/m", 1.0, -1002.0, -998.0)})
     inertia = log["y"][up] * -9.0
     assert force_by_model(steep, log, how)[up] == pytest.approx(inertia, abs=0.05)  # never drives

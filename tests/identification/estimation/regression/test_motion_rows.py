@@ -99,7 +99,9 @@ def test_friction_that_falls_with_speed_is_found_but_called_no_viscous_friction(
     log = swinging((0.0, 9.0, 5.0, -12.0, 0.0), noise_F=0.1)
     fit = fit_imposed(recorded_logs([log], Rig("force"), "force"), np.random.default_rng(0), "led")
     up, down = fit.estimates["F_vp"], fit.estimates["F_vn"]
-    assert up.value is None and up.assumed == pytest.approx(-12.0, rel=0.05)
+    assert up.value is None and up.assumed == 0.0
+    assert fit.falling.keys() == {"F_vp"}
+    assert fit.falling["F_vp"].value == pytest.approx(-12.0, rel=0.05)
     assert "falls with speed" in str(up.reason)
     assert down.value is None and "constant friction predicts as much" in str(down.reason)
     assert fit.estimates["F_cp"].value == pytest.approx(9.0, rel=0.02)

@@ -1,0 +1,92 @@
+"""The force equation by least squares, with the fewest terms of friction that predict.
+
+Columns are m, F_cp, F_cn, F_vp, F_vn, as `motion_rows` has them.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.arrays import Array
+from identification.arx.residual_tests import effective_samples
+from identification.estimation.regression.motion_rows import OF_EQUATION
+from identification.estimation.regression.row_fit import rms
+from identification.estimation.regression.weighted_rows import Rows, left_unseen, stacked
+from identification.model.estimates import NORMAL_95
+from identification.thresholds import HARDLY_MORE
+
+# Columns of viscous friction that may stand beside the others
+SPEED_COLUMNS = ((), (3,), (4,), (3, 4))
+COLUMN_SETS = tuple(
+    sorted(((*mass, 1, 2, *speed) for mass in ((), (0,)) for speed in SPEED_COLUMNS), key=len)
+)
+
+
+@dataclass(frozen=True)
+class ForceFit:
+    """Columns used, coefficients (k,), covariance (k, k), residuals a log, share of inertia in the
+    force."""
+
+    used: tuple[int, ...]
+    theta: Array
+    covariance: Array
+    residuals: tuple[Array, ...]
+    rms: float
+    relative: float
+    share: float
+
+
+def fewest_terms(data: Sequence[Rows]) -> ForceFit:
+    """The fewest columns that leave hardly more of the force, on blocks that the fit has not seen,
+    than those that leave least; a mass that comes out below 0 is none, nor is viscous friction
+    that would take Coulomb friction below 0: at speeds alike it stands for anything."""
+    every = [fitted(data, used) for used in COLUMN_SETS]
+    fits = [one for one in every if _may_be(one)]
+    rows = stacked(data)
+    left = [rms(left_unseen(replace(rows, X=rows.X[:, one.used]))) for one in fits]
+    best = next(x for x, one in zip(fits, left, strict=True) if predicts_as_much(one, min(left)))
+    return replace(best, share=every[-1].share)
+
+
+def _may_be(fit: ForceFit) -> bool:
+    """Whether a body can have these parameters, and each term of speed stands out of its deviation;
+    a constant force alone may stand in F_c. A slope that may as well be none would leave the
+    Coulomb level beside it open."""
+    found = dict(zip(fit.used, fit.theta, strict=True))
+    sd = dict(zip(fit.used, np.sqrt(np.diag(fit.covariance)), strict=True))
+    shown = [(level, v) for level, v in ((1, 3), (2, 4)) if v in found]
+    sure = all(abs(found[v]) > NORMAL_95 * sd[v] and found[level] >= 0.0 for level, v in shown)
+    return sure and not found.get(0, 1.0) < 0.0
+
+
+def predicts_as_much(left: float, least: float) -> bool:
+    """Whether fewer columns, which leave this of a force that they have not seen, will do."""
+    return left <= HARDLY_MORE * least
+
+
+def fitted(data: Sequence[Rows], used: tuple[int, ...]) -> ForceFit:
+    """Weighted least squares of these columns."""
+    noise = np.concatenate([part.sd for part in data])
+    columns = np.concatenate([part.X for part in data])[:, used]
+    force = np.concatenate([part.b for part in data])
+    weight = np.median(noise) / noise
+    chosen = columns * weight[:, np.newaxis]
+    size = np.maximum(np.linalg.norm(chosen, axis=0), 1e-300)
+    theta = np.linalg.lstsq(chosen / size, weight * force, rcond=None)[0] / size
+    residual = force - columns @ theta
+    parts = tuple(np.split(residual, np.cumsum([len(part.b) for part in data])[:-1]))
+    independent = effective_samples([part for part in parts if len(part) > 8])
+    inverse = np.linalg.pinv((chosen / size).T @ (chosen / size)) / np.outer(size, size)
+    square = float(np.mean((weight * residual) ** 2))
+    variance = square * len(residual) / max(independent - len(used), 1.0)
+    inertia = abs(float(theta[0])) * float(np.std(columns[:, 0])) / max(np.std(force), 1e-300)
+    return ForceFit(
+        used=used,
+        theta=theta,
+        covariance=inverse * variance + np.diag((OF_EQUATION * theta) ** 2),
+        residuals=parts,
+        rms=rms(residual),
+        relative=float(np.linalg.norm(residual) / max(float(np.linalg.norm(force)), 1e-300)),
+        share=float(inertia),
+    )
