@@ -56,7 +56,7 @@ lint: environment
 	$(BIN)/ruff format --check .
 
 types: environment
-	$(BIN)/mypy
+	$(BIN)/mypy --num-workers $(WORKERS)
 
 floors: environment
 	$(BIN)/lint-imports

@@ -105,16 +105,25 @@ def kalman_step(c: Array, s: Array, h: float, y: float, F: float) -> None:
     e = np.exp(-f * h / c[K_M])
     gain = (1.0 - e) / f if f * h > 1e-9 * c[K_M] else h / c[K_M]
     s[0], s[1] = s[0] + h * s[1], e * s[1] + gain * (F - s[2])
-    A = np.array([[1.0, h, 0.0], [0.0, e, -gain], [0.0, 0.0, 1.0]])
-    P = A @ s[3:].reshape(3, 3) @ A.T
-    P[1, 1] += c[K_QV] ** 2 * h
-    P[2, 2] += c[K_QF] ** 2 * h
-    k = P[:, 0].copy() / (P[0, 0] + c[K_R_Y] ** 2)
-    off = y - s[0]
+    # P = A P A' + Q, row by row in s[3:]: numpy's matrix products compile for ten seconds.
+    for j in range(3):
+        s[3 + j] += h * s[6 + j]
+        s[6 + j] = e * s[6 + j] - gain * s[9 + j]
+    for i in range(3, 12, 3):
+        s[i] += h * s[i + 1]
+        s[i + 1] = e * s[i + 1] - gain * s[i + 2]
+    s[7] += c[K_QV] ** 2 * h
+    s[11] += c[K_QF] ** 2 * h
+    off, variance = y - s[0], s[3] + c[K_R_Y] ** 2
+    p_0, p_1, p_2 = s[3], s[4], s[5]
     for i in range(3):
-        s[i] += k[i] * off
-    P -= np.outer(k, P[0].copy())
-    s[3:] = 0.5 * (P + P.T).reshape(9)
+        k = s[3 + 3 * i] / variance
+        s[i] += k * off
+        s[3 + 3 * i] -= k * p_0
+        s[4 + 3 * i] -= k * p_1
+        s[5 + 3 * i] -= k * p_2
+    for i, j in ((4, 6), (5, 9), (8, 10)):
+        s[i] = s[j] = 0.5 * (s[i] + s[j])
 
 
 @compiled_exact

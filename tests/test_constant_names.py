@@ -4,14 +4,14 @@ import ast
 from collections.abc import Iterator
 from pathlib import Path
 
-from tests.test_lengths import ROOT, files
+from tests.test_lengths import ROOT, files, tree
 
 TOLERATED = {"EFFECT"}  # every effect's file has one, by contract
 
 
 def assigned(path: Path) -> Iterator[str]:
     """Names that the module gives a value."""
-    for node in ast.parse(path.read_text("utf-8")).body:
+    for node in tree(path).body:
         if isinstance(node, ast.Assign | ast.AnnAssign):
             targets = node.targets if isinstance(node, ast.Assign) else [node.target]
             for one in (part for target in targets for part in ast.walk(target)):

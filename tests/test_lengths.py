@@ -5,6 +5,7 @@ The linter counts branches, this counts lines and arguments.
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -40,9 +41,15 @@ def too_wide(path: Path) -> Iterator[str]:
             yield f"{path.relative_to(ROOT).as_posix()}: {node.name} takes {count}"
 
 
+@cache
+def tree(path: Path) -> ast.Module:
+    """The file's syntax."""
+    return ast.parse(path.read_text("utf-8"))
+
+
 def functions(path: Path) -> Iterator[tuple[ast.FunctionDef | ast.AsyncFunctionDef, set[str]]]:
     """Functions of the file with the names of their decorators."""
-    for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             called = (d.func if isinstance(d, ast.Call) else d for d in node.decorator_list)
             yield node, {ast.unparse(name) for name in called}

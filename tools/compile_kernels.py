@@ -11,7 +11,7 @@ import pandas as pd
 import workbench as wb
 from identification.effects._library import built_in
 from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
-from workbench.steps.kernels_ahead import servo_compiled_ahead
+from workbench.steps.kernels_ahead import fits_compiled_ahead
 
 PLAIN, RICH = "paper_table1_rich", "demo"
 SECONDS = 6.0
@@ -23,9 +23,9 @@ def short(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def main() -> None:
-    """A short log through identification, drift and tracing, every effect's run; then validation,
-    whose kernels a second process has compiled by then."""
-    with servo_compiled_ahead():
+    """A short log through identification, drift and tracing, every effect's run, then validation,
+    while a second process compiles what a fit comes to."""
+    with fits_compiled_ahead():
         log = short(wb.simulate(PLAIN).frame)
         model = wb.identify(log, PLAIN)
         wb.drift(model, log.assign(y=np.round(log["y"], 6)), PLAIN)

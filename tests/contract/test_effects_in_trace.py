@@ -96,6 +96,7 @@ def test_what_the_plain_model_takes_up_is_no_discovery(key: str) -> None:
     assert found.verdict == "none" and found.effects == ()
 
 
+@pytest.mark.slow
 def test_gravity_is_told_beside_friction_and_is_no_discovery() -> None:
     logs = [pendulum(1, 3.0, seconds=12.0)], [pendulum(2, 3.0, seconds=12.0)]
     found = trace(*logs, TURNING, built_in(), np.random.default_rng(0))

@@ -505,6 +505,7 @@ def traced() -> list[Traced]:
     return []
 
 
+@pytest.mark.slow
 def test_demo_runs_the_chain(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch,
     traced: list[Traced],

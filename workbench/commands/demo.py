@@ -40,13 +40,13 @@ def command(seed: int, as_json: bool, out: Path | None) -> int:
     from workbench.report.trace import traced_view
     from workbench.report.validation_tables import missed
     from workbench.steps.demo import demonstrate
-    from workbench.steps.kernels_ahead import servo_compiled_ahead
+    from workbench.steps.kernels_ahead import fits_compiled_ahead
 
     card = load_card(card_path(RECIPE))
     with results("demo", out) as folder:
         with progress("demo", 1.0, as_json=as_json) as bar:
             course = Course(bar, DEMO_STAGES, time.monotonic, told=bar.told)
-            with moving(course), servo_compiled_ahead():
+            with moving(course), fits_compiled_ahead():
                 found = demonstrate(card, folder.path, seed, course.report)
         traced, validation = found.traced, found.validation
         rotary = traced.model.rotary

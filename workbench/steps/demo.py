@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,10 +21,6 @@ from workbench.steps.loop_figures import Traces
 from workbench.steps.simulate import as_columns, record, truth
 from workbench.steps.trace import Traced, trace_sources
 from workbench.steps.validate import Validation, validate
-
-if TYPE_CHECKING:
-    pass
-
 
 HELD_OUT_SEED = 100  # added to a recipe's seed for the run that no fit sees
 

@@ -1,7 +1,7 @@
-"""Kernels of the servo compiled by a process of their own, while a first run has not come to them.
+"""Kernels of a fit compiled by a process of their own, while a first run has not come to them.
 
-Numba compiles one kernel at a time in a process. A chain that identifies first and simulates a loop
-last would compile for a minute on one core what another core could have ready by then.
+Numba compiles one kernel at a time in a process. A chain that simulates its loop first and
+identifies then would compile for a minute on one core what another core could have ready by then.
 
     python -m workbench.steps.kernels_ahead
 """
@@ -14,36 +14,39 @@ from pathlib import Path
 
 import numpy as np
 
+LONG, SAMPLE = 4.0, 2e-3  # of the log that is fitted, and between its samples
 
-def compile_servo() -> None:
-    """A few samples of a servo without and with an effect, which leave its kernels in the cache."""
-    from design.loop import ForcePI
-    from design.pid import pd_to_rst
-    from design.servo import Servo, simulate_servo
+
+def compile_fits() -> None:
+    """A short log through a fit, an ARX fit, a run with an effect, whose kernels this leaves in the
+    cache. The effect's is last: most of what it calls has come from the simulated loop by then."""
+    from identification.arx.model import fit_arx
     from identification.effects._library import built_in
-    from identification.model.karnopp import Karnopp
-    from identification.model.plant import Actuator, Plant
+    from identification.estimation.fit import fit_plant
+    from identification.log import Log, Rig
+    from workbench.cards.effect_runs import HYDRAULIC, run_with, trial_log, typical
 
-    friction = Karnopp(1.0, 10.0, 10.0, 100.0, 100.0, 0.01, -0.01, 12.0, -12.0)
-    effect = built_in()["stribeck"]
-    acting = effect.acting({one.name: one.typical for one in effect.params})
-    h = 1e-3
-    servo = Servo(pd_to_rst(200.0, 0.1, 0.2, h), ForcePI(0.02, 0.05))
-    for effects in ((), (acting,)):
-        simulate_servo(Plant(friction, Actuator(1e4, 1e3), effects), servo, np.zeros(8), h)
+    driven = trial_log(LONG, h=SAMPLE)
+    run = run_with(HYDRAULIC, driven)
+    noise = np.random.default_rng(0).normal(size=(2, len(run.y)))
+    seen = {"y": run.y + 1e-6 * noise[0], "F": run.F + 0.1 * noise[1]}
+    log = Log("made", {"t": driven["t"], "u": driven["u"], **seen})
+    fit_plant([log], np.random.default_rng(0), rig=Rig("force"))
+    fit_arx([(driven["u"], run.y)], 2, 1, 1, SAMPLE)
+    run_with(HYDRAULIC, driven, typical(built_in()["stribeck"]))
 
 
 def are_compiled() -> bool:
-    """Whether the cache holds kernels of the servo."""
-    from design.servo_loop import servo_kernel
+    """Whether the cache holds the kernel of a fit's search."""
+    from identification.estimation.plain_search.cost import cost_kernel
 
-    cache = Path(servo_kernel.stats.cache_path)  # type: ignore[attr-defined]
-    return any(cache.glob("servo_loop.servo_kernel-*.nbi"))
+    cache = Path(cost_kernel.stats.cache_path)  # type: ignore[attr-defined]
+    return any(cache.glob("cost.cost_kernel-*.nbi"))
 
 
 @contextmanager
-def servo_compiled_ahead() -> Iterator[None]:
-    """Within the block another process compiles the kernels of the servo, if they are not yet."""
+def fits_compiled_ahead() -> Iterator[None]:
+    """Within the block another process compiles the kernels of fits, if they are not yet."""
     if are_compiled():
         yield
         return
@@ -57,4 +60,4 @@ def servo_compiled_ahead() -> Iterator[None]:
 
 
 if __name__ == "__main__":
-    compile_servo()
+    compile_fits()

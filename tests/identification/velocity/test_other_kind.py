@@ -1,6 +1,7 @@
 """A body against friction predicts its own log better than a valve does, and no valve's."""
 
 import numpy as np
+import pytest
 
 from identification.velocity.fit import fit
 from identification.velocity.other_kind import body_squares
@@ -17,6 +18,7 @@ def test_a_valve_is_no_body() -> None:
     assert clearly_better(held, body_squares(record, found.valve))[0]
 
 
+@pytest.mark.slow
 def test_a_body_is_no_valve() -> None:
     record = recorded([made_motor(3)])
     found = fit(record)

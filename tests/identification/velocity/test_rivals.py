@@ -25,6 +25,7 @@ def slow(seed: int, valve: Valve = TRUE) -> Log:
     return made(seed, valve, h=0.02)
 
 
+@pytest.mark.slow
 def test_nothing_is_named_where_nothing_is_missing() -> None:
     found = left_by_valve(recorded([slow(60)]))
     assert (found.verdict, found.named, found.complete) == ("none", None, True)

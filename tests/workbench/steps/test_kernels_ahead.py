@@ -1,15 +1,15 @@
-"""The servo's kernels are compiled by another process where they are not yet, and only there."""
+"""The kernels of a fit are compiled by another process where they are not yet, and only there."""
 
 import subprocess
 
 import pytest
 
 from workbench.steps import kernels_ahead
-from workbench.steps.kernels_ahead import are_compiled, compile_servo, servo_compiled_ahead
+from workbench.steps.kernels_ahead import are_compiled, compile_fits, fits_compiled_ahead
 
 
 def test_a_few_samples_leave_the_kernels_in_the_cache() -> None:
-    compile_servo()
+    compile_fits()
     assert are_compiled()
 
 
@@ -19,7 +19,7 @@ def test_no_process_is_started_for_what_is_compiled(monkeypatch: pytest.MonkeyPa
 
     monkeypatch.setattr(subprocess, "Popen", refused)
     monkeypatch.setattr(kernels_ahead, "are_compiled", lambda: True)
-    with servo_compiled_ahead():
+    with fits_compiled_ahead():
         pass
 
 
@@ -33,6 +33,6 @@ def test_the_process_ends_with_the_block(monkeypatch: pytest.MonkeyPatch) -> Non
 
     monkeypatch.setattr(subprocess, "Popen", kept)
     monkeypatch.setattr(kernels_ahead, "are_compiled", lambda: False)
-    with pytest.raises(ZeroDivisionError), servo_compiled_ahead():
+    with pytest.raises(ZeroDivisionError), fits_compiled_ahead():
         raise ZeroDivisionError
     assert started[0].poll() is not None
