@@ -25,10 +25,13 @@ from identification.estimation.regression.equation_rows import (
     mechanical,
     motion_log,
 )
+from identification.estimation.regression.motion_rows import rows_and_windows
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
     OVERLAP,
+    solve_rows,
     spread_of_left_out,
+    stacked,
 )
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
@@ -135,7 +138,35 @@ def _beside(logs: Sequence[Log], rig: Rig) -> Surroundings:
         force = always if stands_out(always.value, always.sd) else NOT_SHOWN
     h = logs[0].h
     gives = rig.force_per_command if held else None
-    return Surroundings(Size(lag.value * h, lag.sd * h), force, sine, cosine, (), gives, sampled)
+    lag = Size(lag.value * h, lag.sd * h)
+    around = Surroundings(lag, force, sine, cosine, (), gives, sampled)
+    return _in_chosen_windows(around, logs, held and not sampled) if used is GRAVITY else around
+
+
+def _in_chosen_windows(around: Surroundings, logs: Sequence[Log], held: bool) -> Surroundings:
+    """The same with gravity as the windows show it that suit these logs best, where many enough."""
+    rest = [around.taken_out(log) for log in logs]
+    moved = [motion_log(log, held=held, by_command=False) for log in rest]
+    made = rows_and_windows(moved, NOTHING_KNOWN)
+    rows = stacked([one.rows for one in made])
+    if len(rows.b) < FEWEST_WINDOWS:
+        return around
+    waves = [
+        np.column_stack([one.windows.mean @ np.sin(y), one.windows.mean @ np.cos(y)])
+        for one, log in zip(made, rest, strict=True)
+        for y in (np.asarray(log["y"]),)
+    ]
+    rows = replace(rows, X=np.column_stack([rows.X, np.concatenate(waves)]))
+    more = solve_rows(rows).theta[-2:]
+    blocks = np.unique(rows.block)
+    spread = spread_of_left_out(
+        np.array([solve_rows(rows, np.asarray(rows.block != k)).theta[-2:] for k in blocks])
+    )
+    sine, cosine = (
+        Size(one.value + float(off), float(sd))
+        for one, off, sd in zip((around.sine, around.cosine), more, spread, strict=True)
+    )
+    return replace(around, sine=sine, cosine=cosine)
 
 
 def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
