@@ -125,7 +125,8 @@ def judged_estimate(
     reasons = _not_judged(model, found, log, (change, measured + np.diag(varied)), settings)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
-        why = f"{log}: it tells none of the model's parameters; " + next(iter(reasons.values()), "")
+        first = next(iter(reasons.values()), "")
+        why = f"{log}: none of the model's parameters is identifiable; {first}"
         return _silent(log, "not_judged", why, reasons, found, state)
     at = np.flatnonzero(told)
     here = LogChange(
@@ -229,12 +230,12 @@ def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: Dr
         return ""
     names = asked or list(seen)
     said = ", ".join(
-        f"{name} from {100 * seen[name]:.2g} % on" if name in seen else f"{name} not at all"
-        for name in names
+        f"{name} {100 * seen[name]:.2g} %" if name in seen else f"{name} none" for name in names
     )
     return (
-        f"{log}: no alarm, but a change of {100 * limit:.3g} % could not have been seen ({said});"
-        " log for longer, with more strokes both ways, or judge by the mean over more logs"
+        f"{log}: no alarm, but a change of {100 * limit:.3g} % is below the minimum detectable"
+        f" change ({said}); log for longer, with more strokes both ways, or test the mean over more"
+        " logs"
     )
 
 
@@ -249,9 +250,9 @@ def _not_judged(
     for i, name in enumerate(model.names):
         sd = float(np.sqrt(covariance[i, i]))
         if name in model.untold:
-            out[name] = f"the model in force does not tell it ({model.untold[name]})"
+            out[name] = f"not identified in the active model ({model.untold[name]})"
         elif name not in found.names:
-            out[name] = found.untold.get(name, f"{log}: not among what this log tells")
+            out[name] = found.untold.get(name, f"{log}: not identifiable from this log")
         elif name in found.untold:
             out[name] = found.untold[name]
         elif name in NAMES and at_bound(float(change[i])):

@@ -49,11 +49,11 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     if model.imposed:
         if model.plant.effects:
             raise NotIdentifiable(
-                f"{log.name}: the motion is imposed, and effects then show in the force equation"
+                f"{log.name}: prescribed motion, in which effects show in the force equation"
                 " only; trace this log together with those of the model"
             )
         recorded = recorded_logs([log], model.rig, drive)
-        found = fit_imposed(recorded, rng, "as the model in force")
+        found = fit_imposed(recorded, rng, "as the active model")
         return _of_fit(found, LIKE * max(model.chi_square, 1.0))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
     # Of a body that is not led, the force equation alone says that its run is not followed.

@@ -82,7 +82,7 @@ class InForce:
         object.__setattr__(self, "covariance", frozen(self.covariance))
         if self.values.shape != (d,) or self.covariance.shape != (d, d):
             raise BadModel(
-                f"model in force: {d} names, values {self.values.shape}, covariance"
+                f"active model: {d} names, values {self.values.shape}, covariance"
                 f" {self.covariance.shape}; one value a name and a square covariance needed"
             )
 

@@ -196,7 +196,7 @@ def _independent(name: str, columns: Array) -> None:
     condition = float(np.linalg.cond(columns / size))
     if condition > MAX_CONDITION:
         raise NotIdentifiable(
-            f"{name}: mass, Coulomb and viscous friction cannot be told apart (condition"
+            f"{name}: mass, Coulomb and viscous friction are not separable (condition"
             f" {condition:.0f}, at most {MAX_CONDITION:.0f} needed); log motion of varied speed"
         )
 

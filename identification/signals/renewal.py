@@ -44,7 +44,7 @@ def renewed(log: Log) -> Renewed:
     }
     rate = 1.0 / (step * log.h)
     said = (
-        f"{log.name}: {RENEWED_AT} {rate:.3g} Hz and held in between, the log is"
+        f"{log.name}: {RENEWED_AT} {rate:.3g} Hz (zero-order hold), the log is"
         f" written at {1.0 / log.h:.3g} Hz: only new positions were used"
     )
     return Renewed(Log(log.name, signals), (said,))

@@ -52,7 +52,7 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
             continue
         spread = sd[name] * wide if np.isfinite(sd[name]) else None
         if spread is None and values[name] <= low[0] + 1e-9 * max(record.u_max, 1.0):
-            zero = "at its bound: the logs cannot tell it from 0"
+            zero = "at its bound: not significantly different from 0"
             out[name] = Estimate(None, unit[name], reason=zero, assumed=0.0)
             continue
         out[name] = told_estimate(values[name], unit[name], spread, bounds=low, beside=size)
@@ -60,7 +60,7 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
         first = f"{record.runs[0].name}: "
         why = str(out["g_p"].reason).removeprefix(first)
         raise NotIdentifiable(
-            f"{first}the position does not tell how the velocity follows the command (g_p: {why})"
+            f"{first}how the velocity follows the command is not identifiable (g_p: {why})"
         )
     return out
 
@@ -74,11 +74,12 @@ def _together(name: str, record: Record) -> str:
     """Why a number is not told from another one."""
     if name not in ("g_p", "g_n", "d_p", "d_n"):
         return (
-            f"{record.runs[0].name}: not told from the other numbers; add commands of other sizes"
+            f"{record.runs[0].name}: not separable from the other parameters; add commands of"
+            " other sizes"
         )
     way = WAYS[name[-1]][0]
     return (
-        f"{record.runs[0].name}: gain and dead zone of the {way} direction cannot be told apart;"
+        f"{record.runs[0].name}: gain and dead zone of the {way} direction are not separable;"
         " add commands of other sizes"
     )
 

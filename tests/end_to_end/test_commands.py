@@ -364,7 +364,7 @@ def test_axis_test_has_the_status_of_its_light(
         assert json.loads((tmp_path / "a/axis_test.json").read_text())["light"] == light
         assert ("next" in found) is (status == 1)
     assert main(["axis-test", log, "--card", str(card), "--out", out]) == 1
-    assert capsys.readouterr().out.startswith("YELLOW: no limits to judge by")
+    assert capsys.readouterr().out.startswith("YELLOW: no limits to test against")
     card.write_text(text + "\n[limits]\nF_cp = [6.0, 5.0]\n", encoding="utf-8")
     for arguments, said in (
         ([log, "--card", str(card)], "the lower limit first needed"),

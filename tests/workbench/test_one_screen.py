@@ -302,7 +302,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
     shown = identified_view(replace(identified(), model=model, remarks=())).screen()
-    assert "dv_p, dv_n - m/s not told: the interval is wider than the value" in words_of(
+    assert "dv_p, dv_n - m/s not identifiable: the interval is wider than the value" in words_of(
         shown.text()
     )
     assert words_of(shown.text(verbose=True)).count("excite it more") == 2

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 @click.command(
     cls=StatusCommand,
     done="green",
-    refusal="yellow or red, or the log tells nothing; the first line says why",
+    refusal="yellow or red, or nothing is identifiable from the log; the first line says why",
     epilog="Example: workbench axis-test run1.csv --card bench-a/card.toml --registry registry.db",
 )
 @click.argument("log", metavar="LOG", shell_complete=complete_file)

@@ -17,9 +17,9 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=StatusCommand,
-    refusal="the log cannot be identified as it is or tells nothing, or something of the"
-    " installation does not work",
-    epilog="Example: workbench doctor run1.csv --card card.toml --out look",
+    refusal="nothing can be identified from the log as it is, or something of the installation"
+    " does not work",
+    epilog="Example: workbench doctor run1.csv --card card.toml --out check",
 )
 @click.argument("log", required=False, shell_complete=complete_file)
 @click.option(

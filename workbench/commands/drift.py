@@ -11,9 +11,9 @@ from workbench.output import output_options, progress, results
 
 @click.command(
     cls=StatusCommand,
-    done="no drift; or NOT JUDGED, where no test alarmed but a change that matters could not have"
-    " been seen (the first line says so)",
-    refusal="drift, a changed structure, or no log that tells anything",
+    done="no drift; or INCONCLUSIVE, where no test alarmed but a change that matters is below the"
+    " minimum detectable change (the first line says so)",
+    refusal="drift, a changed structure, or no log from which anything is identifiable",
     epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json",
 )
 @click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))

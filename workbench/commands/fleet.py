@@ -128,7 +128,7 @@ def after_fleet(
     if in_registry and first.verdict in ("structure", "promoted", "refused"):
         return step("what was found, and why", "registry", "show", first.log.machine, *registry)
     beside = str(Path(first.log.path).with_name("card.toml"))
-    return step("what the log can tell", "doctor", first.log.path, "--card", card or beside)
+    return step("what the log identifies", "doctor", first.log.path, "--card", card or beside)
 
 
 def fleet_view(done: "Report", out: Path) -> "Screen":

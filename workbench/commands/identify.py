@@ -21,7 +21,7 @@ from workbench.steps.stages import IDENTIFY_STAGES
 
 @click.command(
     cls=StatusCommand,
-    refusal="the logs tell nothing",
+    refusal="nothing is identifiable from the logs",
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
 @click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)

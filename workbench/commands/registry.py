@@ -135,7 +135,7 @@ def diff(
                 type=click.Path(path_type=Path))  # fmt: skip
 @click.option("--validation", type=click.Path(path_type=Path), metavar="FILE",
               help="validation.json of the design.")  # fmt: skip
-@click.option("--promote", is_flag=True, help="Put it in force as well.")
+@click.option("--promote", is_flag=True, help="Make it the active version as well.")
 @effects_option
 @decision_options
 @registry_options
@@ -176,7 +176,7 @@ def add(
         current = found.in_force(machine)
         if promote and (current is None or current.number != version.number):
             found.promote(machine, version.number, reason=reason, by=who, now=now)
-    state = "in force" if promote else "not in force yet: 'workbench registry promote'"
+    state = "active" if promote else "not active yet: 'workbench registry promote'"
     said = [f"{machine}: version {version.number}, {state}", *(f"note: {r}" for r in remarks)]
     emit({**asdict(version), "remarks": remarks}, as_json, lambda: "\n".join(said))
 
@@ -230,9 +230,7 @@ def retry(
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
-    said = (
-        f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none set aside"
-    )
+    said = f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none excluded"
     emit({"machine": machine, "logs": files}, as_json, lambda: said)
 
 
@@ -250,7 +248,7 @@ def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     found.machine(machine)
     version = found.in_force(machine) if number is None else found.version(machine, number)
     if version is None:
-        raise BadRegistry(f"{machine}: no version in force; name a version's number")
+        raise BadRegistry(f"{machine}: no active version; name a version's number")
     return version
 
 
@@ -269,4 +267,4 @@ def _write(found: "Registry", version: "Version", out: Path) -> None:
 
 
 def _said(decision: "Decision") -> str:
-    return f"{decision.machine}: version {decision.number} in force ({decision.reason})"
+    return f"{decision.machine}: version {decision.number} active ({decision.reason})"

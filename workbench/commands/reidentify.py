@@ -19,7 +19,7 @@ MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 
 @click.command(
     cls=StatusCommand,
-    refusal="an alarm: drift, another structure, a log set aside",
+    refusal="an alarm: drift, another structure, an excluded log",
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
 @click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
@@ -73,7 +73,7 @@ def undelivered(alarms: "Delivery") -> str:
     if alarms.given_up:
         parts.append(f"{alarms.given_up} alarm(s) given up after a day")
     why = f" ({alarms.reason})" if alarms.reason else ""
-    return f"--webhook: {', '.join(parts)}{why}; look after the receiver"
+    return f"--webhook: {', '.join(parts)}{why}; check the receiver"
 
 
 def pass_view(done: "PassReport") -> "Screen":
@@ -82,7 +82,7 @@ def pass_view(done: "PassReport") -> "Screen":
     from workbench.registry.views import outcomes_table
     from workbench.screen import listed, screen
 
-    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"
+    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) tested"
     alarming = dict.fromkeys(o.machine for o in done.outcomes if o.verdict in ALARMING)
     then = (
         next_step(f"`workbench registry show {machine}` says what has changed, and what was done")
@@ -104,5 +104,5 @@ def remarks(done: "PassReport") -> Sequence[str]:
     if done.busy:
         out.append(f"in another worker's hands: {', '.join(done.busy)}")
     for name in done.without_model:
-        out.append(f"{name}: no model in force; 'workbench registry add {name} ...', or --first")
+        out.append(f"{name}: no active model; 'workbench registry add {name} ...', or --first")
     return out

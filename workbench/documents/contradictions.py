@@ -121,8 +121,8 @@ def _impossible_mass(found: "ModelFile", peak: float, speed: float, most: str) -
     least = found.fit.noise_y * 0.5 * sum(viscous) / speed / sqrt(samples)
     if mass.sd < least / _SHARPER:
         return (
-            f"its standard deviation would be {mass.sd:.2g} {mass.unit}, and the noise of its logs"
-            f" tells no mass better than to {least:.2g} {mass.unit}"
+            f"its standard deviation would be {mass.sd:.2g} {mass.unit}, but with the noise of its"
+            f" logs it is at least {least:.2g} {mass.unit}"
         )
     return None
 

@@ -50,7 +50,8 @@ class TablesAsked:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a table leaves uncompensated, in words; force [N or N m], None where no log tells it."""
+    """What a table leaves uncompensated, in words; force [N or N m], None where not
+    identifiable from the logs."""
 
     what: str
     force: float | None
@@ -144,7 +145,7 @@ class Compensation:
             found = self.model.friction[name]
             if found.value is None and found.at_most is not None:
                 yield (
-                    f"{name}: too small for the logs to tell, at most"
+                    f"{name}: not significantly different from 0, at most"
                     f" {number(found.at_most)} {found.unit}; the table has"
                     f" {number(found.assumed or 0.0)}"
                 )
@@ -284,7 +285,7 @@ class AtMotor:
 
 def first_of(reason: str | None) -> str:
     """What a reason says, without its advice."""
-    return (reason or "no log tells it").partition(";")[0]
+    return (reason or "not identifiable from the logs").partition(";")[0]
 
 
 def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
@@ -307,7 +308,7 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
     ):
         found = what.model.friction[name]
         if not found.known:
-            out.append(Cost(f"breakaway in {way} direction, not identified, so not told", None))
+            out.append(Cost(f"breakaway in {way} direction: not identified", None))
             continue
         limit = abs(found.value if found.value is not None else found.assumed or 0.0)
         more = limit - float(level[0])
@@ -330,7 +331,8 @@ def other_costs(what: Compensation) -> Iterator[Cost]:
             kind = "a force of place, not friction" if is_of_place(one) else "varies with place"
             yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))
         else:
-            yield Cost(f"{said}: depends on {', '.join(effect.depends_on)}, so not held", None)
+            of = ", ".join(effect.depends_on)
+            yield Cost(f"{said}: depends on {of}, so not compensated", None)
 
 
 def largest_along(model: Model, one: Acting) -> float:

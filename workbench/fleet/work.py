@@ -82,7 +82,7 @@ def _identified(item: Item, path: Path, card: Path, blank: Result) -> Result:
     if found.model.fit.adequate:
         return replace(out, verdict="identified", reason="the machine's first model")
     chi = found.model.fit.chi_square
-    reason = f"the model leaves more than noise (chi-square {chi:.3g}); 'workbench trace' tells"
+    reason = f"the model leaves more than noise (chi-square {chi:.3g}); run 'workbench trace'"
     return replace(out, verdict="inadequate", reason=reason)
 
 

@@ -38,7 +38,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     said = ""
     if len(logs) < FEWEST_EARLIER:
         said = (
-            f"{machine} has {len(logs)} judged logs that tell its parameters, at least"
+            f"{machine} has {len(logs)} tested logs with identified parameters, at least"
             f" {FEWEST_EARLIER} needed"
         )
     if state.in_force is None:
@@ -48,7 +48,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     further = [key.replace("_", " ") for key in model.effects if not _held(key)]
     if further:
         remarks.append(
-            f"by the fit of version {state.in_force.number}, in force, which has"
+            f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
         found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
@@ -57,7 +57,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     if width is not None and width.value is not None and "backlash" not in (estimates or {}):
         in_force = Estimate(width.value, width.unit, width.sd, width.low, width.high)
         estimates = {**(estimates or {}), "backlash": in_force}
-        remarks.append(f"backlash is that of version {state.in_force.number}, in force")
+        remarks.append(f"backlash is that of the active version {state.in_force.number}")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
 
 

@@ -51,7 +51,7 @@ def _said(test: DriftTest) -> str:
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
     moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
     if test.unsure:
-        moved.append(f"something that it cannot tell apart, of {', '.join(test.unsure)}")
+        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
 
 

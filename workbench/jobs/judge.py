@@ -54,7 +54,7 @@ class Chain:
             return self._first(sources)
         champion = _contender(task, self.library)
         if any(entry.sha256 == task.log.sha256 for entry in champion.model.log):
-            return Judgement("none", "the model in force was fitted on this log")
+            return Judgement("none", "the active model was fitted on this log")
         rng = np.random.default_rng(self.seed)
         state = (task.previous or {}).get("state", {})
         found = self.drift(champion.model, sources, rng, state)
@@ -221,7 +221,7 @@ def _contender(task: Task, library: Library | None) -> Contender:
                 made = read_design(_written(folder / "design.json", task.design))
         except BadModel as error:
             said = str(error).replace(f"{folder}/", "")
-            raise BadModel(f"{task.machine}: in force: {said}") from None
+            raise BadModel(f"{task.machine}: active version: {said}") from None
     return Contender(found, made)
 
 

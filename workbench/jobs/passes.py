@@ -212,7 +212,7 @@ class Pass:
         retry, settings = self._settings.patience, self._settings
         if _replaced(log, found):
             judgement = Judgement(
-                "set_aside", f"{log.file}: changed before it was judged; what it holds now counts"
+                "set_aside", f"{log.file}: changed before it was tested; its present content counts"
             )
         elif begun >= settings.attempts:
             judgement = Judgement(

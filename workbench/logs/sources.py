@@ -124,7 +124,7 @@ def refuse_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
         if source.sha256 in names:
             raise BadLog(
                 f"--test {source.file}: the same bytes as the training log"
-                f" {names[source.sha256]}; test on a log that the fit has not seen"
+                f" {names[source.sha256]}; test on a log that the fit has not used"
             )
 
 

@@ -44,7 +44,7 @@ def _panel(name: str, told: Mapping[int, Mapping[str, Any]], x: Array, label: st
     unit = str(told[int(at[0])].get("unit", ""))
     return Panel(
         label, f"{name} [{unit}]",
-        [Line("in force", place, column("before"), "reference", "dashed"),
+        [Line("active model", place, column("before"), "reference", "dashed"),
          Line("by each log", place, column("after"), "measured")],
         areas=[Area("95 %", place, column("low"), column("high"), "band")], height=PARAMETER_HEIGHT,
     )  # fmt: skip

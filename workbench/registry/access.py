@@ -63,7 +63,7 @@ class Access:
         with self._database.writing() as session:
             if session.scalar(select(AccessTokenRow.id).where(AccessTokenRow.name == name)):
                 raise BadRegistry(
-                    f"token {name!r}: is there already, in force or revoked; give another name"
+                    f"token {name!r}: exists already, active or revoked; give another name"
                 )
             row = AccessTokenRow(name=name, role=role, sha256=hashed(secret), made_by=by, at=now)
             session.add(row)

@@ -297,7 +297,7 @@ def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLo
 def _of_older(judgement: Judgement, log: SeenLog, newer: SeenLog) -> Judgement:
     """The judgement of a log older than `newer`, from which a model comes: nothing is promoted."""
     promoted = judgement.verdict == "promoted"
-    so = "not put in force: " if promoted else ""
+    so = "not made active: " if promoted else ""
     said = f"{so}{log.file} is older than {newer.file}, from which a later model comes"
     return replace(
         judgement,

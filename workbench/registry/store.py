@@ -92,7 +92,7 @@ class Registry:
             row = numbered(session, machine, number)
             current = version_in_force(session, machine)
             if current is not None and current.id == row.id:
-                raise BadRegistry(f"{machine}: version {number} is in force already")
+                raise BadRegistry(f"{machine}: version {number} is active already")
             made = decide(session, "promoted", row, reason=reason, by=by, now=now)
             return decision_value(session, made)
 
@@ -104,7 +104,7 @@ class Registry:
             if len(earlier) < 2:
                 have = "one version" if earlier else "no version"
                 raise BadRegistry(
-                    f"{machine}: {have} has been in force, so there is none to go back to"
+                    f"{machine}: {have} has been active, so there is none to go back to"
                 )
             row = session.get_one(VersionRow, earlier[-2])
             made = decide(session, "rolled_back", row, reason=reason, by=by, now=now)

@@ -185,5 +185,5 @@ def _caption(model: Model) -> str:
         " breakaway limits (the bar at zero)."
     )
     if model.friction["m"].value is None:
-        text += " The mass is not identified, so the assumed one stands in for the inertia."
+        text += " The mass is not identified, so the assumed one is used for the inertia."
     return text

@@ -103,7 +103,9 @@ def logs_of(model: Model) -> tuple[str, ...]:
 
 
 WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
-WHAT_TO_DO = re.compile(r"(: the logs do not tell it)?; .*")  # at the end of a reason
+# At the end of a reason; the first wording is that of older files.
+WHAT_TO_DO = re.compile(r"(: the logs do not tell it|: not identifiable from these logs)?; .*")
+NEAR_ZERO = "not significantly different from 0"
 
 
 def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
@@ -135,8 +137,13 @@ def _short(reason: str, logs: Iterable[str]) -> str:
     for name in (*logs, *re.findall(r"^\d+ logs", said)):
         said = said.removeprefix(f"{name}: ")
     if not said:
-        return "not told"
-    return "not told: " + WIDE.sub(r"found \1, anywhere in \2", WHAT_TO_DO.sub("", said))
+        return "not identifiable"
+    return not_identified(WIDE.sub(r"found \1, anywhere in \2", WHAT_TO_DO.sub("", said)))
+
+
+def not_identified(why: str) -> str:
+    """Why a parameter has no interval; one near 0 is well known, and said to be so alone."""
+    return why if why.startswith(NEAR_ZERO) else f"not identifiable: {why}"
 
 
 def summary(model: Model) -> str:
@@ -146,7 +153,7 @@ def summary(model: Model) -> str:
     logs = "one log" if len(model.log) == 1 else f"{len(model.log)} logs"
     text = f"{many} friction parameters identified from {logs}."
     if model.assumed:
-        text += f" Not told: {', '.join(model.assumed)}."
+        text += f" Not identifiable: {', '.join(model.assumed)}."
     if model.fit.adequate:
         return f"{text} The model leaves nothing but sensor noise."
     if model.resonance is not None:
@@ -188,7 +195,7 @@ def fit_lines(model: Model) -> list[str]:
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
     runs = runs_to_add(model)
     if runs:
-        lines.append(f"to tell the rest: {'; '.join(runs)}")
+        lines.append(f"to identify the rest: {'; '.join(runs)}")
     if model.posterior is not None:
         lines.append(f"posterior: {model.posterior['verdict']}")
     return lines

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0
-LOOK_FOLDER = "look"  # where a picture of a log is proposed
+LOOK_FOLDER = "check"  # where a picture of a log is proposed
 
 
 def looked_over(logs: Sequence[str], card: str) -> Callable[[str], Step]:
@@ -74,7 +74,7 @@ def after_design(
     if of_margins and modulus > 0.0:
         samples = math.inf if delay is None else _floor(delay)
         least = () if samples >= 2.0 else ("--delay", f"{samples:g}")
-        return step("the goals that can be kept", *words, "--modulus", f"{modulus:g}", *least)
+        return step("the goals that can be met", *words, "--modulus", f"{modulus:g}", *least)
     return step("a slower loop", *words, "--poles", _poles(best, SLOWER))
 
 

@@ -33,7 +33,7 @@ def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
         "delay",
         "at rest",
         "over",
-        "settled",
+        "settling",
         "smooth",
         f"force {units.force}",
         *command,

@@ -120,10 +120,10 @@ class AxisTest:
         if self.blind:
             found = (self.of(name).estimate for name in ("F_cp", "F_cn"))
             why = next(one.reason or "" for one in found if one.value is None)
-            out.append(f"Coulomb friction is not told: {why.partition(';')[0]}")
+            out.append(f"Coulomb friction is not identifiable: {why.partition(';')[0]}")
         if self.unjudged:
             why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"
-            out.append(f"no limits to judge by: {why}")
+            out.append(f"no limits to test against: {why}")
         return tuple(out)
 
 
@@ -163,8 +163,8 @@ def told_of(
     out = {}
     scale = max(abs(found.values["F_cp"]), abs(found.values["F_cn"]))
     unheld = (
-        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no number holds;"
-        " `workbench trace` looks for what acts"
+        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no estimate is"
+        " valid; `workbench trace` searches for the cause"
     )
     for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
         if name not in found.values:
@@ -191,11 +191,11 @@ def _why_not(name: str, found: AxisEquation) -> str:
     if name == "m":
         return "inertia is too small a part of the force; add faster reversals"
     if name.startswith("F_v"):
-        return "speeds too alike to tell it from Coulomb friction; add strokes at others"
+        return "speeds too similar to separate it from Coulomb friction; add strokes at others"
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]
-    return f"{many} breakaways seen, too few; add starts from rest"
+    return f"{many} breakaways, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:
@@ -238,8 +238,8 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
     """A quantity with its light and, where it is not green, the reason in a sentence."""
     meaning = MEANING_OF[name]
     if told.value is None and allowed is not None and allowed.source == "card":
-        why = (told.reason or "the log does not tell it").partition(";")[0]
-        said = f"{_whole(meaning)} is not told, and the card has limits for it: {why}"
+        why = (told.reason or "not identifiable from this log").partition(";")[0]
+        said = f"{_whole(meaning)} is not identifiable, and the card has limits for it: {why}"
         return Quantity(name, meaning, told, allowed, "yellow", said)
     if told.value is None or allowed is None:
         return Quantity(name, meaning, told, allowed, "", "")

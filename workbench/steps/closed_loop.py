@@ -91,7 +91,7 @@ def present_loop(machine: Model, now: Present) -> DrivenLoop:
     command = command_of(machine, force)
     if drive is None and now.output == "command" and machine.rig.command_unit != command.unit:
         raise BadModel(
-            f"it gives a command in {machine.rig.command_unit}, and no log tells what force that"
+            f"it gives a command in {machine.rig.command_unit}, and no log shows what force that"
             " makes; log the command"
         )
     return DrivenLoop(now.law, force, now.rate, command.limit, direct=now.output == "command")

@@ -171,7 +171,7 @@ def speed_of(log: Log) -> float:
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit held have their assumed value."""
     units = friction_units(rig.motion)
-    held = "held at a value that does not matter for these logs"
+    held = "fixed at a value that does not matter for these logs"
     return {
         name: fit.estimates.get(name)
         or Estimate(None, units[name], reason=held, assumed=getattr(fit.friction, name))

@@ -208,8 +208,8 @@ def _arx(model: Model, period: float | None, known: bool) -> Linear:
     why_not = model.friction["m"].reason or "mass identified"
     if model.imposed:
         raise NotIdentifiable(
-            "no plant to design on: the logged motion was imposed on the body; log a run in which"
-            " the drive moves it freely"
+            "no plant to design on: the logged motion was prescribed; log a run in which the drive"
+            " moves the body freely"
         )
     if found is None:
         raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); m: {why_not}")

@@ -189,7 +189,7 @@ def why_no_run(model: Model, drive: Drive) -> str | None:
     name, first = next(iter(untold.items()))
     by = "the command" if drive == "command" else "the force"
     return (
-        f"no free run: the model does not tell {', '.join(untold)}, which a run by {by} needs"
+        f"no free run: {', '.join(untold)} not identified, which a run by {by} needs"
         f" ({name}: {first.reason})"
     )
 
@@ -214,7 +214,8 @@ def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
     for key, found in model.effects.items():
         names += [f"{key}.{name}" for name, one in found.items() if not one.known]
     what = "force and run" if ran else "force"
-    return (f"{what} by assumed values of what no log told: {', '.join(names)}",) if names else ()
+    said = f"{what} by assumed values of what is not identifiable: {', '.join(names)}"
+    return (said,) if names else ()
 
 
 def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:

@@ -128,7 +128,7 @@ def identified_or_not(
     try:
         found = identify_sources(sources, seed=seed, on_progress=on_progress, keep_going=keep_going)
     except NotIdentifiable as error:
-        return None, f"the logs do not tell it ({error})"
+        return None, f"not identifiable from the logs ({error})"
     return found.model, None
 
 

@@ -115,7 +115,7 @@ def told_by(
     for name in NAMES:
         found = fit.estimates.get(name)
         if found is None:
-            out.append(Told(name, False, "held at a value that does not matter for this log"))
+            out.append(Told(name, False, "fixed at a value that does not matter for this log"))
         elif open_run and name not in FIVE:
             out.append(_if_followed(name, recorded, ways, fit, found))
         elif found.value is not None:
@@ -184,7 +184,7 @@ def _if_followed(
 def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
     """Why a parameter is not told, and what run would tell it; lacks: what the measured motion has
     too little of, which says more than how a fit came out."""
-    said = (lacks or found.reason or "the log does not tell it").removeprefix(f"{log}: ")
+    said = (lacks or found.reason or "not identifiable from this log").removeprefix(f"{log}: ")
     if said == WHY_NOT["stick"]:
         said = f"{NO_RUN_FOLLOWED}; {MEND_OF_RUN}"
     why, _, add = said.partition("; ")

@@ -141,7 +141,7 @@ def _remarks(
     ]
     if found.recommended == "none":
         why = f" ({found.recommendation.why})" if found.recommendation else ""
-        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is judged")
+        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is shown")
     out += dict.fromkeys(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )

@@ -48,7 +48,7 @@ def design_velocity(
     for name in DESIGN_NEEDS:
         if not model.valve[name].known:
             raise NotIdentifiable(
-                f"{name} is not told, without which there is no dead zone to compensate:"
+                f"{name} is not identified, without which there is no dead zone to compensate:"
                 f" {model.valve[name].reason}"
             )
     valve, narrow = model.simulated, model.end(low=True)

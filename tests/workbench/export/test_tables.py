@@ -358,7 +358,7 @@ def test_what_else_a_model_lacks() -> None:
             made(linear(), target)
     unknown = lost(linear(), "F_sp")
     costs = made(unknown, "friction-table").files[0].costs
-    assert any("not identified, so not told" in cost.what and cost.force is None for cost in costs)
+    assert any("direction: not identified" in cost.what and cost.force is None for cost in costs)
     blind = linear(PLAY)
     width = replace(blind.effects["backlash"]["width"], value=None, reason="too short; log on",
                     assumed=1e-4)  # fmt: skip

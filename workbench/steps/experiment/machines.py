@@ -113,7 +113,7 @@ def bench_of(model: Model, found: Design | None) -> Bench:
     """
     if model.imposed:
         raise BadModel(
-            "the model's logs are of a motion that a rig imposed; no controller moves this machine"
+            "the model's logs are of a prescribed motion; no controller moves this machine"
         )
     if found is not None:
         name = found.recommended if found.recommended in found.controllers else ""

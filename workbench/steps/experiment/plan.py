@@ -72,8 +72,9 @@ def experiment(
     promises = promised(bench, plants[: 1 + PROMISED_PLANTS], r, promise, report)
     if all(one.after is None for one in promises):
         raise NotIdentifiable(
-            f"{model.card}: no run within the limits tells any parameter ({bench.controller} hardly"
-            " moves the machine within them); widen the limits, or give another --design"
+            f"{model.card}: no parameter is identifiable from a run within the limits"
+            f" ({bench.controller} hardly moves the machine within them); widen the limits, or"
+            " give another --design"
         )
     seen = looked_at(machines[:1], r)
     per = len(asked) if not rivals else 1
@@ -156,7 +157,7 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
         out.append(left_out)
     if model.assumed:
         names = ", ".join(model.assumed)
-        out.append(f"no log tells {names}: values within a third of the assumed ones were tried")
+        out.append(f"{names}: not identifiable; tried within a third of the assumed values")
     if not model.fit.adequate:
         out.append(
             "the model leaves more than noise of its logs: what is promised holds for a machine"
