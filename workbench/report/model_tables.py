@@ -105,7 +105,7 @@ def logs_of(model: Model) -> tuple[str, ...]:
 WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
 # At the end of a reason; the first wording is that of older files.
 WHAT_TO_DO = re.compile(r"(: the logs do not tell it|: not identifiable from these logs)?; .*")
-NEAR_ZERO = "not significantly different from 0"
+INSIGNIFICANT = "not significantly different from 0"
 
 
 def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
@@ -143,7 +143,7 @@ def _short(reason: str, logs: Iterable[str]) -> str:
 
 def not_identified(why: str) -> str:
     """Why a parameter has no interval; one near 0 is well known, and said to be so alone."""
-    return why if why.startswith(NEAR_ZERO) else f"not identifiable: {why}"
+    return why if why.startswith(INSIGNIFICANT) else f"not identifiable: {why}"
 
 
 def summary(model: Model) -> str:

@@ -100,7 +100,7 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     ):
         yield (
             f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
-            " of a valve and cylinder: inertia is hardly identifiable; see the rig kind"
+            " of a valve and cylinder: inertia is hardly identifiable; use kind ="
             ' "velocity"'
         )
 
