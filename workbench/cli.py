@@ -73,7 +73,7 @@ ADVICE = {
 
 
 class Terminated(KeyboardInterrupt):
-    """The process was told to end, which it does as on Ctrl-C: what is half written is cleared."""
+    """The process was asked to end, which it does as on Ctrl-C: what is half written is cleared."""
 
     def __init__(self, number: int) -> None:
         super().__init__()

@@ -108,7 +108,8 @@ class InverseModel:
 
     @property
     def offset(self) -> float:
-        """Constant force [N]: it cannot be told from unequal F_cp = F_c + offset, F_cn = ..."""
+        """Constant force [N]: it is not distinguishable from unequal F_cp = F_c + offset, F_cn =
+        ..."""
         return 0.5 * (self.F_cp - self.F_cn)
 
 

@@ -45,7 +45,7 @@ def command(
 
     Each number has its limits, of the card's [limits], else the mean +- 3 sd of the machine's last
     logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side, or
-    nothing to judge by. Writes axis_test.json, and report.html to be printed on one page.
+    nothing to test against. Writes axis_test.json, and report.html to be printed on one page.
     """
     from workbench.logs.sources import read_sources
     from workbench.report.axis_test import axis_view

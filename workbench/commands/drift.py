@@ -1,4 +1,4 @@
-"""`workbench drift`: new logs against the model in force -> drift.json and report.html."""
+"""`workbench drift`: new logs against the active model -> drift.json and report.html."""
 
 from pathlib import Path
 
@@ -63,9 +63,9 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> int:
-    """Test new logs against the model in force: has the machine changed, and in which parameters?
+    """Test new logs against the active model: has the machine changed, and in which parameters?
 
-    Every log is judged alone and, with those before it, by their mean, which finds what changes
+    Every log is tested alone and, with those before it, by their mean, which finds what changes
     slowly. Writes drift.json and report.html.
     """
     from identification.drift.drift_test import DriftSettings

@@ -71,7 +71,8 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> int:
-    """Find the run to make next: the reference, within the machine's limits, that tells most.
+    """Find the run to make next: the reference, within the machine's limits, that is most
+    informative.
 
     Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
     report.html. The run begins with the machine at rest at the first r.

@@ -74,11 +74,11 @@ def command(
     out: Path,
     as_json: bool,
 ) -> int:
-    """Identify the logs of many machines, or judge them by the models in force.
+    """Identify the logs of many machines, or test them against the active models.
 
     LOGS is a folder, a file, a pattern or any fsspec URL of Parquet logs, <machine>/*.parquet or
-    <machine>.parquet. A machine without a model in force gets its first (without a design) where it
-    leaves only noise; else the log is judged as by 'workbench reidentify'. Results go into the
+    <machine>.parquet. A machine without an active model gets its first (without a design) where it
+    leaves only noise; else the log is tested as by 'workbench reidentify'. Results go into the
     registry and DIR/results/*.parquet while the run goes on. A run that was killed goes on where it
     was; logs that are done are skipped.
     """

@@ -56,8 +56,8 @@ def command(
 ) -> None:
     """Find friction, plant and actuator of a machine from its logs.
 
-    Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
-    report.html. LOG is a path, or a file name of the card's set.
+    Writes model.json (every parameter with its 95 % interval, or why it is not identifiable)
+    and report.html. LOG is a path, or a file name of the card's set.
     """
     begun = time.monotonic()
     from workbench.logs.sources import card_of_velocity, read_sources

@@ -26,14 +26,14 @@ MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 @verbose_option
 @job_options
 def command(as_json: bool, **given: Any) -> int:
-    """Judge each new log of each machine once; where friction has drifted, re-tune.
+    """Test each new log of each machine once; where friction has drifted, re-tune.
 
     ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
-    tested against the model in force ('workbench registry add' puts the first there); on drift a
+    tested against the active model ('workbench registry add' puts the first there); on drift a
     new model and design are made, on another structure the log is traced; what is new replaces the
     old only if it wins on held-out data and in simulation. Safe to run at any time and many at
-    once; what a killed run left, the next does. A log older than one behind the model in force is
-    judged and recorded, and changes nothing. Progress is told as JSON lines on standard error.
+    once; what a killed run left, the next does. A log older than one behind the active model is
+    tested and recorded, and changes nothing. Progress is written as JSON lines on standard error.
     Exit status 2 also where a machine could not be handled, the registry is away, or the webhook
     has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
     given up after a day.

@@ -108,7 +108,7 @@ def _impossible_mass(found: "ModelFile", peak: float, speed: float, most: str) -
     """Too heavy to reach the logs' speed, or known better than the logs' noise allows.
 
     A mass that is off by dm shifts the position by at most speed/F_v dm, so that n positions with
-    noise tell it no better than to noise F_v/(speed sqrt(n)): the bound of Cramer and Rao.
+    noise gives it no better than to noise F_v/(speed sqrt(n)): the bound of Cramer and Rao.
     """
     mass = found.friction["m"]
     duration = max(entry.duration for entry in found.log)

@@ -147,5 +147,5 @@ def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
 
 
 def _untold(what: Compensation) -> tuple[str, ...]:
-    """Lines on what of the cogging no log tells."""
+    """Lines on what of the cogging no log identifies."""
     return tuple(line for line in what.untold_places if line.startswith("cogging"))

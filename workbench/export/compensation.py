@@ -133,14 +133,14 @@ class Compensation:
                 raise BadModel(self.untold(what, name, found))
 
     def untold(self, what: str, name: str, found: Estimate) -> str:
-        """The refusal of what needs a number that no log tells."""
+        """The refusal of what needs a number that no log identifies."""
         return (
             f"{self.model.card}: {what} needs {name}, which is not identified"
             f" ({first_of(found.reason)}); no number is assumed for it"
         )
 
     def small(self, names: Iterable[str]) -> Iterator[str]:
-        """A line for each parameter of which the logs tell no more than that it is small."""
+        """A line for each parameter of which the logs show only that it is small."""
         for name in names:
             found = self.model.friction[name]
             if found.value is None and found.at_most is not None:
@@ -174,13 +174,13 @@ class Compensation:
 
     @cached_property
     def places(self) -> tuple[Acting, ...]:
-        """Effects that are forces of place, with the sizes that the logs tell; `untold_places` has
-        the others, which are 0 here."""
+        """Effects that are forces of place, with the sizes that the logs identify; `untold_places`
+        has the others, which are 0 here."""
         return tuple(one for one, _ in self._places if one is not None)
 
     @property
     def untold_places(self) -> tuple[str, ...]:
-        """A line for each number of a force of place that no log tells."""
+        """A line for each number of a force of place that no log identifies."""
         return tuple(line for _, lines in self._places for line in lines)
 
     @cached_property
@@ -188,7 +188,8 @@ class Compensation:
         return [self._told(one) for one in self.model.acting if is_of_place(one)]
 
     def _told(self, one: Acting) -> tuple[Acting | None, list[str]]:
-        """The effect without the sizes that no log tells; None where its shape is not told."""
+        """The effect without the sizes that no log identifies; None where its shape is not
+        identified."""
         found, lines, values = self.model.effects[one.key], list[str](), dict(one.values)
         for p in one.effect.params:
             if found[p.name].known:
@@ -202,7 +203,7 @@ class Compensation:
 
     @cached_property
     def harmonics(self) -> tuple[Harmonic, ...]:
-        """Cogging of the axis by its waves, the largest first; empty where none is told."""
+        """Cogging of the axis by its waves, the largest first; empty where none is identified."""
         return cogging_harmonics(self.places)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What a worker does with one log: read it there, identify or judge it, and tell the result."""
+"""What a worker does with one log: read it there, identify or test it, and return the result."""
 
 import hashlib
 import resource
@@ -87,7 +87,7 @@ def _identified(item: Item, path: Path, card: Path, blank: Result) -> Result:
 
 
 def _judged(item: Item, path: Path, card: Path, blank: Result) -> Result:
-    """The log against what is in force: drift test, and where it has drifted the chain anew."""
+    """The log against the active version: drift test, and where it has drifted the chain anew."""
     log = item.log
     seen = SeenLog(blank.sha256, path.name, log.size, log.mtime_ns)
     task = Task(log.machine, card, path, seen, item.version, item.model, item.design, item.previous)

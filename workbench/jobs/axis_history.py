@@ -1,4 +1,4 @@
-"""What the registry has of a machine for its axis test: its last logs, and its model in force."""
+"""What the registry has of a machine for its axis test: its last logs, and its active model."""
 
 import json
 from collections.abc import Mapping, Sequence
@@ -20,13 +20,13 @@ from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
 
-LOOKED_AT = 120  # of a machine's last logs, among which those are that tell its parameters
+LOOKED_AT = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see
 HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
-    """The machine's last logs, and this log by the model in force where that has further effects.
+    """The machine's last logs, and this log by the active model where that has further effects.
 
     Raises BadRegistry where there is no such machine.
     """
@@ -62,7 +62,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
 
 
 def untold(model: Model, why: str) -> dict[str, Estimate]:
-    """The nine as a log has them that the fit of the model in force does not tell."""
+    """The nine as a log has them that the fit of the active model does not identify."""
     return {
         name: Estimate(None, one.unit, reason=why)
         for name, one in model.friction.items()

@@ -2,7 +2,7 @@
 
 They have to win twice, with margin: on held-out logs or time blocks that neither was fitted on
 (free run in windows, and the force equation), and in the simulated loop of the machine as it is
-now, along one reference for both designs. Where only the model wins and the design in force still
+now, along one reference for both designs. Where only the model wins and the active design still
 keeps every limit, the model alone is replaced. The rule is ours; the paper re-tunes without asking.
 """
 
@@ -118,7 +118,7 @@ def challenge(
 
 
 def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
-    """Root mean squares over the logs, by their lengths; no free run where motion is imposed."""
+    """Root mean squares over the logs, by their lengths; no free run with prescribed motion."""
     found = []
     for log in logs:
         window = WINDOW if log.duration >= 2 * WINDOW else None

@@ -33,7 +33,7 @@ class Source:
 @dataclass(frozen=True)
 class Sources:
     """The card, its rig for these files, their runs, what had to be repaired in them, and which
-    samples were set aside."""
+    samples were excluded."""
 
     card: Card
     rig: Rig

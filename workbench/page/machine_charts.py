@@ -1,4 +1,4 @@
-"""A machine's parameters over its last logs, each with its interval and its value in force."""
+"""A machine's parameters over its last logs, each with its interval and its active value."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds
 
 
 def parameter_charts(logs: Sequence[JudgedLog]) -> list[Chart]:
-    """The parameters that the logs tell, the one that moved most first; none of a single log.
+    """The parameters that the logs identify, the one that moved most first; none of a single log.
 
     logs: the oldest first.
     """

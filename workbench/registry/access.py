@@ -51,7 +51,7 @@ class Access:
         self._database = database
 
     def add(self, name: str, role: Role, *, by: str, now: datetime) -> str:
-        """A new token, which is told this once; the registry keeps its hash.
+        """A new token, which is shown only now; the registry keeps its hash.
 
         Raises BadRegistry where the name is taken or none.
         """

@@ -30,7 +30,7 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
 def machine_view(
     state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
 ) -> Screen:
-    """A machine: what is in force and why, the latest decisions and results of logs; with
+    """A machine: the active version and why, the latest decisions and results of logs; with
     --verbose all of them."""
     if state.in_force is None or state.since is None:
         first = f"{state.name}: no active version; 'workbench registry promote {state.name} N'"

@@ -68,7 +68,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
 
 
 def _within(one: Told) -> str:
-    """A parameter, and within what share of its value it can be told."""
+    """A parameter, and within what share of its value it can be identified."""
     return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
 
@@ -158,7 +158,8 @@ def _not_told(told: Iterable[Told]) -> list[str]:
 
 
 def _open(told: Iterable[Told]) -> list[str]:
-    """On what it hangs whether others are told, each with the parameters that it holds for."""
+    """On what it depends whether others are identifiable, each with the parameters that it holds
+    for."""
     return _together((one.only_if, one.name) for one in told if one.only_if)
 
 

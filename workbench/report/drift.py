@@ -82,7 +82,7 @@ def drift_chart(found: Drifted, last: Tested) -> Chart:
 
 
 def _changes(found: Drifted, last: Tested) -> Panel:
-    """Every judged parameter's change with its interval, the model's own, and the margin."""
+    """Every tested parameter's change with its interval, the model's own, and the margin."""
     shifts = list(last.test.shifts.values())
     moved = {shift.name for shift in last.test.moved}
     margin, n = 100 * found.settings.margin, len(shifts)

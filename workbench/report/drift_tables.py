@@ -46,7 +46,7 @@ def _what_changed(test: DriftTest) -> str:
 
 
 def seen_sentence(test: DriftTest, limit: float) -> str:
-    """Which changes a test could have seen, and which parameters it does not judge by that.
+    """The minimum detectable changes of a test, and on which parameters it is inconclusive.
 
     limit: relative change that it must be able to see. "" where nothing was tested.
     """
@@ -103,7 +103,7 @@ def _over(found: Statistic | None) -> str:
 
 
 def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
-    """Every parameter of a run before and after; those not judged with the reason."""
+    """Every parameter of a run before and after; those inconclusive with the reason."""
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = [_shift_row(shift) for shift in one.test.shifts.values()]
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
@@ -152,7 +152,7 @@ def what_the_columns_say(found: Drifted) -> list[str]:
 
 
 def seen_lines(found: Drifted) -> list[str]:
-    """What each test could have seen, and why a log was not judged."""
+    """The minimum detectable change of each test, and why a log was inconclusive."""
     out = []
     for one in found.tests:
         said = seen_sentence(one.test, found.settings.to_be_seen)
@@ -166,7 +166,7 @@ def seen_lines(found: Drifted) -> list[str]:
 
 
 def drift_notes(found: Drifted) -> list[str]:
-    """What to know of the tests: thresholds, runs not judged, remarks."""
+    """What to know of the tests: thresholds, inconclusive runs, remarks."""
     return [*what_the_columns_say(found), *seen_lines(found), *found.remarks]
 
 
@@ -180,7 +180,7 @@ def drift_parts(found: Drifted) -> list[Part | str]:
     """Every run, the parameters of the last one, and what to know of the tests."""
     logs = logs_of_drift(found)
     legend, seen = what_the_columns_say(found), seen_lines(found)
-    # What is not judged, and why, stands in the table too.
+    # What is inconclusive, and why, stands in the table too.
     told = told_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
     short = [line for line in told if line not in drift_sentence(found)]
     return [

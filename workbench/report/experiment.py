@@ -190,7 +190,7 @@ def run_chart(found: Experiment) -> Chart:
 
 
 def promise_chart(found: Experiment) -> Chart:
-    """Half intervals over the value, now and after the run; none where one is not told."""
+    """Half intervals over the value, now and after the run; none where one is not identified."""
     lines = []
     for key, colour, shift, name in PROMISE_LOOKS:
         sizes = [getattr(one, key) for one in found.promise]

@@ -11,7 +11,8 @@ NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
 def proposal_view(of: Proposal, card: Path) -> Screen:
-    """What the card says, what the log will hardly tell, what is left out, and what to do next."""
+    """What the card says, what is hardly identifiable from the log, what is left out, and what to
+    do next."""
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
     guesses = [row[0] for row in rows if row[3] == "guess"]
     looked = f"check the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"

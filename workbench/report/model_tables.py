@@ -109,8 +109,8 @@ INSIGNIFICANT = "not significantly different from 0"
 
 
 def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
-    """Rows of parameters for one screen: those that are not told for the same reason in one row,
-    without the reason's advice.
+    """Rows of parameters for one screen: those that are not identified for the same reason in one
+    row, without the reason's advice.
 
     value: column of the value, before those of the unit and of the interval or reason.
     """
@@ -125,7 +125,7 @@ def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> li
 
 
 def _together(alike: Sequence[Row], reason: Sequence[str], value: int) -> Row:
-    """Rows of parameters that are not told for the same reason as one."""
+    """Rows of parameters that are not identified for the same reason as one."""
     names, units = ", ".join(row[0] for row in alike), {row[value + 1] for row in alike}
     unit, rest = units.pop() if len(units) == 1 else "", len(alike[0]) - value - 3
     return (names, *alike[0][1:value], "-", unit, *reason, *[""] * rest)
@@ -180,7 +180,7 @@ def next_of_model(model: Model) -> str:
 
 
 def fit_lines(model: Model) -> list[str]:
-    """What the fit leaves, and what would tell the rest, in words."""
+    """What the fit leaves, and what would identify the rest, in words."""
     by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
         f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
@@ -214,7 +214,7 @@ def plant_lines(model: Model) -> list[str]:
 
 
 def runs_to_add(model: Model) -> tuple[str, ...]:
-    """Runs that would tell what neither the logs could, by the look before the fit, nor the fit."""
+    """Runs that would identify what neither the gate before the fit nor the fit could."""
     found = {**model.friction, **(model.actuator or {})}
     return tuple(
         dict.fromkeys(

@@ -16,7 +16,7 @@ NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
 class Told(NamedTuple):
-    """The error by which a trace is told: its name, before, after, its noise, and how each is
+    """The error by which a trace is reported: its name, before, after, its noise, and how each is
     written."""
 
     name: str

@@ -84,7 +84,8 @@ def present_loop(machine: Model, now: Present) -> DrivenLoop:
     """The controller that the machine has now, as its drive runs it.
 
     Where no command is logged its force loop is not known to the model, and gives what is asked.
-    Raises BadModel where the controller gives a command of which the logs do not tell the force.
+    Raises BadModel where the controller gives a command of which the logs do not identify the
+    force.
     """
     drive = machine.simulated.actuator
     force = now.force if isinstance(drive, Actuator) else None
@@ -146,7 +147,7 @@ def run_plant(
 def load_of(machine: Model) -> SecondMass | None:
     """The load that swings behind the machine's body; None where it shows none.
 
-    Of a mass that the log does not tell, its share of the mass that simulations use.
+    Of a mass that the log does not identify, its share of the mass that simulations use.
     """
     two = machine.resonance
     if two is None:

@@ -1,4 +1,4 @@
-"""What the motion in a log will hardly let any fit tell, said before one is made.
+"""What is hardly identifiable from the motion in a log, said before a fit.
 
 Quick, and of the motion and the work alone: `init` says it with the first card, doctor with the
 rest of what it sees.
@@ -40,7 +40,7 @@ class _Moved:
 
 
 def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
-    """A line for each thing that the runs will hardly tell; nothing where there is no run."""
+    """A line for each thing that the runs will hardly identify; nothing where there is no run."""
     if not runs:
         return ()
     log = max(runs, key=len)

@@ -78,7 +78,7 @@ def identify(
     """The model of one machine from its runs, and the fit it comes from.
 
     keep_going: whether it is to go on, else the best so far is the model.
-    Raises NotIdentifiable where nothing can be told, BadLog where a signal is missing.
+    Raises NotIdentifiable where nothing can be identified, BadLog where a signal is missing.
     """
     options = options or Options()
     logs = [source.log for source in sources]
@@ -332,8 +332,8 @@ def common_period(logs: Sequence[Log], period: float | None) -> tuple[float, tup
 
 
 def check_period(period: float | None, name: str, duration: float) -> None:
-    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they tell
-    nothing."""
+    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they
+    identify nothing."""
     if period is not None and FEWEST * period > duration:
         raise BadModel(
             f"design period {period:g} s, {name} lasts {duration:.4g} s: fewer than {FEWEST}"

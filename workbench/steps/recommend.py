@@ -211,7 +211,7 @@ def in_thousandths(length: float, units: Shown) -> tuple[float, str]:
 
 
 def percent(share: float) -> str:
-    """A share with two digits; a hundredth of a percent is the least that is told."""
+    """A share with two digits; a hundredth of a percent is the least that is printed."""
     return f"{100 * share:.2g} %" if share >= 1e-4 else "< 0.01 %"
 
 

@@ -235,7 +235,7 @@ def _remarks(
 
 
 def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
-    """Stretches of frequencies [Hz] where it holds, gaps of a few points left aside."""
+    """Stretches of frequencies [Hz] where it holds, gaps of a few points left out."""
     at = np.flatnonzero(where)
     if not len(at):
         return []

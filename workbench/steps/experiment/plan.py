@@ -48,7 +48,7 @@ SHOWN_PLANTS = 12  # drawn plants in the picture
 def experiment(
     model: Model, wanted: Wanted, design: Design | None, report: Progress, keep_going: KeepGoing
 ) -> Experiment:
-    """The run that tells most of the parameters asked for, within the limits.
+    """The run that is most informative of the parameters asked for, within the limits.
 
     design: whose recommended controller moves the machine; None: its present one. Raises BadModel
     where nothing would follow a reference, NotIdentifiable where no run within the limits tells
@@ -125,7 +125,7 @@ def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[P
 
 
 def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
-    """How far the run tells each pair apart, the hardest first."""
+    """How far the run discriminates each pair, the hardest first."""
     found = [
         Separation(*pair.names, float(np.sqrt(told_apart(told.matrix, pair.one, pair.others))))
         for pair in pairs_of(told, keys)

@@ -1,4 +1,4 @@
-"""Which effects a run is to tell apart: those that a trace could not."""
+"""Which effects a run is to discriminate: those that a trace could not."""
 
 import json
 import re

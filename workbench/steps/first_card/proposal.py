@@ -87,8 +87,8 @@ class Proposal:
     card, what else was measured (name: column), and what it should say of a rig of the next likely
     kind.
 
-    hardly: what the log will hardly tell; refused: why it cannot be read by the card; both empty
-    until it was tried (`looked_over`)."""
+    hardly: what is hardly identifiable from the log; refused: why it cannot be read by the card;
+    both empty until it was tried (`looked_over`)."""
 
     path: Path
     name: str
@@ -334,7 +334,7 @@ def _motion_guess(found: MotionGuess) -> RigGuess:
 
 
 def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
-    """The numbers of the rig that a log can tell, and those that it needs beside the log."""
+    """The numbers of the rig that a log can identify, and those that it needs beside the log."""
     out = []
     if roles.kind == "electro-pneumatic":
         even = abs(roles.area_ratio - 1.0) < 1e-9
