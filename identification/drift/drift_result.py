@@ -57,8 +57,9 @@ class DriftTest:
     reason; could_have_seen: minimum detectable relative change of each tested one on this log or,
     if it lasts, by the mean.
     single, alone, mean: the statistic of all parameters of this log, of the largest one, and of the
-    mean over logs, None where nothing is tested; found_by: which of them alarmed ("log": the first two). chi_square: what the log's own refit leaves; allowed: up to
-    which the structure fits. state: to be given with the next log.
+    mean over logs, None where nothing is tested; found_by: which of them alarmed ("log": the first
+    two). chi_square: what the log's own refit leaves; allowed: up to which the structure fits.
+    state: to be given with the next log.
     """
 
     log: str

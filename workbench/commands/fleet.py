@@ -115,7 +115,7 @@ def clock() -> datetime:
 def after_fleet(
     done: "Report", logs: str, card: str | None, where: str | None, *, in_registry: bool
 ) -> Step | None:
-    """Look at the first machine or log that somebody has to look at; else run again."""
+    """Check the first machine or log that somebody has to check; else run again."""
     from workbench.addresses import shown
 
     if not (done.bad or done.later):
@@ -156,7 +156,7 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
 
 
 def _bad(one: Any) -> dict[str, Any]:
-    """A result to look at, as JSON has it."""
+    """A result to check, as JSON has it."""
     return {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
             "reason": one.reason}  # fmt: skip
 

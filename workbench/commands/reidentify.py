@@ -54,7 +54,7 @@ def command(as_json: bool, **given: Any) -> int:
 
 
 def after_pass(done: "PassReport", where: str | None) -> Step | None:
-    """Look at the first machine with an alarm."""
+    """Check the first machine with an alarm."""
     from workbench.addresses import shown
     from workbench.registry.values import ALARMING
 

@@ -174,13 +174,13 @@ class Compensation:
 
     @cached_property
     def places(self) -> tuple[Acting, ...]:
-        """Effects that are forces of place, with the sizes that the logs identify; `untold_places`
-        has the others, which are 0 here."""
+        """Position-dependent forces among the effects, with the sizes that the logs identify;
+        `untold_places` has the others, which are 0 here."""
         return tuple(one for one, _ in self._places if one is not None)
 
     @property
     def untold_places(self) -> tuple[str, ...]:
-        """A line for each number of a force of place that no log identifies."""
+        """A line for each number of a position-dependent force that no log identifies."""
         return tuple(line for _, lines in self._places for line in lines)
 
     @cached_property
@@ -329,7 +329,11 @@ def other_costs(what: Compensation) -> Iterator[Cost]:
         if effect.place.unit != "N" or effect.evolve is not None or effect.signals:
             yield Cost(f"{said}: {NO_TABLE_HOLDS}", None)
         elif set(effect.depends_on) <= {"y", "v"}:
-            kind = "a force of place, not friction" if is_of_place(one) else "varies with place"
+            kind = (
+                "a position-dependent force, not friction"
+                if is_of_place(one)
+                else "varies with position"
+            )
             yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))
         else:
             of = ", ".join(effect.depends_on)

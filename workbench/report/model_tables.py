@@ -103,8 +103,8 @@ def logs_of(model: Model) -> tuple[str, ...]:
 
 
 WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
-# At the end of a reason; the first wording is that of older files.
-WHAT_TO_DO = re.compile(r"(: the logs do not tell it|: not identifiable from these logs)?; .*")
+# At the end of a reason; in older files it begins with ": the logs".
+WHAT_TO_DO = re.compile(r"(: (the logs|not identifiable)[a-z ]*)?; .*")
 INSIGNIFICANT = "not significantly different from 0"
 
 
@@ -233,4 +233,4 @@ def held(model: Model) -> str:
     if model.fit.stiffness == 0.0:
         return anew
     unit = shown(model.rotary).stiffness
-    return f"held to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"
+    return f"corrected to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"
