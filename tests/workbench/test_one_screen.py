@@ -61,7 +61,10 @@ LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
 OUT = Path("results") / ("a folder with a long name " * 4)
 NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 SLOW = Asked((20.0, 0.9))  # nothing to be searched
-WHY = "the interval is wider than the value: the logs do not tell it; excite it more, or log longer"
+WHY = (
+    "the interval is wider than the value: not identifiable from these logs; excite it more, or log"
+    " longer"
+)
 REMARKS = (
     *(f"{log}: uneven clock, resampled every {n % 3 + 5:.3g} ms" for n, log in enumerate(LOGS)),
     *(f"{log}: isolated spikes of 'y' in {n} samples interpolated" for n, log in enumerate(LOGS)),
