@@ -148,8 +148,8 @@ def machines_option(command: Command) -> Command:
 
 
 def events_options(command: Command) -> Command:
-    """The options `--json`, as `as_json`, `--verbose` and `--debug` of commands that tell events as
-    JSON."""
+    """The options `--json`, as `as_json`, `--verbose` and `--debug` of commands that report events
+    as JSON."""
     debug = click.option("--debug", is_flag=True, expose_value=False, hidden=True)
     return click.option(
         "--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON."

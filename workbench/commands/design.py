@@ -264,7 +264,7 @@ def _robust(
 
 
 def _drift(where: str | None, machine: str) -> dict[str, float]:
-    """By how much the machine's parameters have changed between its models in force."""
+    """By how much the machine's parameters have changed between its active models."""
     from pydantic import TypeAdapter
 
     from identification.model.estimates import Estimate

@@ -24,7 +24,7 @@ SEARCH_SECONDS = 30.0
 )  # fmt: skip
 @click.option(
     "--parameters", metavar="NAME,...",
-    help="Parameters that are to be told, as m,F_cp,dv_p.  [default: all]",
+    help="Parameters to be identified, as m,F_cp,dv_p.  [default: all]",
 )  # fmt: skip
 @click.option(
     "--stroke", type=(Finite(), Finite()), metavar="LOW HIGH",
@@ -43,8 +43,8 @@ SEARCH_SECONDS = 30.0
 )  # fmt: skip
 @click.option(
     "--rivals", "trace_file", type=click.Path(path_type=Path), metavar="TRACE",
-    help="trace.json whose rivals (or, of an unknown effect, all of the library) the run is to tell"
-    " apart.",
+    help="trace.json whose rivals (or, of an unknown effect, all of the library) the run is to"
+    " discriminate.",
 )  # fmt: skip
 @click.option(
     "--budget", type=POSITIVE, default=SEARCH_SECONDS, show_default=True, metavar="SECONDS",
@@ -71,7 +71,8 @@ def command(
     as_json: bool,
     out: Path | None,
 ) -> int:
-    """Find the run to make next: the reference, within the machine's limits, that tells most.
+    """Find the run to make next: the reference, within the machine's limits, that is most
+    informative.
 
     Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
     report.html. The run begins with the machine at rest at the first r.

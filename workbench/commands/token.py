@@ -35,7 +35,7 @@ def add_token(name: str, role: str, by: str | None, where: str | None, as_json: 
     wanted: Role = "change" if role == "change" else "read"
     with _open(where) as found:
         secret = Access(found.database).add(name, wanted, by=by or getpass.getuser(), now=_now())
-    shown = f"{secret}\nThe token of {name} ({role}); it is shown this once and kept nowhere."
+    shown = f"{secret}\nThe token of {name} ({role}); it is shown only now and stored nowhere."
     emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
 
 
@@ -51,7 +51,7 @@ def list_tokens(where: str | None, as_json: bool) -> None:
         tokens = Access(found.database).tokens()
     rows = [
         (one.name, one.role, one.made_by, moment(one.at),
-         "in force" if one.ended is None else f"revoked {moment(one.ended)}")
+         "active" if one.ended is None else f"revoked {moment(one.ended)}")
         for one in tokens
     ]  # fmt: skip
     head = ("token", "role", "made by", "at", "state")

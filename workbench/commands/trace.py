@@ -31,7 +31,7 @@ from workbench.steps.stages import TRACE_STAGES
     multiple=True,
     metavar="LOG",
     shell_complete=complete_file,
-    help="Held-out log, which neither fit nor choice sees; may be given several times.",
+    help="Held-out log, used by neither fit nor model selection; may be given several times.",
 )
 @card_option
 @effects_option

@@ -61,7 +61,7 @@ def command(cron: str, port: int | None, address: str, as_json: bool, **given: A
 
 
 def _once(found: "Worker") -> bool:
-    """One pass; whether it has to come again soon. What it dies of is told, and tried again."""
+    """One pass; whether it has to come again soon. What it dies of is reported, and tried again."""
     from identification.errors import UserError
 
     try:

@@ -1,4 +1,4 @@
-"""The drift test over a machine's logs as the judge of new logs takes it.
+"""The drift test over a machine's logs as the test of new logs takes it.
 
 Its state goes from log to log in the registry, with each log's result.
 """
@@ -24,7 +24,7 @@ from workbench.steps.drift import Drifted, Stream, drift_of, model_key, seen_siz
 def drift_by_chart(
     model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
 ) -> Drift:
-    """The verdict on a log alone and by the mean of those since the model is in force.
+    """The verdict on a log alone and by the mean of those since the model is active.
 
     Raises BadModel where the stored state is none, or model and card are of different machines.
     """
@@ -51,7 +51,7 @@ def _said(test: DriftTest) -> str:
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
     moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
     if test.unsure:
-        moved.append(f"something that it cannot tell apart, of {', '.join(test.unsure)}")
+        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
 
 

@@ -59,8 +59,8 @@ def job_options(command: Command) -> Command:
                      "for writers that pause for longer than --settle."),
         click.option("--order", type=click.Choice(["time-or-name", "time"]),
                      default="time-or-name", show_default=True,
-                     help="What tells that a log is older than another, so that it puts no model "
-                     "in force: the file's time, or also the numbers in its name."),
+                     help="What makes a log older than another, so that its model does not become "
+                     "active: the file's time, or also the numbers in its name."),
         click.option("--lease", type=SECONDS_ABOVE_0, default=120.0, show_default=True, metavar="S",
                      help="Take a silent worker's machine over after this long."),
         click.option("--patience", type=SECONDS, default=60.0, show_default=True,

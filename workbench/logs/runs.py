@@ -31,7 +31,7 @@ _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
 
 @dataclass(frozen=True)
 class Fingerprint:
-    """What tells a log file from every other: name, sha256 of its bytes, rows read from it."""
+    """What identifies a log file: name, sha256 of its bytes, rows read from it."""
 
     file: str
     sha256: str
@@ -106,7 +106,7 @@ def shown_name(path: Path) -> str:
 
 
 def with_force(log: Log, path: Path, card: Card) -> Log:
-    """The log with the applied force F_e in `F`, by the card's rig, where it can be told."""
+    """The log with the applied force F_e in `F`, by the card's rig, where it is known."""
     rig = card.rig(path.name)
     F = applied_force(log, rig)
     if F is None:

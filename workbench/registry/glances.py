@@ -1,4 +1,4 @@
-"""The fleet at a glance kept beside its results, within the transaction that writes them."""
+"""The summary of the fleet kept beside its results, within the transaction that writes them."""
 
 import json
 from collections.abc import Mapping
@@ -44,7 +44,7 @@ def glance_judged(
 
 
 def glance_moved(session: Session, machine: str) -> None:
-    """Somebody has put another version in force: the next log tells how that fits."""
+    """Somebody has activated another version: the next log shows how that fits."""
     nothing = dict.fromkeys(("moved", "moved_by", "moved_trend"))
     values = {"state": "not_judged", **nothing}
     session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(values))

@@ -12,7 +12,7 @@ from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.steps.limit_cycle import LimitCycle, limit_cycle
 
-JUDGED_SHARE = 0.5  # part of a dwell that is judged
+JUDGED_SHARE = 0.5  # part of a dwell that is tested
 SETTLING_BAND = 0.05  # of a step, in which a settled position stays
 ESCAPED = 10.0  # times the step
 
