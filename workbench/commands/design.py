@@ -270,13 +270,13 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import MOVES, Registry
-    from workbench.steps.robust.machines import drift_seen
+    from workbench.steps.robust.machines import drift_found
 
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]
         models = [store.document(store.version(machine, n), "model") for n in numbers]
     friction = TypeAdapter(dict[str, Estimate])
-    return drift_seen([friction.validate_python(model["friction"]) for model in models])
+    return drift_found([friction.validate_python(model["friction"]) for model in models])
 
 
 def _kept(

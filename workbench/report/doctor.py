@@ -6,16 +6,16 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from workbench.cards.readable import number
-from workbench.documents.model import Told
-from workbench.remarks import told_once
+from workbench.documents.model import Identifiable
+from workbench.remarks import printed_once
 from workbench.report.chart import Chart
 from workbench.report.chart_figure import chart_figure
 from workbench.report.doctor_chart import doctor_charts, speed_unit, unit_of
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
-from workbench.steps.told_by_log import Way
+from workbench.steps.identifiable_by_log import Way
 
 LABEL_WIDTH = 17
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
@@ -37,7 +37,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     lines += _labelled("clock", [_clock(found.clock)])
     lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
     bad = [one.line for one in found.bad]
-    told = bad if most is None else told_once(bad, [found.file])
+    told = bad if most is None else printed_once(bad, [found.file])
     lines += _labelled("samples", [_plain(found, one) for one in told])
     lines += _labelled("delay", [_delay(one) for one in found.delays])
     if found.ways is not None:
@@ -50,15 +50,15 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
         can = ", ".join(_within(one) for one in found.told if one.can)
         lines += _labelled("identifiable", [can or "nothing"])
     lines += _labelled("only if", _open(found.told))
-    lines += _labelled("not identifiable", _not_told(found.told), 6)
+    lines += _labelled("not identifiable", _not_identifiable(found.told), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]
         lines += _labelled("effects", [f"would show: {', '.join(shown) or 'none'}",
                                        f"would not: {', '.join(hidden) or 'none'}"])  # fmt: skip
     lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
-    said = [one for one in found.remarks if most is None or not isinstance(one, Aside)]
-    said = said if most is None else told_once(said, [found.file])
+    said = [one for one in found.remarks if most is None or not isinstance(one, MinorRemark)]
+    said = said if most is None else printed_once(said, [found.file])
     lines += _labelled("note", [_plain(found, one) for one in said])
     if found.refused:
         lines += _labelled("refused", [_plain(found, found.refused)])
@@ -67,7 +67,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     return lines
 
 
-def _within(one: Told) -> str:
+def _within(one: Identifiable) -> str:
     """A parameter, and within what share of its value it can be identified."""
     return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
@@ -152,12 +152,12 @@ def _way(found: Examined, one: Way) -> str:
     )
 
 
-def _not_told(told: Iterable[Told]) -> list[str]:
+def _not_identifiable(told: Iterable[Identifiable]) -> list[str]:
     """The reasons, each with the parameters that it holds for."""
     return _together((one.why, one.name) for one in told if not (one.can or one.only_if))
 
 
-def _open(told: Iterable[Told]) -> list[str]:
+def _open(told: Iterable[Identifiable]) -> list[str]:
     """On what it depends whether others are identifiable, each with the parameters that it holds
     for."""
     return _together((one.only_if, one.name) for one in told if one.only_if)

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.cards.readable import force, length, units_of
-from workbench.report.chart import Chart, Colour, Line, Look, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel, chart_html
 from workbench.report.notes import notes
 from workbench.report.page import Section, lines_section
 from workbench.report.view import View
@@ -87,7 +87,7 @@ def prediction_chart(found: Predicted, rotary: bool) -> Chart:
             every = [np.append(getattr(run, key), gap) for run in found.runs]
             values = factor * np.concatenate(every)
             if np.any(np.isfinite(values)):
-                look: Look = "line" if colour == "measured" else "dashed"
+                look: LineStyle = "line" if colour == "measured" else "dashed"
                 lines.append(Line(said, t, values, colour, look))
         panels.append(Panel("time [s]", f"{name} [{unit}]", lines))
         if len(lines) > 1:

@@ -8,7 +8,7 @@ from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
-from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
 from workbench.report.notes import notes
@@ -22,7 +22,7 @@ from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spre
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")
-CURVE_LOOKS: dict[str, tuple[Colour, Look]] = {
+CURVE_STYLES: dict[str, tuple[Colour, LineStyle]] = {
     ROBUST: ("model", "line"),
     NOMINAL: ("before", "dotted"),
     PRESENT: ("measured", "dashed"),
@@ -75,7 +75,7 @@ def promise_table(found: Robust, rotary: bool) -> Part:
 def beside_table(found: Robust, rotary: bool) -> Part:
     """The medians of every loop, and the shares."""
     rows = [
-        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_LOOKS))
+        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_STYLES))
         for one, _ in _of(found.promises[ROBUST])
     ]
     return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
@@ -221,7 +221,7 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
         at, share = at[keep], share[keep]
         # Where many machines have one value the line goes up, which an axis takes as going on.
         apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
-        lines.append(Line(name, at + apart, share, *CURVE_LOOKS[name]))
+        lines.append(Line(name, at + apart, share, *CURVE_STYLES[name]))
     return Panel(
         f"{one.words.split(',')[0]}{unit}", "share of machines [%]", lines,
         marks=[] if limit is None else [Mark(factor * limit, "x")],
