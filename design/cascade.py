@@ -122,7 +122,7 @@ def tune_cascade(
     best = _first_kept(seen, goals, found)
     if best is None:
         raise BadSpecification(
-            "no P-PI cascade keeps these plants stable with the margins asked for; ask for less"
+            "no P-PI cascade stabilizes these plants with the margins asked for; ask for less"
         )
     again = [
         (score, gains, best.series)

@@ -332,7 +332,7 @@ def _off(spread: Spread, recorded: RecordedLogs) -> str:
     force = units_of(recorded.rig.motion)["F_cp"]
     y = [one.position_rms for one in spread.logs]
     F = [one.force_rms for one in spread.logs if one.force_rms is not None]
-    said = f"the run is off by {factor * max(y):.3g} {unit} rms in position"
+    said = f"the run has an error of {factor * max(y):.3g} {unit} rms in position"
     said += f" (sensor's noise {factor * spread.noise[0]:.2g} {unit})"
     if F:
         said += f" and {max(F):.3g} {force} in force (noise {spread.noise[1]:.2g} {force})"

@@ -313,7 +313,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
 
 def test_the_demo_sets_the_controllers_side_by_side() -> None:
     text = words_of(next(demo()).text())
-    assert "Recommended: RST with the friction compensator, which keeps all limits" in text
+    assert "Recommended: RST with the friction compensator, which meets all limits" in text
     assert "before: present" in text and "after: RST+comp" in text
     assert "stribeck F_s 3.50 N 3.43 to 3.57 3.5 " in text
     assert "workbench init LOG" in text and "report.html" in text

@@ -38,7 +38,7 @@ NOT_FOR_VELOCITY = (
 
 @click.command(
     cls=StatusCommand,
-    refusal="the model carries no design, or no controller keeps the goals (design.json then says"
+    refusal="the model carries no design, or no controller meets the goals (design.json then says"
     " what each misses, and recommends none)",
     epilog="Example: workbench design runs/.../model.json --poles 20,0.9",
 )
@@ -76,7 +76,7 @@ NOT_FOR_VELOCITY = (
 )
 @click.option(
     "--robust", is_flag=True,
-    help="Choose by the loops of machines drawn from what the model is not sure of.",
+    help="Choose by the loops of machines drawn from the model's uncertainty.",
 )  # fmt: skip
 @click.option(
     "--draws", type=click.IntRange(20, 10_000), default=200, show_default=True,

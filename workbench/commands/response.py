@@ -32,9 +32,9 @@ if TYPE_CHECKING:
 @card_option
 @click.option(
     "--model", "model_file", type=click.Path(path_type=Path), metavar="MODEL",
-    help="model.json whose friction is taken off the force.  [default: identified from the logs]",
+    help="model.json whose friction is subtracted.  [default: identified from the logs]",
 )  # fmt: skip
-@click.option("--friction-left-in", is_flag=True, help="Take nothing off the force.")
+@click.option("--friction-left-in", is_flag=True, help="Subtract nothing from the force.")
 @click.option(
     "--lowest", type=POSITIVE, metavar="HZ",
     help="Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",

@@ -17,7 +17,7 @@ from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
 from workbench.steps.identifiable_by_log import Way
 
-LABEL_WIDTH = 17
+LABEL_WIDTH = 15
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 
@@ -42,15 +42,15 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     lines += _labelled("delay", [_delay(one) for one in found.delays])
     if found.ways is not None:
         ways = found.ways
-        lines += _labelled("way +", [_way(found, ways.positive)])
-        lines += _labelled("way -", [_way(found, ways.negative)])
+        lines += _labelled("direction +", [_way(found, ways.positive)])
+        lines += _labelled("direction -", [_way(found, ways.negative)])
         lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
                                       f" {ways.rested:.3g} s"])  # fmt: skip
     if found.told:
         can = ", ".join(_within(one) for one in found.told if one.can)
         lines += _labelled("identifiable", [can or "nothing"])
     lines += _labelled("only if", _open(found.told))
-    lines += _labelled("not identifiable", _not_identifiable(found.told), 6)
+    lines += _labelled("unidentifiable", _not_identifiable(found.told), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]
@@ -129,7 +129,7 @@ def _sensor(found: Examined, one: SensorState) -> str:
     low, high = factor * one.low, factor * one.high
     if low == high:
         return f"{one.name}: always {low:.4g} {unit}".rstrip()
-    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no quantization step found"
+    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no steps"
     noise = f"noise {number(factor * one.noise, 2)}"
     share = max(one.noise, one.step / np.sqrt(12.0)) / (one.high - one.low)
     span = f"{low:.4g} to {high:.4g} {unit}".rstrip()

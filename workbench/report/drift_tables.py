@@ -142,11 +142,12 @@ def what_the_columns_say(found: Drifted) -> list[str]:
     """Legend of the tables, and what counts as a change."""
     setting = found.settings
     return [
-        "this log, mean of logs: how far the parameters have moved, of how far it takes to be"
-        " drift; chi-square: what the model leaves, of what it may",
-        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
-        f" sure: thresholds for a false alarm in {setting.run_length:g} logs or more",
-        "the intervals hold the errors of the model and of the log, and how much the machine varies"
+        "this log, mean of logs: drift statistic, of its threshold; chi-square: residual of the"
+        " model, of its limit",
+        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where"
+        f" significant: thresholds for a false alarm in {setting.run_length:g} logs or more",
+        "the intervals contain the errors of the model and of the log, and how much the machine"
+        " varies"
         f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
     ]
 

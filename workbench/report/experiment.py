@@ -23,7 +23,7 @@ PIECE_NAMES = {
 }
 PROMISE_STYLES: tuple[tuple[str, Colour, float, str], ...] = (
     ("before", "before", -0.1, "now"),
-    ("after", "measured", 0.1, "promised after the run"),
+    ("after", "measured", 0.1, "expected after the run"),
 )
 RUN_CAPTION = (
     "Reference and simulated run on the model and on machines drawn from what the model leaves open"

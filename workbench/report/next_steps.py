@@ -67,7 +67,7 @@ def after_design(
         return None
     words = ("design", str(model_file), *kept)
     if asked_poles:
-        return step("poles that keep the goals are searched", *words)
+        return step("poles that meet the goals are searched", *words)
     best = max(found.controllers.values(), key=lambda one: (-len(one.missed), _worst(one)))
     modulus, delay = _floor(_worst(best)), best.margins.delay_samples
     of_margins = all("margin" in missed for missed in best.missed)
@@ -79,10 +79,10 @@ def after_design(
 
 
 def after_robust(found: "Robust", model_file: Path) -> Step | None:
-    """Where no loop keeps the limits often enough: the run that narrows what is not sure."""
+    """Where no loop keeps the limits often enough: the run that reduces the uncertainty."""
     if found.passed:
         return None
-    return step("the run that narrows what is not sure", "experiment", model_file)
+    return step("the run that reduces the uncertainty", "experiment", model_file)
 
 
 def _worst(one: "Controller") -> float:

@@ -32,17 +32,15 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     lines = []
     if summary["position_rms"] is not None:
         rms = length(summary["position_rms"], rotary)
-        lines.append(f"position ({start}, driven by {by}): off by {rms} rms")
+        lines.append(f"position ({start}, driven by {by}): error {rms} rms")
     if summary["run_refused"] is not None:
         lines.append(f"position: {summary['run_refused']}")
     if summary["force_predicted_rms"] is not None:
         rms = force(summary["force_predicted_rms"], rotary)
-        lines.append(
-            f"force, inverse model: off by {rms} rms while sliding, outside the stick band"
-        )
+        lines.append(f"force, inverse model: error {rms} rms while sliding, outside the stick band")
     if summary["force_simulated_rms"] is not None:
         rms = force(summary["force_simulated_rms"], rotary)
-        lines.append(f"force, simulated: off by {rms} rms")
+        lines.append(f"force, simulated: error {rms} rms")
     return lines
 
 
@@ -93,5 +91,5 @@ def prediction_chart(found: Predicted, rotary: bool) -> Chart:
         if len(lines) > 1:
             measured, model = lines[:2]
             off = Line(f"{measured.name} less {model.name}", t, measured.y - model.y)
-            panels.append(Panel("time [s]", f"off by [{unit}]", [off]))
+            panels.append(Panel("time [s]", f"error [{unit}]", [off]))
     return Chart("prediction", "measured and predicted position and force over time", panels)

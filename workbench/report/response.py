@@ -117,7 +117,7 @@ def friction_line(found: Responded) -> str:
     upto = float(every.f[every.body.seen][-1])
     with_, without = (sure_share(one, upto) for one in (every.with_friction, every.body))
     return (
-        f"friction: taken off the force; that leaves a coherence above {COHERENCE_SURE:g} on"
+        f"friction: subtracted from the force; that leaves a coherence above {COHERENCE_SURE:g} on"
         f" {100 * without:.0f} % of the octaves up to {number(upto)} Hz,"
         f" {100 * with_:.0f} % with friction left in"
     )

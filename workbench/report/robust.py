@@ -50,7 +50,7 @@ def robust_sentence(found: Robust) -> str:
     )
     if promise.every == 1.0:
         return (
-            f"{called}{with_it}: keeps every limit on each of {found.asked.draws} machines drawn."
+            f"{called}{with_it}: meets every limit on each of {found.asked.draws} machines drawn."
         )
     return (
         f"{called}{with_it}: each limit holds on at least {100 * least:.0f} % of"
@@ -181,7 +181,7 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
 
 def _then(found: Robust) -> list[str]:
     if not found.passed:
-        return ["`workbench experiment MODEL` finds the run that narrows what is not sure, then"
+        return ["`workbench experiment MODEL` finds the run that reduces the uncertainty, then"
                 " identify and design again"]  # fmt: skip
     return ["`workbench validate MODEL design.json` shows its loops in time, `workbench export"
             " design.json --to c` writes the code"]  # fmt: skip

@@ -129,7 +129,7 @@ def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
     left, off = found.after["train"].force_rms, found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
-            f"the free run is off by {length(off, rotary)} in 2 s (sensors' noise"
+            f"the free run has an error of {length(off, rotary)} in 2 s (sensors' noise"
             f" {length(found.noise_y, rotary)}), and it {depends}."
         )
     said = "an unknown part" if left is None else force(left, rotary)

@@ -252,7 +252,7 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
         said = _said(meaning, told, allowed, "") if light == "red" else ""
         return Quantity(name, meaning, told, allowed, light, said)
     outside = not allowed.low <= told.value <= allowed.high
-    unsure = ", though this log is not sure of it" if outside else " within its interval"
+    unsure = ", though not significantly by this log" if outside else " within its interval"
     if allowed.source == "usual":
         unsure = ": something else acts"
     return Quantity(name, meaning, told, allowed, light, _said(meaning, told, allowed, unsure))

@@ -162,10 +162,10 @@ def drift_of(
     if model.own_logs is None and model.fit.chi_square > ADEQUATE:
         remarks.append(
             "the model leaves more than noise, and its file does not hold how far its own logs lie"
-            " from it; identify it again, or a drift may be cried that is the model's own misfit"
+            " from it; identify it again, or the model's own misfit may be taken for drift"
         )
     if stream is not None and stream.state.model != key:
-        remarks.append("the stored state is of another model; it begins anew with this one")
+        remarks.append("the stored state is of another model; it starts again with this one")
         stream = None
     before = {one.sha256 for one in stream.seen} if stream else set()
     state = stream.state if stream else None

@@ -98,7 +98,8 @@ def broken_promises(model: Model) -> tuple[str, ...]:
         return ()
     why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
     return (
-        f"intervals are wider than the logs promised (in brackets): {', '.join(wider)}; {why}, or"
+        f"intervals are wider than predicted from the logs (in brackets): {', '.join(wider)};"
+        f" {why}, or"
         " their noise is not the sensors' alone",
     )
 

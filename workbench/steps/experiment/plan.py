@@ -160,7 +160,7 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
         out.append(f"{names}: not identifiable; tried within a third of the assumed values")
     if not model.fit.adequate:
         out.append(
-            "the model leaves more than noise of its logs: what is promised holds for a machine"
+            "the model leaves more than noise of its logs: the prediction holds for a machine"
             " like the model; run 'workbench trace' for what is missing"
         )
     if scale < 1.0:
