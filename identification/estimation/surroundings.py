@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.estimates import of_effect, told_estimate
+from identification.estimation.estimates import of_effect, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
     NOTHING_KNOWN,
@@ -238,7 +238,7 @@ def lag_estimate(around: Surroundings) -> Estimate | None:
     """By how much the motion follows the column of the force [s]; None where it does not."""
     if not around.lag.value:
         return None
-    return told_estimate(around.lag.value, "s", around.lag.sd)
+    return reported_estimate(around.lag.value, "s", around.lag.sd)
 
 
 def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:

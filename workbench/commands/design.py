@@ -38,7 +38,7 @@ NOT_FOR_VELOCITY = (
 
 @click.command(
     cls=StatusCommand,
-    refusal="the model carries no design, or no controller keeps the goals (design.json then says"
+    refusal="the model carries no design, or no controller meets the goals (design.json then says"
     " what each misses, and recommends none)",
     epilog="Example: workbench design runs/.../model.json --poles 20,0.9",
 )
@@ -76,7 +76,7 @@ NOT_FOR_VELOCITY = (
 )
 @click.option(
     "--robust", is_flag=True,
-    help="Choose by the loops of machines drawn from what the model is not sure of.",
+    help="Choose by the loops of machines drawn from the model's uncertainty.",
 )  # fmt: skip
 @click.option(
     "--draws", type=click.IntRange(20, 10_000), default=200, show_default=True,
@@ -270,13 +270,13 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import MOVES, Registry
-    from workbench.steps.robust.machines import drift_seen
+    from workbench.steps.robust.machines import drift_found
 
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]
         models = [store.document(store.version(machine, n), "model") for n in numbers]
     friction = TypeAdapter(dict[str, Estimate])
-    return drift_seen([friction.validate_python(model["friction"]) for model in models])
+    return drift_found([friction.validate_python(model["friction"]) for model in models])
 
 
 def _kept(

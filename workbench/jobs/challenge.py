@@ -25,8 +25,8 @@ from workbench.steps.loop_figures import (
     SMOOTH_SHARE,
     SMOOTH_SPEED,
     STEP_SHARE,
-    judged_of,
     slowest,
+    tested_of,
     travel,
 )
 from workbench.steps.predict import default_drive, predict
@@ -113,7 +113,7 @@ def challenge(
         return Contest(False, False, lost, errors, loop)
     lost = _lost_loop(old, new, terms)
     keeps = old is not None and old.rms is not None and not old.missed
-    said = _won(errors, loop) if not lost else f"{_held_out_said(errors)}; {lost}"
+    said = _won(errors, loop) if not lost else f"{_held_out_words(errors)}; {lost}"
     return Contest(not lost, bool(lost) and keeps, said, errors, loop)
 
 
@@ -194,7 +194,7 @@ def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
 
 
 def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
-    text = _held_out_said(errors)
+    text = _held_out_words(errors)
     new, old = loop["challenger"], loop["champion"]
     if new is None or new.rms is None:
         return text
@@ -206,7 +206,7 @@ def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
     return f"{text} against {old.rms:.4g}"
 
 
-def _held_out_said(errors: dict[str, HeldOut]) -> str:
+def _held_out_words(errors: dict[str, HeldOut]) -> str:
     return f"held out: {_figures(errors['challenger'])} against {_figures(errors['champion'])}"
 
 
@@ -236,7 +236,7 @@ def tracking(
     """A design on a machine: what validation says of it, and its error on the common reference."""
     if found.recommended == "none":
         return Tracking(None, ("no controller keeps its goals",))
-    name = judged_of(found)
+    name = tested_of(found)
     try:
         checked, _ = validate(machine, found, rng)
         reference = common_reference(machine, designs, loop_period(found))
@@ -255,7 +255,7 @@ def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Arr
     dwell = max(
         max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
     )
-    w = SMOOTH_SPEED * min(one.controllers[judged_of(one)].dominant[0] for one in designs)
+    w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
     t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)

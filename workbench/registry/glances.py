@@ -10,7 +10,7 @@ from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.orm import Session
 
 from workbench.output import dumps
-from workbench.registry.at_a_glance import glance, state_of, with_log
+from workbench.registry.machine_summary import most_moved, state_of, with_log
 from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
 
 
@@ -35,7 +35,7 @@ def glance_judged(
     """The newest log has its result."""
     row = session.get_one(MachineNowRow, machine)
     row.state = state_of(verdict, evidence)
-    name, change = glance(evidence)
+    name, change = most_moved(evidence)
     if name is not None:
         kept = session.get_one(MachineTrendRow, machine)
         trend = with_log(json.loads(kept.trend), evidence)

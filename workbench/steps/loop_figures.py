@@ -174,7 +174,7 @@ def slowest(found: Design) -> float:
     return -found.plant.h / float(np.log(min(radius, 0.9999)))
 
 
-def judged_of(found: Design) -> Structure:
+def tested_of(found: Design) -> Structure:
     """The controller that decides: the recommended one, or the first there is."""
     there = [name for name in DESIGNED_STRUCTURES if name in found.controllers]
     return next((name for name in there if name == found.recommended), there[0])

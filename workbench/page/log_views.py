@@ -15,7 +15,7 @@ from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
     from identification.arrays import Array
-    from workbench.documents.model import Told
+    from workbench.documents.model import Identifiable
     from workbench.logs.unknown import UnknownLog
     from workbench.steps.first_card.proposal import Proposal
 
@@ -24,7 +24,7 @@ FIRST_POINTS = 8000  # of each column's line, every peak kept
 LOGS_REMEMBERED = 1
 
 
-class BadLook(UserError):
+class BadView(UserError):
     """What is wrong with a log or its card, without the server's folders in it."""
 
 
@@ -58,7 +58,7 @@ def refuse_no_log(path: Path) -> None:
     try:
         checked_format(path, FileSpec())
     except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
+        raise BadView(without_path(str(error), [path])) from None
 
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
@@ -83,13 +83,13 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 def proposal(path: Path) -> "Proposal":
     """The card that `init` proposes, and what is hardly identifiable from the log; raises
     BadLook."""
-    from workbench.steps.first_card.looked_over import looked_over
+    from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
 
     try:
-        return looked_over(proposed(path))
+        return checked_proposal(proposed(path))
     except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
+        raise BadView(without_path(str(error), [path])) from None
 
 
 def headers(path: Path) -> list[tuple[str, str | int, str]]:
@@ -110,12 +110,12 @@ def doctor_chart(path: Path, card: Path) -> str:
     from workbench.cards.card import load_card
     from workbench.report.chart import chart_html
     from workbench.report.doctor_chart import doctor_charts
-    from workbench.steps.doctor import looked
+    from workbench.steps.doctor import checked_log
 
     try:
-        found = looked(path, load_card(card, with_recipe=False))
+        found = checked_log(path, load_card(card, with_recipe=False))
     except UserError as error:
-        raise BadLook(without_path(str(error), [path, card])) from None
+        raise BadView(without_path(str(error), [path, card])) from None
     return "".join(str(chart_html(chart)) for chart in doctor_charts(found))
 
 
@@ -128,13 +128,13 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
     try:
         found = examine(path, load_card(card, with_recipe=False))
     except UserError as error:
-        raise BadLook(without_path(str(error), [path, card])) from None
+        raise BadView(without_path(str(error), [path, card])) from None
     lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
     told = tuple((one.name, one.can, _said_of(one)) for one in found.told)
     return DoctorFound(found.verdict, tuple(lines), told)
 
 
-def _said_of(one: "Told") -> str:
+def _said_of(one: "Identifiable") -> str:
     """Why a parameter is identifiable, on what that depends, or what run would identify it."""
     if one.only_if:
         return f"only if {one.only_if}"
@@ -145,7 +145,7 @@ def _unknown(path: Path) -> "UnknownLog":
     try:
         return _read(path, path.stat().st_mtime_ns)
     except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
+        raise BadView(without_path(str(error), [path])) from None
 
 
 @lru_cache(maxsize=LOGS_REMEMBERED)

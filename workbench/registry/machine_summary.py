@@ -25,7 +25,7 @@ def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
     return _BY_VERDICT.get(verdict, "not_judged")
 
 
-def glance(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
+def most_moved(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
     """The parameter that moved most, with its relative change; None where the log gave none.
 
     That is the one whose change is largest beyond its own 95 % interval; where all lie within
