@@ -127,12 +127,13 @@ def test_viscous_friction_takes_no_coulomb_friction_below_nothing() -> None:
 
 
 def test_noise_of_the_position_costs_no_mass() -> None:
-    """Narrow windows fit the force as well, but their accelerations are half noise."""
+    """Where more than noise is left in windows of any width, narrow ones leave hardly more, but
+    their accelerations are noise."""
     log = swinging((1.0, 200.0, 200.0, 0.0, 0.0), hz=2.0, noise_y=4e-5)
-    one = moved(log)
-    narrow = solve_rows(rows_of_width(one, HALF_WIDTHS[0], NONE).rows).theta
+    log = log.with_signals(F=log["F"] + 60.0 * np.sin(1.1 * log["t"]))
+    narrow = solve_rows(rows_of_width(moved(log), HALF_WIDTHS[0], NONE).rows).theta
     assert narrow[0] < 0.9
-    assert by_least_squares(log)[0] == pytest.approx(1.0, abs=0.03)
+    assert by_least_squares(log)[0] == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_log_of_few_samples_has_windows_of_few() -> None:
