@@ -2,51 +2,34 @@
 
 import getpass
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from workbench.ending import StatusGroup
-from workbench.options import effects_option, registry_option
-from workbench.output import emit, results, verbose_option
+from workbench.options import EFFECTS_OPTION, MODEL_ARGUMENT, REGISTRY_OPTION
+from workbench.output import JSON_OPTION, emit, results
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
     from workbench.registry.values import Decision, Version
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 KINDS = ("model", "design", "validation")
-
-
-def registry_options(command: Command) -> Command:
-    """The options of every registry command: `where` (--registry) and `as_json` (--json)."""
-    options = (
-        registry_option,
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
-        verbose_option,
-        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-def decision_options(command: Command) -> Command:
-    """Why and by whom: `reason` (--reason) and `by` (--by)."""
-    by = click.option("--by", metavar="NAME", help="Who decides.  [default: you]")
-    why = click.option("--reason", required=True, metavar="TEXT", callback=_given,
-                       help="Why; it is recorded.")  # fmt: skip
-    return why(by(command))
 
 
 def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
     if not value.strip():
         raise click.UsageError("--reason is empty; say why in a few words.", ctx)
     return value.strip()
+
+
+MACHINE_ARGUMENT = argument()
+BY_OPTION = option("Who decides.  [default: you]", metavar="NAME")
+REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 
 
 @click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
@@ -59,8 +42,8 @@ def command() -> None:
 
 
 @command.command("list", epilog="Example: workbench registry list --registry fleet.db")
-@registry_options
-def list_machines(where: str | None, as_json: bool) -> None:
+@by_signature
+def list_machines(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
     """List the machines, what is in force on each, and how many logs wait."""
     from workbench.registry.views import list_view
 
@@ -70,13 +53,13 @@ def list_machines(where: str | None, as_json: bool) -> None:
 
 
 @command.command(epilog="Example: workbench registry show bench-a 2 --out version2")
-@click.argument("machine")
-@click.argument("number", type=click.IntRange(min=1), required=False)
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write the files of the version too.")  # fmt: skip
-@registry_options
+@by_signature
 def show(
-    machine: str, number: int | None, out: Path | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    number: int | None = argument(type=click.IntRange(min=1)),
+    out: Path | None = option("Write the files of the version too.", metavar="DIR"),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show a machine: what is in force, every decision with its reason, every log's result.
 
@@ -98,12 +81,13 @@ def show(
 
 
 @command.command(epilog="Example: workbench registry diff bench-a 1 2")
-@click.argument("machine")
-@click.argument("first", type=click.IntRange(min=1), required=False)
-@click.argument("second", type=click.IntRange(min=1), required=False)
-@registry_options
+@by_signature
 def diff(
-    machine: str, first: int | None, second: int | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    first: int | None = argument(type=click.IntRange(min=1)),
+    second: int | None = argument(type=click.IntRange(min=1)),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show the parameters of two versions side by side, with units and 95 % intervals.
 
@@ -129,27 +113,18 @@ def diff(
 @command.command(
     epilog="Example: workbench registry add bench-a model.json design.json --promote --reason first"
 )
-@click.argument("machine")
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("design_file", metavar="[DESIGN]", required=False,
-                type=click.Path(path_type=Path))  # fmt: skip
-@click.option("--validation", type=click.Path(path_type=Path), metavar="FILE",
-              help="validation.json of the design.")  # fmt: skip
-@click.option("--promote", is_flag=True, help="Put it in force as well.")
-@effects_option
-@decision_options
-@registry_options
+@by_signature
 def add(
-    machine: str,
-    model_file: Path,
-    design_file: Path | None,
-    validation: Path | None,
-    promote: bool,
-    effects: tuple[Path, ...],
-    reason: str,
-    by: str | None,
-    where: str | None,
-    as_json: bool,
+    machine: str = MACHINE_ARGUMENT,
+    model_file: Path = MODEL_ARGUMENT,
+    design_file: Path | None = argument("[DESIGN]"),
+    validation: Path | None = option("validation.json of the design.", metavar="FILE"),
+    promote: bool = option("Put it in force as well."),
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
 
@@ -182,12 +157,14 @@ def add(
 
 
 @command.command(epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'")
-@click.argument("machine")
-@click.argument("number", type=click.IntRange(min=1))
-@decision_options
-@registry_options
+@by_signature
 def promote(
-    machine: str, number: int, reason: str, by: str | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    number: int = argument(type=click.IntRange(min=1)),
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Put a version of a machine in force."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
@@ -197,10 +174,14 @@ def promote(
 
 
 @command.command(epilog="Example: workbench registry rollback bench-a --reason 'it hunts'")
-@click.argument("machine")
-@decision_options
-@registry_options
-def rollback(machine: str, reason: str, by: str | None, where: str | None, as_json: bool) -> None:
+@by_signature
+def rollback(
+    machine: str = MACHINE_ARGUMENT,
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
+) -> None:
     """Put the version in force that was before the present one; again goes one further back."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
@@ -209,17 +190,14 @@ def rollback(machine: str, reason: str, by: str | None, where: str | None, as_js
 
 
 @command.command(epilog="Example: workbench registry retry bench-a --reason 'card corrected'")
-@click.argument("machine")
-@click.argument("logs", nargs=-1, metavar="[LOG...]")
-@decision_options
-@registry_options
+@by_signature
 def retry(
-    machine: str,
-    logs: tuple[str, ...],
-    reason: str,
-    by: str | None,
-    where: str | None,
-    as_json: bool,
+    machine: str = MACHINE_ARGUMENT,
+    logs: tuple[str, ...] = argument("[LOG...]"),
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Have logs judged again by the next pass; their earlier results stay on record.
 
