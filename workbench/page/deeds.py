@@ -13,8 +13,7 @@ from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
 from workbench.page import version_looks
-from workbench.page.dropped import card_of, log_of
-from workbench.page.kept import keep_files, refuse_machine
+from workbench.page.dropped import card_of, keep_files, log_of, refuse_machine
 from workbench.page.pages import go, part
 from workbench.page.version_looks import EXPORTS
 from workbench.page.visitors import Visitor, changing, form_of, reading

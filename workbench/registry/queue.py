@@ -17,9 +17,9 @@ from sqlalchemy import and_, delete, func, select
 from sqlalchemy.orm import Session
 
 from workbench.output import dumps
+from workbench.registry.at_a_glance import glance_heard, glance_judged
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.glances import glance_heard, glance_judged
 from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
     add_version,

@@ -11,8 +11,8 @@ from sqlalchemy.orm import Session, aliased
 
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
+from workbench.registry.at_a_glance import begin_glance, glance_moved
 from workbench.registry.errors import BadRegistry
-from workbench.registry.glances import begin_glance, glance_moved
 from workbench.registry.tables import (
     DecisionRow,
     InForceRow,

@@ -13,7 +13,7 @@ from identification.simulation.effect_along_motion import contribution
 from identification.tracing.result import Residual, Trace
 from workbench.cards.readable import units_of
 from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
-from workbench.report.figures import SHOWN_SHARE, evenly_spread
+from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
 from workbench.report.page import Section
 from workbench.report.trace_words import words
 

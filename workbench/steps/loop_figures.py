@@ -23,9 +23,8 @@ from workbench.documents.design import (
 )
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
-from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import plants_of
-from workbench.steps.loop_motion import JUDGED_SHARE, loop_motion
+from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
