@@ -5,7 +5,7 @@ import json
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -17,8 +17,6 @@ from workbench.signature import argument, by_signature, option
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
     from workbench.registry.values import Decision, Version
-
-KINDS = ("model", "design", "validation")
 
 
 def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
@@ -104,7 +102,7 @@ def diff(
                 f"{machine}: no version before {after.number}; name two versions to compare"
             )
         before = found.version(machine, first if first is not None else after.number - 1)
-        lines = difference(_documents(found, before), _documents(found, after))
+        lines = difference(found.documents(before), found.documents(after))
     names = (f"version {before.number}", f"version {after.number}")
     result = {"machine": machine, "versions": [before, after], "parameters": lines}
     emit(result, as_json, lambda: difference_view(lines, names))
@@ -232,16 +230,9 @@ def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     return version
 
 
-def _documents(found: "Registry", version: "Version") -> dict[str, dict[str, Any] | None]:
-    return {
-        kind: found.document(version, kind) if getattr(version, kind) else None  # type: ignore[arg-type]
-        for kind in KINDS
-    }
-
-
 def _write(found: "Registry", version: "Version", out: Path) -> None:
     with results("registry", out) as folder:
-        for kind, document in _documents(found, version).items():
+        for kind, document in found.documents(version).items():
             if document is not None:
                 folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
 

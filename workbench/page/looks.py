@@ -3,6 +3,8 @@
 Each takes paths and texts and gives plain values; errors of the user are `UserError`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -55,10 +57,8 @@ def refuse_no_log(path: Path) -> None:
     from workbench.cards.card_tables import FileSpec
     from workbench.logs.formats import checked_format
 
-    try:
+    with _without(path):
         checked_format(path, FileSpec())
-    except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
 
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
@@ -85,10 +85,8 @@ def proposal(path: Path) -> "Proposal":
     from workbench.steps.first_card.looked_over import looked_over
     from workbench.steps.first_card.proposal import proposed
 
-    try:
+    with _without(path):
         return looked_over(proposed(path))
-    except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
 
 
 def headers(path: Path) -> list[tuple[str, str | int, str]]:
@@ -111,10 +109,8 @@ def doctor_chart(path: Path, card: Path) -> str:
     from workbench.report.doctor_chart import doctor_charts
     from workbench.steps.doctor import looked
 
-    try:
+    with _without(path, card):
         found = looked(path, load_card(card, with_recipe=False))
-    except UserError as error:
-        raise BadLook(without_path(str(error), [path, card])) from None
     return "".join(str(chart_html(chart)) for chart in doctor_charts(found))
 
 
@@ -124,10 +120,8 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
     from workbench.report.doctor import doctor_view
     from workbench.steps.doctor import examine
 
-    try:
+    with _without(path, card):
         found = examine(path, load_card(card, with_recipe=False))
-    except UserError as error:
-        raise BadLook(without_path(str(error), [path, card])) from None
     lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
     told = tuple((one.name, one.can, _said_of(one)) for one in found.told)
     return DoctorFound(found.verdict, tuple(lines), told)
@@ -141,10 +135,17 @@ def _said_of(one: "Told") -> str:
 
 
 def _unknown(path: Path) -> "UnknownLog":
-    try:
+    with _without(path):
         return _read(path, path.stat().st_mtime_ns)
+
+
+@contextmanager
+def _without(*paths: Path) -> Iterator[None]:
+    """Within the block an error of the user becomes BadLook, without the folders of these files."""
+    try:
+        yield
     except UserError as error:
-        raise BadLook(without_path(str(error), [path])) from None
+        raise BadLook(without_path(str(error), paths)) from None
 
 
 @lru_cache(maxsize=LOGS_REMEMBERED)
