@@ -37,7 +37,9 @@ def add_token(
     from workbench.registry.access import Access
 
     with _open(where) as found:
-        secret = Access(found.database).add(name, role, by=by or getpass.getuser(), now=_now())
+        secret = Access(found.database).add(
+            name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
+        )
     shown = f"{secret}\nThe token of {name} ({role}); it is shown this once and kept nowhere."
     emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
 
@@ -74,7 +76,7 @@ def revoke_token(
     from workbench.registry.access import Access
 
     with _open(where) as found:
-        Access(found.database).revoke(name, by=by or getpass.getuser(), now=_now())
+        Access(found.database).revoke(name, by=by or getpass.getuser(), now=datetime.now(UTC))
     emit({"name": name, "revoked": True}, as_json, lambda: f"{name}: revoked")
 
 
@@ -83,7 +85,3 @@ def _open(where: str | None) -> "Registry":
     from workbench.registry.store import Registry
 
     return Registry(location(where))
-
-
-def _now() -> datetime:
-    return datetime.now(UTC)
