@@ -215,7 +215,7 @@ def _points(
 def _first_kept(
     seen: _Seen, goals: Goals, found: Sequence[tuple[float, CascadeGains, SeriesFilter | None]]
 ) -> TunedCascade | None:
-    """The first that is stable on all plants and keeps the goals, as they are told exactly.
+    """The first that is stable on all plants and meets the goals, as they are given exactly.
 
     Where none does, the first that is stable; None where none is.
     """

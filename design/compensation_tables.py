@@ -16,7 +16,7 @@ from identification.simulation.effect_along_motion import contribution
 TABLE_ERROR = 2e-3  # largest relative error between the points of a table with room for them
 CURVE_POINTS = 1500  # in which a curve is held against the straight lines of a table
 TURN_POINTS = 720  # of one turn
-LOWEST_OF_TABLE = 1e-3  # lowest speed of a table, of its highest, where no stick band is told
+LOWEST_OF_TABLE = 1e-3  # lowest speed of a table, of its highest, where no stick band is identified
 NO_SLOPE = 1e-12  # of the largest, below which an amplitude is none
 
 

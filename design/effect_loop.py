@@ -29,7 +29,7 @@ def simulate_effect_loop(
     cascade.position.h may be a multiple of h. Raises BadModel where the parts do not fit together,
     or a needed signal is missing.
     """
-    # In `simulate_loop` a motor's controller is told of a clipped command, another's is not.
+    # In `simulate_loop` a motor's controller knows of a clipped command, another's is not.
     told = 0.0 if cascade.force is None else None
     limit = cascade.control_limit
     servo = Servo(cascade.position, cascade.force, friction, control_limit=limit, anti_windup=told)

@@ -189,7 +189,7 @@ def _stable_loop(A: ArrayLike, B: ArrayLike, controller: RST) -> tuple[_Loop, Co
     if not np.all(sum(loop.both(grid))):
         # A S and B R both vanish there: that the computed pole lies inside is rounding alone.
         raise BadSpecification(
-            "a closed-loop pole lies on the unit circle but for rounding: no margins can be told;"
+            "a closed-loop pole lies on the unit circle but for rounding: no margins are defined;"
             " ask for faster poles"
         )
     return loop, poles, grid

@@ -14,7 +14,7 @@ from identification.signals.filters import Filter
 
 FilterKind = Literal["notch", "low-pass"]
 NOTCH_WIDTHS = (0.3, 0.7, 1.2)  # dampings of a notch's poles tried: half its width over its f
-DEEPEST_NOTCH = 0.05  # gain: a resonance that is told to 2 % leaves no more of a deeper one
+DEEPEST_NOTCH = 0.05  # gain: a resonance that is known to 2 % leaves no more of a deeper one
 NOTCH_PLACES = (1.0, 0.9, 1.1)  # of a notch, in units of the resonance
 CUTS = (1.5, 1.0, 0.7, 0.5)  # of a low-pass, in units of the resonance
 LOW_PASS_DAMPING = 0.7

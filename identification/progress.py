@@ -1,4 +1,4 @@
-"""How far a long computation has come, told to whoever asked, and whether it is to go on."""
+"""How far a long computation has come, reported to whoever asked, and whether it is to go on."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -4,7 +4,7 @@
 class Aside(str):
     """A remark on which a reader of the result cannot act, and that does not change how it reads.
 
-    It is told in reports and with `--verbose`; read back from a file it is a text as any other.
+    It is printed in reports and with `--verbose`; read back from a file it is a text as any other.
     """
 
     __slots__ = ()

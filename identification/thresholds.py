@@ -1,4 +1,4 @@
-"""The numbers that decide what is said of a log: adequate, told or null, an effect, drift.
+"""The numbers that decide what is said of a log: adequate, identified or null, an effect, drift.
 
 Each is a value to which one statistic is compared; numbers that only steer a search stand where it
 is. `benchmarks/ablation.py` shows what each changes on the blind benchmark, off, halved or doubled;
@@ -12,12 +12,12 @@ decides on either side. A misfit is a mean square in units of the sensors' noise
 COMPLETE = 1.1  # nothing is missing (1: what is left is noise)
 ADEQUATE = 1.5  # hardly more than noise: a fit is adequate, a structure found in the run is taken
 FOLLOWED = 2.0  # a stop lost here or there: the structure still follows the log
-ASTRAY = 3.0  # something is missing, or a measured force's noise has walked as far
+ASTRAY = 3.0  # something is missing, or a measured force's noise has drifted as far
 NEARLY_FOLLOWED = 8.0  # not followed, but near
-LUCKY_WINDOWS = 0.15  # of a free motor's windows, that luck may have spoilt
-FORGIVEN_FROM = 4  # windows, of which luck may have spoilt one
+LUCKY_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
+FORGIVEN_FROM = 4  # windows, of which chance may have spoilt one
 NO_RUN = 50.0  # a run by the measured force is not the body's own motion
-LIKE = 4.0  # times the misfit of the model in force, where that leaves more than noise
+LIKE = 4.0  # times the misfit of the active model, where that leaves more than noise
 
 # What the equations' rows leave, in units of their noise (blind.py, chapters.py).
 MUCH = 2.0  # root mean square: something is missing from an equation
@@ -27,8 +27,8 @@ INERT = 2.0  # times what is left, below which inertia does not show
 # Which effects the equations name (blind.py: clean, single; chapters.py).
 PENALTY = 5.0  # criterion (twice a log-likelihood) that each parameter has to gain
 CALLED = 10.0  # the same, of an optional parameter
-CHANCE_LEVEL = 0.01  # chance up to which the largest gain of the library is no luck
-SEARCHED = 2.0  # times the gain of columns at one place, that a search over shapes finds by luck
+CHANCE_LEVEL = 0.01  # chance up to which the largest gain of the library is significant
+SEARCHED = 2.0  # times the gain of columns at one place, that a search over shapes finds by chance
 MATERIAL = 0.002  # of the Coulomb level (of the spread of dF/dt): the smallest effect spoken of
 LEAST_SHARE = 0.25  # of what is missing, that an effect explains; less is another's shadow
 MOSTLY_EXPLAINED = 0.55  # the same, where much is left in the end
@@ -49,10 +49,10 @@ IDLE = 1.0001  # the same, of a single effect that the equations call for, whose
 # What is left, and whether it carries over (blind.py: removed; outside.py --strange; chapters.py).
 SHARE_LEFT = 0.01  # of the square that was missing, left where effects are there without a doubt
 ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noise
-IMPOSED_LEFT = 0.3  # the same, where the motion is imposed
+IMPOSED_LEFT = 0.3  # the same, with prescribed motion
 # (the next three by what they mean; no bench has chosen them yet)
 SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
-HEADLINE = 0.5  # share left at most of what was missing there, by effects that are told first
+HEADLINE = 0.5  # share left at most of what was missing there, by effects that are reported first
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
 HIDES = 0.1  # of the force, left where it is more than friction too: nothing can be said of either
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure
@@ -69,7 +69,7 @@ DRIFT_LEAST = 0.01  # of its value, that it changes
 FOLLOWS_AS_WELL = 1.5  # times the usual error of whole runs, up to which one is followed as usual
 LEVELS_LEAVE = 0.8  # of a run's error, left at most by Coulomb levels fitted before it
 
-# What a test of a new log must be able to see, or it does not judge (drift.py: coarse).
+# What a test of a new log must be able to see, or it is inconclusive (drift.py: coarse).
 SEEN = 0.05  # of a Coulomb level, the change that it sees
 SEEN_MARGINS = 2.5  # times the margin that does not matter, where that is more
 CHANCE_TO_SEE = 0.9  # chance with which it would have alarmed
@@ -96,14 +96,15 @@ RESONANCE_APART = 1.02  # times the anti-resonance, from which a resonance shows
 OTHER_WAY = 0.02  # of the windows of sliding, up to which those of a direction are noise
 BEYOND_FRICTION = 0.05  # of the larger Coulomb level, by which the other has to be negative
 
-# What a log tells of a parameter, and what drives it (nine_parameters.py, chapters.py, drives.py).
+# What a log identifies of a parameter, and what drives it (nine_parameters.py, chapters.py,
+# drives.py).
 EVENTS_NEEDED = 3  # breakaways or crossings of the band's limit, of a kind
 NOTHING_OF = 1e-4  # of the log's force (speed), a friction (a band) that is as good as 0
 SMALLEST_LEVEL = 1e-3  # of what is left of the force, a Coulomb level of which it is no share
 WIDEST_SD = 0.255  # deviation over the value, beyond which its interval is wider than the value
 HARDLY_MORE = 1.02  # times the least force left unseen, that fewer terms of friction may leave
-SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to tell friction of speed alone
-GATE_MARGIN = 3.0  # times the information's deviation, that a log is said to tell a parameter by
+SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to identify friction of speed alone
+GATE_MARGIN = 3.0  # times the information's deviation, by which a parameter is called identifiable
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
 SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 SURE_OF_SHARE = 6.0  # deviations from 0 of a command's change between the samples of a slow log
@@ -113,7 +114,7 @@ JITTER_FROM = 0.5  # times the position's noise at rest, that of a jittering clo
 ACTUATOR_MISFIT = 3.0  # times the sensors' noise, that one leaves of the force where it is none,
 ACTUATOR_SHARE = 0.02  # and share of the force, that it has to leave as well
 
-# What of a log is set aside (sound_logs.py, bad_samples.py below seed 100); times the noise.
+# Samples excluded from a log (sound_logs.py, bad_samples.py below seed 100); times the noise.
 JUMP_FROM = 10.0  # step of a position beyond its motion, that is a jump
 SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a spike
 RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves

@@ -30,7 +30,7 @@ from workbench.threads import one_thread_by_default
 COMMANDS = {
     "demo": "Run the whole chain on a shipped recipe and write a report.",
     "init": "Propose a card for a log: columns, units, signs and rig.",
-    "doctor": "Look a log over before any fit; alone, the installation.",
+    "doctor": "Check a log before any fit; without a log, the installation.",
     "identify": "Find friction, plant and actuator of a machine from its logs.",
     "trace": "Find the physical effect that the model of a machine lacks.",
     "drift": "Test whether a machine has changed since its model.",
@@ -38,15 +38,15 @@ COMMANDS = {
     "response": "Show the machine over frequency: Bode, resonances, margins.",
     "predict": "Predict force and position of a log by a model.",
     "design": "Design PID, RST and P-PI controllers for a model.",
-    "experiment": "Find the run to make next: the reference that tells most.",
+    "experiment": "Design the next experiment: the most informative reference.",
     "validate": "Check a design on a plant in simulation.",
     "export": "Write a design as code, a model as tables for its control.",
     "simulate": "Make the log of a recipe, its truth beside it.",
     "effects": "List the effects that 'trace' knows; check your own.",
-    "registry": "Show and change what is in force on each machine.",
-    "reidentify": "Judge the new logs of all machines; re-tune what has drifted.",
+    "registry": "Show and change the active version of each machine.",
+    "reidentify": "Test the new logs of all machines; re-tune what has drifted.",
     "watch": "Do so again and again, by schedule and on new files.",
-    "fleet": "Identify or judge the logs of many machines on a Dask cluster.",
+    "fleet": "Identify or test the logs of many machines on a Dask cluster.",
     "serve": "Serve the page: fleet, machines, and a place to drop a log.",
     "work": "Do what was asked for on the page.",
     "token": "Make and revoke the tokens of the page.",
@@ -73,7 +73,7 @@ ADVICE = {
 
 
 class Terminated(KeyboardInterrupt):
-    """The process was told to end, which it does as on Ctrl-C: what is half written is cleared."""
+    """The process was asked to end, which it does as on Ctrl-C: what is half written is cleared."""
 
     def __init__(self, number: int) -> None:
         super().__init__()

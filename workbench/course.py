@@ -1,6 +1,6 @@
 """A long computation as whoever waits for it sees it: a bar that keeps moving, and a way to end it.
 
-The numeric floors know neither clock nor keys: they tell stages and ask whether to go on. Here is
+The numeric floors know neither clock nor keys: they report stages and ask whether to go on. Here is
 where a budget of seconds and Ctrl-C become an answer.
 """
 
@@ -69,7 +69,7 @@ class Course:
         self.beat()
 
     def keep_going(self) -> bool:
-        """Whether the computation is to go on: within its budget, and not told to end.
+        """Whether the computation is to go on: within its budget, and not asked to end.
 
         What kernels take to be compiled, once after an installation, does not count.
         """
@@ -81,7 +81,7 @@ class Course:
 
     @property
     def stopped(self) -> bool:
-        """Whether it was told to end, before its budget."""
+        """Whether it was asked to end, before its budget."""
         return self._stopped
 
     def beat(self) -> None:
@@ -111,9 +111,9 @@ class Course:
     def expected(self) -> float:
         """Share of the whole that should be done by now.
 
-        From the last place that was told (or shown by then), at the pace so far, ever more slowly
-        towards the end of the stage, which is not passed unseen; or the share of the budget, where
-        that is more.
+        From the last place that was reported (or shown by then), at the pace so far, ever more
+        slowly towards the end of the stage, which is not passed unseen; or the share of the budget,
+        where that is more.
         """
         now = self.clock()
         passed = self._since - self._begun

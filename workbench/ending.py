@@ -1,4 +1,4 @@
-"""How a command ends: its exit status, told in its help, and the command to type next."""
+"""How a command ends: its exit status, given in its help, and the command to type next."""
 
 import shlex
 from collections.abc import Callable, Iterator
@@ -34,7 +34,7 @@ class StatusCommand(click.Command):
 
 
 class StatusGroup(click.Group):
-    """A command of several; each of them tells its exit status."""
+    """A command of several; each of them gives its exit status."""
 
     command_class = StatusCommand
 
@@ -57,8 +57,8 @@ class Step(NamedTuple):
     def lines(self, width: int, most: int | None = None) -> list[str]:
         """The step in lines of so many columns, that a shell takes as they stand.
 
-        A word is never broken, so that a long path may stick out. most: lines that are told; of a
-        longer one, as of 40 logs, the middle is left out.
+        A word is never broken, so that a long path may stick out. most: lines that are printed; of
+        a longer one, as of 40 logs, the middle is left out.
         """
         if len(str(self)) <= width:
             return [str(self)]

@@ -83,7 +83,7 @@ MACHINES_OPTION = option(  # of what serves the page: the folder of all machines
     "Folder of the machines, as of 'watch'; dropped logs lie in it too.",
     default=Path("machines"), metavar="FOLDER",
 )  # fmt: skip
-EVENTS_OPTION = option(  # of commands that tell events as JSON
+EVENTS_OPTION = option(  # of commands that report events as JSON
     "Accepted as everywhere; events are JSON.", "--json", beside=(verbose_option, debug_option)
 )
 MODEL_ARGUMENT = argument("MODEL")

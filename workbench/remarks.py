@@ -1,11 +1,11 @@
-"""Remarks that say the same of several logs, told once with a count."""
+"""Remarks that say the same of several logs, printed once with a count."""
 
 import re
 from collections.abc import Collection, Iterable, Sequence
 from typing import NamedTuple
 
 FIGURE = re.compile(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\w)")
-# When and where in its log: told of one remark, left out where several differ in it.
+# When and where in its log: printed with one remark, left out where several differ in it.
 PLACE = re.compile(
     r",? (?:(?:at|from) )?t = \S+ s(?: to \S+ s)?"
     r"|,? first in row \d+|,? in row \d+(?:, t = \S+ s)?"
@@ -39,7 +39,7 @@ def told_once(remarks: Iterable[str], logs: Collection[str] = ()) -> list[str]:
 
 
 def _alike(remark: str, logs: Collection[str]) -> tuple[str, ...]:
-    """What remarks have in common that are told together."""
+    """What remarks have in common that are printed together."""
     log, said = _of_log(remark, logs)
     return (remark,) if log is None else ("", FIGURE.sub(HOLE, PLACE.sub("", said)))
 

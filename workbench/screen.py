@@ -91,7 +91,7 @@ def tabled(
 
 
 def more(part: Part | str) -> Part:
-    """What is told with --verbose alone."""
+    """What is printed with --verbose alone."""
     if isinstance(part, str):
         return Part((), (part,))
     return Part((), part.whole, part.head, part.right)

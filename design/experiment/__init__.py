@@ -1,1 +1,1 @@
-"""The run to make next: a reference within the machine's limits that tells most."""
+"""The run to make next: a reference within the machine's limits that is most informative."""

@@ -65,10 +65,10 @@ def d_optimal(
 def t_optimal(
     matrices: Array, pairs: Sequence[PairLike], seconds: Array, total: float
 ) -> Allocation:
-    """The times that make the mean log of what tells the pairs apart largest.
+    """The times that make the mean log of what discriminates the pairs largest.
 
     matrices (k, d, d): information of k segments, of parameters and effects; seconds (k,), total:
-    of time [s]. What tells a pair apart is the square of what one effect changes, in units of the
+    of time [s]. What discriminates a pair is the square of what one effect changes, in units of the
     noise, and the other places do not make up for.
     """
     import casadi as ca

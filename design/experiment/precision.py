@@ -17,8 +17,8 @@ from identification.thresholds import EVENTS_NEEDED
 
 NO_IDEA = 1e3  # relative deviation of what a run says nothing of
 UNKNOWN_RIDGE = 1e-12  # of the information's scale, granted where a run says nothing
-# Share of a run that may hang on luck: by the command of an actuator a fit follows it as a whole,
-# and loses its way there; where a force drives it, in windows, of which some may be lost.
+# Share of a run that may be sensitive to chance: by the command of an actuator a fit follows it as
+# a whole, and loses its way there; where a force drives it, in windows, of which some may be lost.
 LOOSE_WHOLE, LOOSE_WINDOWS = 0.02, 0.3
 WANTED_EVENTS = 2 * EVENTS_NEEDED  # events of each kind, of which another machine may lose some
 PER_EVENT = 2.0  # log of a deviation, that each of them is worth
@@ -27,23 +27,23 @@ PER_LOOSE = 300.0  # log of a deviation, that all of a run beyond it is taken to
 
 @dataclass(frozen=True, eq=False)
 class Machine:
-    """A machine in question: what it does along a reference, and what that run tells of it; whole:
-    a fit follows its runs as a whole."""
+    """A machine in question: what it does along a reference, and what that run identifies of it;
+    whole: a fit follows its runs as a whole."""
 
     run: Callable[[Array], LoopRun]
     told: Callable[[LoopRun], Information]
     whole: bool
 
     def luck(self, told: Information) -> float:
-        """What it costs that a part of a run hangs on luck."""
+        """What it costs that a part of a run is sensitive to chance."""
         return PER_LOOSE * max(told.loose - (LOOSE_WHOLE if self.whole else LOOSE_WINDOWS), 0.0)
 
 
 def looked_at(
     machines: Sequence[Machine], r: Array
 ) -> tuple[Peaks, list[Information], list[Events]] | None:
-    """Extremes over all machines along r [m], (n,), what each run tells, and what happens in it;
-    None where one cannot be followed."""
+    """Extremes over all machines along r [m], (n,), what each run identifies, and what happens in
+    it; None where one cannot be followed."""
     worst: Peaks | None = None
     told, events = [], []
     try:
@@ -60,9 +60,9 @@ def looked_at(
 
 
 def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
-    """The criterion: log-determinant of what is told of the asked parameters, the mean over the
-    machines for the shares of the time; and for a whole run `worth` on the machine that it tells
-    least of."""
+    """The criterion: log-determinant of the information on the asked parameters, the mean over the
+    machines for the shares of the time; and for a whole run `worth` on the machine that it
+    identifies least of."""
 
     def look(r: Array) -> Seen | None:
         found = looked_at(machines, r)
@@ -111,7 +111,7 @@ def missing(happens: Events, asked: Sequence[str]) -> float:
 
 
 def told_by(seen: Sequence[Seen]) -> list[list[Information]]:
-    """What each segment tells, a list a machine."""
+    """The information of each segment, a list a machine."""
     each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
     return [list(one) for one in zip(*each, strict=True)]
 
@@ -126,8 +126,8 @@ def _places(told: Information, asked: Sequence[str]) -> IntArray:
 
 
 def worth(told: Information, asked: IntArray) -> float:
-    """How well a run tells the asked parameters: minus the log of their mean (geometric) relative
-    deviation, and of the largest."""
+    """How well a run identifies the asked parameters: minus the log of their mean (geometric)
+    relative deviation, and of the largest."""
     mean = 0.5 * log_det(told.matrix, asked) / len(asked)
     spread = np.sqrt(np.diag(told.covariance)[asked]) / told.unit[asked]
     least = -float(np.log(min(float(np.max(spread)), NO_IDEA)))

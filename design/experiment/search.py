@@ -1,10 +1,11 @@
-"""The search for the reference that tells most: segments, their shares of the time, then exchange.
+"""The search for the reference that is most informative: segments, their shares of the time, then
+exchange.
 
 1. Each segment of the library is run alone, on the machine as the model has it and as it may be;
    one that comes near a limit on any of them is left out.
 2. How the time is best shared among them is a convex program (`allocation`).
 3. The shares are rounded to a run, and the run changed piece by piece, each time simulated as a
-   whole, as long as it tells more and somebody waits.
+   whole, as long as its information grows and somebody waits.
 """
 
 from collections.abc import Callable, Sequence
@@ -23,7 +24,7 @@ from identification.progress import KeepGoing, Progress
 OF_A_LIMIT = 0.97  # share of a limit that a run of the search may use
 FEWEST_SEGMENTS = 24  # segments that are looked at, however little time there is
 REPEATED_KINDS = ("steps", "multisine")  # of which a whole run may be made, repeated
-SWAPS_TRIED = 1500  # exchanges tried among segments, as sums of what they tell
+SWAPS_TRIED = 1500  # exchanges tried among segments, as sums of their information
 STALE_CHANGES = 60  # changes in a row that do not help, after which the run is done
 RUNS_AT_ONCE = 2  # runs
 CHANGE_FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes amplitude or rate
@@ -31,8 +32,8 @@ CHANGE_FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes ampl
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """What a reference does and tells: extremes over all plants, and a value the larger the better
-    it tells; told: whatever the criterion adds up over segments."""
+    """What a reference does and its information: extremes over all plants, and a value the larger
+    the better its information; told: whatever the criterion adds up over segments."""
 
     peaks: Peaks
     value: float
@@ -44,7 +45,7 @@ Look = Callable[[Array], Seen | None]  # at r [m], (n,); None where the run cann
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """Segments together, as the sum of what they tell. shared: the best shares of the time [s];
+    """Segments together, as the sum of their information. shared: the best shares of the time [s];
     measure: what these are the best of, of so many repeats of each; value: as a `Seen` has it."""
 
     shared: Callable[[Array, float], Allocation]
@@ -54,7 +55,7 @@ class Joint:
 
 @dataclass(frozen=True, eq=False)
 class Criterion:
-    """What a run is to tell. look: at a reference; joint: segments that were looked at."""
+    """What a run is to identify. look: at a reference; joint: segments that were evaluated."""
 
     look: Look
     joint: Callable[[Sequence[Seen]], Joint]
@@ -62,7 +63,8 @@ class Criterion:
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A reference r [m], (n,), its segments, what it does and tells; bound: what the best shares
+    """A reference r [m], (n,), its segments, what it does and its information; bound: what the best
+    shares
     reach, joined: what the rounded ones do, both as sums over segments; tried: segments, runs."""
 
     segments: tuple[Segment, ...]
@@ -80,7 +82,7 @@ def best_run(
     """The run to make next; h [s]: period of the reference.
 
     keep_going: asked between runs; once it says no, the best so far is given. Raises
-    NotIdentifiable where no segment stays within the limits, or none tells anything.
+    NotIdentifiable where no segment stays within the limits, or none identifies anything.
     """
     report("segments", 0.0)
     parts, seen = _looked_at(criterion.look, limits, h, report, keep_going)
@@ -103,7 +105,7 @@ def best_run(
 def _looked_at(
     look: Look, limits: MotionLimits, h: float, report: Progress, keep_going: KeepGoing
 ) -> tuple[list[Segment], list[Seen]]:
-    """The segments that stay within the limits on every plant, and what they tell."""
+    """The segments that stay within the limits on every plant, and their information."""
     every = [one for one in library(limits) if allowed(one, limits, h)]
     # Mixed, so that where the time is short some of each kind have been seen.
     every = [every[i] for i in np.random.default_rng(0).permutation(len(every))]
@@ -159,7 +161,7 @@ def _one_more(i: int, k: int) -> Array:
 def _swapped(
     joint: Joint, seconds: Array, room: float, times: Array, rng: np.random.Generator
 ) -> Array:
-    """Repeats (k,) in which segments were exchanged for others as long as that tells more."""
+    """Repeats (k,) in which segments were exchanged for others as long as that adds information."""
     best, value = times, joint.value(times)
     for _ in range(SWAPS_TRIED):
         trial = best.copy()
@@ -190,7 +192,7 @@ def _in_turn(times: Array) -> list[int]:
 def _repeated(
     parts: Sequence[Segment], seen: Sequence[Seen], seconds: Array, room: float
 ) -> list[tuple[Segment, ...]]:
-    """Runs of one and the same segment, of each kind that is usual the most telling one."""
+    """Runs of one and the same segment, of each kind that is usual the most informative one."""
     out = []
     for kind in REPEATED_KINDS:
         of_kind = [i for i, one in enumerate(parts) if one.kind == kind]

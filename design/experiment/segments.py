@@ -1,8 +1,8 @@
 """Pieces that a reference is put together from; each begins and ends at rest at home.
 
-So they may stand in any order, and what they tell adds up. Each shape carries something of its own:
-steps break the body away and stop it, slow triangles do so again and again at the stick limit, fast
-strokes tell mass and viscous friction, sines and sweeps all of it in between.
+So they may stand in any order, and their information adds up. Each shape carries something of its
+own: steps break the body away and stop it, slow triangles do so again and again at the stick limit,
+fast strokes identify mass and viscous friction, sines and sweeps all of it in between.
 """
 
 from collections.abc import Iterator

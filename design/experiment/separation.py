@@ -1,4 +1,4 @@
-"""The run that tells apart the effects of which a machine may have one: T-optimal."""
+"""The run that discriminates the effects of which a machine may have one: T-optimal."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from identification.arrays import Array
 from identification.experiment.information import Information
 from identification.experiment.structures import NO_EFFECT, told_apart
 
-NEGLIGIBLE_CHANGE = 1.0  # square in units of the noise, beside which a difference begins to tell
+NEGLIGIBLE_CHANGE = 1.0  # square in units of the noise, beside which a difference begins to count
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def pairs_of(told: Information, keys: Sequence[str]) -> tuple[Pair, ...]:
 
 
 def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
-    """The criterion: the mean, over pairs and machines, of the log of what tells them apart."""
+    """The criterion: the mean, over pairs and machines, of the log of what discriminates them."""
 
     def value_of(matrix: Array, pairs: Sequence[Pair]) -> float:
         left = [told_apart(matrix, one.one, one.others) for one in pairs]

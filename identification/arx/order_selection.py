@@ -4,8 +4,8 @@ One factor of the largest model on the estimation runs gives every smaller model
 validation runs its one-step error there, so all orders together cost two passes over the data.
 
 Which of them is taken: a superfluous coefficient lowers the one-step error on n held-out samples
-by luck by less than z^2/n of it (maximum over q of `2 z sqrt(q/(n N)) - q/N`, N fitted samples), so
-among the models within z^2/n of the best the one with the fewest coefficients is taken, z = 4. n
+by chance by less than z^2/n of it (maximum over q of `2 z sqrt(q/(n N)) - q/N`, N fitted samples),
+so among the models within z^2/n of the best the one with the fewest coefficients is taken, z = 4. n
 is the number of independent samples: fewer than the samples where the best model's errors are
 correlated. The simulation error has no such scale; it may be asked for as the criterion where the
 model is to run freely, with errors that are correlated over the plant's memory.

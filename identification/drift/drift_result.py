@@ -12,7 +12,7 @@ FoundBy = Literal["log", "mean"]
 
 @dataclass(frozen=True)
 class Shift:
-    """A parameter before (model in force) and after (this log, or the mean of the last logs).
+    """A parameter before (active model) and after (this log, or the mean of the last logs).
 
     change: relative to the model's value, with its standard deviation and 95 % interval, in which
     the model's error, the log's and the machine's variation from log to log are.
@@ -50,15 +50,16 @@ class DriftTest:
     """The verdict on one log.
 
     verdict: "none", "drift", "structure" (no parameters of the model's structure follow the log),
-    "not_judged" (`reason` says why: nothing is told, or a change of the Coulomb levels could not
-    have been seen). moved: of the fewest parameters that explain a drift, those that surely have a
-    part in it; unsure: names of the others, and of those that explain it as well. shifts: every
-    tested parameter on this log; not_judged: the others, with the reason; could_have_seen:
-    smallest relative change of each tested one that would have been found on this log or, if it
-    lasts, by the mean. single, alone, mean: the statistic of all parameters of this log, of the
-    largest one, and of the mean over logs, None where nothing is tested; found_by: which of them
-    alarmed ("log": the first two). chi_square: what the log's own refit leaves; allowed: up to
-    which the structure fits. state: to be given with the next log.
+    "not_judged" (`reason` says why: nothing is identifiable, or the minimum detectable
+    change of the Coulomb levels is too large). moved: of the fewest parameters that explain a
+    drift, those that surely have a part in it; unsure: names of the others, and of those that
+    explain it as well. shifts: every tested parameter on this log; not_judged: the others, with the
+    reason; could_have_seen: minimum detectable relative change of each tested one on this log or,
+    if it lasts, by the mean.
+    single, alone, mean: the statistic of all parameters of this log, of the largest one, and of the
+    mean over logs, None where nothing is tested; found_by: which of them alarmed ("log": the first
+    two). chi_square: what the log's own refit leaves; allowed: up to which the structure fits.
+    state: to be given with the next log.
     """
 
     log: str

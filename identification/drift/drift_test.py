@@ -1,15 +1,15 @@
-"""Drift test of one new log against the model in force: has the machine changed, and in what?
+"""Drift test of one new log against the active model: has the machine changed, and in what?
 
-The log's own parameters come from its fit, begun from the model in force (`log_estimate`). Their
+The log's own parameters come from its fit, begun from the active model (`log_estimate`). Their
 change counts by how far it lies beyond a practical margin, and beyond how much the machine varies
 from log to log anyhow, in the covariance of everything that is unsure: the log's fit and the
-model's (`single_log`). How sure both are is judged by the model's own logs where it left more than
-noise of them (`own_misfit`): a machine that it never followed has not changed for that. A second
-statistic over the logs since the model was put in force (`mewma`) finds what changes slowly.
+model's (`single_log`). How sure both are is estimated by the model's own logs where it left more
+than noise of them (`own_misfit`): a machine that it never followed has not changed for that. A
+second statistic over the logs since the model became active (`mewma`) finds what changes slowly.
 
 A log that no parameters bring the model to follow is said to have another structure; that is no
 drift. "None" is said only where the test could have seen a change that matters of the Coulomb
-levels; else the log is not judged.
+levels; else the log is inconclusive.
 """
 
 from collections.abc import Mapping, Sequence
@@ -50,7 +50,7 @@ class DriftSettings:
     alarm, at least, on average; smoothing: weight of the newest log in the mean over logs;
     variation: relative standard deviation of a parameter from log to log, stated until the
     machine's own logs show it; widest: relative deviation of a change from which a log does not
-    judge a parameter. Raises BadSpecification.
+    test a parameter. Raises BadSpecification.
     """
 
     margin: float = 0.02
@@ -72,7 +72,8 @@ class DriftSettings:
 
     @property
     def to_be_seen(self) -> float:
-        """Relative change that a log must be able to show, or it does not judge the parameter."""
+        """Relative change that a log must be able to show, or it is inconclusive on the
+        parameter."""
         return max(SEEN, SEEN_MARGINS * self.margin)
 
 
@@ -125,7 +126,8 @@ def judged_estimate(
     reasons = _not_judged(model, found, log, (change, measured + np.diag(varied)), settings)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
-        why = f"{log}: it tells none of the model's parameters; " + next(iter(reasons.values()), "")
+        first = next(iter(reasons.values()), "")
+        why = f"{log}: none of the model's parameters is identifiable; {first}"
         return _silent(log, "not_judged", why, reasons, found, state)
     at = np.flatnonzero(told)
     here = LogChange(
@@ -217,8 +219,8 @@ def at_bound(change: float) -> bool:
 def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: DriftSettings) -> str:
     """Why "none" cannot be said of a log without an alarm; "" where it can.
 
-    Friction that changes shows in the Coulomb levels first: every one that the model tells has to
-    be seen, or of a model that tells neither at least one parameter.
+    Friction that changes shows in the Coulomb levels first: every one that the model identifies has
+    to be seen, or of a model with neither at least one parameter.
     """
     limit = settings.to_be_seen
     asked = [name for name in COULOMB if name in model.names and name not in model.untold]
@@ -229,12 +231,12 @@ def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: Dr
         return ""
     names = asked or list(seen)
     said = ", ".join(
-        f"{name} from {100 * seen[name]:.2g} % on" if name in seen else f"{name} not at all"
-        for name in names
+        f"{name} {100 * seen[name]:.2g} %" if name in seen else f"{name} none" for name in names
     )
     return (
-        f"{log}: no alarm, but a change of {100 * limit:.3g} % could not have been seen ({said});"
-        " log for longer, with more strokes both ways, or judge by the mean over more logs"
+        f"{log}: no alarm, but a change of {100 * limit:.3g} % is below the minimum detectable"
+        f" change ({said}); log for longer, with more strokes both ways, or test the mean over more"
+        " logs"
     )
 
 
@@ -242,16 +244,16 @@ def _not_judged(
     model: InForce, found: LogEstimate, log: str, seen: tuple[Array, Array],
     settings: DriftSettings,
 ) -> dict[str, str]:  # fmt: skip
-    """Parameters that this log cannot be judged by, with the reason; seen: the change (d,) and its
+    """Parameters on which this log is inconclusive, with the reason; seen: the change (d,) and its
     covariance (d, d)."""
     change, covariance = seen
     out: dict[str, str] = {}
     for i, name in enumerate(model.names):
         sd = float(np.sqrt(covariance[i, i]))
         if name in model.untold:
-            out[name] = f"the model in force does not tell it ({model.untold[name]})"
+            out[name] = f"not identified in the active model ({model.untold[name]})"
         elif name not in found.names:
-            out[name] = found.untold.get(name, f"{log}: not among what this log tells")
+            out[name] = found.untold.get(name, f"{log}: not identifiable from this log")
         elif name in found.untold:
             out[name] = found.untold[name]
         elif name in NAMES and at_bound(float(change[i])):
@@ -276,7 +278,7 @@ def _moved(
     those that may have.
 
     The mean over the logs, where that found it, lags behind what drifts: it names the parameters,
-    and sizes them only where this log does not judge them or shows less.
+    and sizes them only where this log is inconclusive on them or shows less.
     """
     here = log.nearer
     chosen = moved(found.change, found.covariance, found.margin)
@@ -298,7 +300,7 @@ def _moved(
 
 
 def _shifts(model: InForce, found: Mean) -> dict[str, Shift]:
-    """Every judged parameter by itself."""
+    """Every tested parameter by itself."""
     sd = np.sqrt(np.diag(found.covariance))
     return {
         model.names[i]: _shift(model, i, float(found.change[k]), float(sd[k]))

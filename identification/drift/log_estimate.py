@@ -1,4 +1,4 @@
-"""What one new log says of a known machine: the fit of that log, begun from the model in force."""
+"""What one new log says of a known machine: the fit of that log, begun from the active model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,8 +22,9 @@ from identification.thresholds import ADEQUATE, FOLLOWED, LIKE
 class LogEstimate:
     """Parameters of one log: values (d,) and covariance (d, d) by `names`.
 
-    untold: parameters that the log does not tell, with the reason; they are among `names` all the
-    same. chi_square: what the best fit leaves per value; allowed: up to which the structure fits.
+    untold: parameters that the log does not identify, with the reason; they are among `names` all
+    the same. chi_square: what the best fit leaves per value; allowed: up to which the structure
+    fits.
     """
 
     names: tuple[str, ...]
@@ -35,34 +36,34 @@ class LogEstimate:
 
     @property
     def follows(self) -> bool:
-        """Whether the structure of the model in force follows the log."""
+        """Whether the structure of the active model follows the log."""
         return self.chi_square <= self.allowed
 
 
 def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
-    """The parameters of a model in force, as this log alone tells them.
+    """The parameters of an active model, as this log alone identifies them.
 
-    Raises NotIdentifiable where nothing moves, or where effects would have to show under an imposed
-    motion, BadLog where a signal is missing.
+    Raises NotIdentifiable where nothing moves, or where effects would have to show under a
+    prescribed motion, BadLog where a signal is missing.
     """
     drive = None if model.rig.kind == "motor" else model.drive
     if model.imposed:
         if model.plant.effects:
             raise NotIdentifiable(
-                f"{log.name}: the motion is imposed, and effects then show in the force equation"
+                f"{log.name}: prescribed motion, in which effects show in the force equation"
                 " only; trace this log together with those of the model"
             )
         recorded = recorded_logs([log], model.rig, drive)
-        found = fit_imposed(recorded, rng, "as the model in force")
+        found = fit_imposed(recorded, rng, "as the active model")
         return _of_fit(found, LIKE * max(model.chi_square, 1.0))
     found = fit_plant([log], rng, rig=model.rig, drive=drive, prior=model.plant)
-    # Of a body that is not led, the force equation alone says that its run is not followed.
+    # Without prescribed motion the force equation alone says that its run is not followed.
     return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
 
 
 def relative_change(model: InForce, found: LogEstimate) -> tuple[Array, Array, BoolArray]:
     """Change (d,) of the model's parameters in their scales, positive where the size grows, its
-    covariance (d, d) without the model's own error, and which of them (d,) the log tells."""
+    covariance (d, d) without the model's own error, and which of them (d,) the log identifies."""
     sign = np.where(model.values < 0, -1.0, 1.0)
     factor = sign / model.scales
     place = {name: i for i, name in enumerate(found.names)}

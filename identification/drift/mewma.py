@@ -1,7 +1,7 @@
 """Slow drift: a multivariate EWMA of the changes over a machine's logs, as a value to be stored.
 
 The mean of the last logs is known better than one log, so a small lasting change shows in it.
-What does not average out is kept apart: the error of the model in force itself, and a margin
+What does not average out is kept apart: the error of the active model itself, and a margin
 below which a change does not matter. The limit is computed for the asked run length by the Markov
 chain of the chart's radius, not taken from a textbook's table. Sources: Lowry, Woodall, Champ and
 Rigdon, Technometrics 34 (1992); Runger and Prabhu, Biometrika 83 (1996).
@@ -27,9 +27,9 @@ Rows = tuple[tuple[float, ...], ...]
 
 @dataclass(frozen=True)
 class DriftState:
-    """What the logs since the model in force have shown; all relative to the model's values.
+    """What the logs since the active model have shown; all relative to the model's values.
 
-    model: key of the model in force; names (d,): its parameters; mean (d,): weighted mean change
+    model: key of the active model; names (d,): its parameters; mean (d,): weighted mean change
     so far, `weight` (d,) of the whole weight 1 reached; covariance (d, d): of the mean, the
     model's own error left out; last, last_variance (d,): of the last log, None before there is
     one; squares, pairs (d,): half square differences of successive logs beyond
@@ -59,7 +59,7 @@ class DriftState:
 
 
 def fresh_state(model: str, names: tuple[str, ...]) -> DriftState:
-    """The state of a machine whose model in force has seen no new log."""
+    """The state of a machine whose active model has seen no new log."""
     d = len(names)
     zeros = (0.0,) * d
     return DriftState(model, names, zeros, zeros, (zeros,) * d, (None,) * d, zeros, zeros, (0,) * d)
@@ -127,7 +127,7 @@ class Mean:
 
 
 def mean_change(state: DriftState, in_force: Array, margin: float) -> Mean:
-    """The mean change, as far as logs have judged it; in_force (d, d): the model's own error.
+    """The mean change, as far as logs have tested it; in_force (d, d): the model's own error.
 
     While few logs have been seen only a part of the weight is reached: change, margin and error
     are those of the part.

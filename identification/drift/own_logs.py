@@ -19,7 +19,7 @@ from identification.log import Log
 from identification.thresholds import COMPLETE
 
 LOG_PARTS = 3  # stretches of a single log
-LEAST_STRETCH = 3.0  # s, of a stretch that tells something by itself
+LEAST_STRETCH = 3.0  # s, of a stretch that is informative by itself
 
 
 def with_own_logs(model: InForce, logs: Sequence[Log], rng: np.random.Generator) -> InForce:
@@ -37,7 +37,7 @@ def with_own_logs(model: InForce, logs: Sequence[Log], rng: np.random.Generator)
         try:
             found.append(estimate_log(model, log, rng))
         except NotIdentifiable:
-            continue  # a log that tells nothing alone
+            continue  # a log from which nothing is identifiable alone
     return replace(model, own_logs=own_logs_of(model, found, parts)) if len(found) > 1 else model
 
 

@@ -1,4 +1,4 @@
-"""How sure a log is of a machine's parameters, judged by the logs that the model comes from."""
+"""How sure a log is of a machine's parameters, estimated by the logs that the model comes from."""
 
 from dataclasses import dataclass
 
@@ -52,7 +52,7 @@ def own_misfit(model: InForce) -> OwnMisfit:
     """Of the model's own logs; nothing where it left noise alone, or they are not known.
 
     These logs were among those that the model was fitted on: a new one lies farther from it, as
-    one that is left out does. Their distance is that of a few, and could be small by luck: so it
+    one that is left out does. Their distance is that of a few, and could be small by chance: so it
     is taken as large as it may well be. A fit that leaves noise alone is never surer than it says.
     """
     found, d = model.own_logs, len(model.names)

@@ -2,7 +2,7 @@
 
 A change counts by how far it lies outside the box of changes that do not matter, measured in the
 covariance of what is known. So a change must be both sure and larger than the margin: a long log
-makes no trifle significant, and a poor log none of its accidents.
+makes no negligible change significant, and a poor log none of its accidents.
 """
 
 from dataclasses import dataclass
@@ -53,7 +53,7 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
 
     The others may lie anywhere within the margin. One at a time is set free, the one that brings
     the distance down most, as long as it does so surely; then those are taken back that the rest
-    makes needless. Parameters that a log cannot tell apart do not all move.
+    makes needless. Parameters that a log cannot separate do not all move.
     """
     d = len(change)
     sure = float(chi2.isf(CHANCE_LEVEL / max(d, 1), 1))

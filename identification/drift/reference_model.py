@@ -1,4 +1,4 @@
-"""The model in force, as the drift test takes it: values, joint covariance, and what it left."""
+"""The active model, as the drift test takes it: values, joint covariance, and what it left."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -23,8 +23,8 @@ class OwnLogs:
     """How far the logs of a model lie from it, each estimated alone as a new one is.
 
     names (d,): parameters; scatter (d,): root mean square over the logs of the change from the
-    model, relative to `InForce.scales`, None where no log tells the parameter. apart (n,): square
-    distance of each log from the model in the covariance of both fits, over the number of
+    model, relative to `InForce.scales`, None where no log identifies the parameter. apart (n,):
+    square distance of each log from the model in the covariance of both fits, over the number of
     parameters; left (n,): misfit of its own fit. parts: they are stretches of one log. Raises
     BadModel where sizes differ.
     """
@@ -55,12 +55,12 @@ class InForce:
     """A machine's model against which its new logs are tested, in SI.
 
     names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
-    key.name; untold: those that the model does not tell, with the reason. drive: what drove
+    key.name; untold: those that the model does not identify, with the reason. drive: what drove
     its fit; chi_square: what the fit left, 1 for the sensors' noise; imposed: only
-    the force equation was fitted; fastest [m/s]: speed at which a viscous force is judged, 0 where
-    it is not known. own_logs: how far its own logs lie from it, None where a single one leaves
-    noise alone, or that is not known. key: names the model in a `DriftState`. Raises BadModel where
-    sizes differ.
+    the force equation was fitted; fastest [m/s]: speed at which a viscous force is evaluated, 0
+    where it is not known. own_logs: how far its own logs lie from it, None where a single one
+    leaves noise alone, or that is not known. key: names the model in a `DriftState`. Raises
+    BadModel where sizes differ.
     """
 
     plant: Plant
@@ -82,7 +82,7 @@ class InForce:
         object.__setattr__(self, "covariance", frozen(self.covariance))
         if self.values.shape != (d,) or self.covariance.shape != (d, d):
             raise BadModel(
-                f"model in force: {d} names, values {self.values.shape}, covariance"
+                f"active model: {d} names, values {self.values.shape}, covariance"
                 f" {self.covariance.shape}; one value a name and a square covariance needed"
             )
 
@@ -90,7 +90,7 @@ class InForce:
     def scales(self) -> Array:
         """Size (d,) that a relative change refers to: the value, or what is small beside friction.
 
-        A force below a tenth of the largest friction force is judged against that tenth; so is
+        A force below a tenth of the largest friction force is compared with that tenth; so is
         a viscous one, at the fastest speed of the model's logs.
         """
         size = np.abs(self.values)
@@ -123,7 +123,7 @@ class InForce:
 
 
 def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> InForce:
-    """The model of a fit as the one in force; fastest [m/s]: speed in its logs, 0 if unknown."""
+    """The model of a fit as the active one; fastest [m/s]: speed in its logs, 0 if unknown."""
     untold = {n: e.reason or "" for n, e in fit.estimates.items() if not e.known}
     friction = fit.friction
     every = {name: float(getattr(friction, name)) for name in fit.free if hasattr(friction, name)}

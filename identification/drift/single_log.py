@@ -1,7 +1,7 @@
 """One log's change against what is no drift: a small change, or what the machine varies by anyhow.
 
 It shows drift where it is neither: surely beyond the margin that does not matter, and beyond what
-the machine varies from log to log. Judged over all parameters together, which finds a change of
+the machine varies from log to log. Tested over all parameters together, which finds a change of
 many, and of each on its own, which finds a change of one.
 """
 
@@ -22,7 +22,7 @@ WIDEST_SEEN = 10.0  # relative change up to which a test's smallest one is looke
 
 @dataclass(frozen=True, eq=False)
 class LogChange:
-    """The change (k,) on a log, relative, of those parameters `at` that it judges.
+    """The change (k,) on a log, relative, of those parameters `at` that it tests.
 
     measured (k, k): covariance of the log's and the model's errors; varied (k,): variance from log
     to log; margin: change that does not matter.

@@ -30,7 +30,7 @@ Rs = Sequence[float]
 Role = Literal["period", "place", "width"]
 MAX_PARAMS = 8
 MAX_SIGNALS = 4
-AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not tell
+AT_REST = ("at_rest_p", "at_rest_n")  # parameters that sliding does not identify
 
 
 @dataclass(frozen=True)

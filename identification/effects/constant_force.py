@@ -1,8 +1,8 @@
 """A force that is always there: weight on a tilted axis, or the force sensor's offset.
 
 In positive direction it acts as less friction and in negative as more, so from sliding and sticking
-alone it cannot be told from unequal levels F_cp, F_cn and F_sp, F_sn: Trace counts it as absorbed
-by these.
+alone it is not distinguishable from unequal levels F_cp, F_cn and F_sp, F_sn: Trace counts it as
+absorbed by these.
 """
 
 from identification.effects._base import Effect, Param, R, Rs

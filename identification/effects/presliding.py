@@ -3,7 +3,7 @@
 The level c falls from the stick limit at rest to the Coulomb level at speed as in the LuGre model,
 with the Karnopp band as its Stribeck velocity. The stiffness has no asymmetry: were it to differ
 between loading and unloading, a closed cycle could give energy; the level differs instead. The
-stepper adds LuGre's micro-damping (`bristle_step.MICRO_DAMPING`), which no log could tell.
+stepper adds LuGre's micro-damping (`bristle_step.MICRO_DAMPING`), which no log could identify.
 """
 
 from identification.effects._base import Effect, Param, R, Rs

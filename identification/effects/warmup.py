@@ -13,7 +13,7 @@ def value(t: R, y: R, v: R, F: R, u: R, d: R, z: R, c: R, f: R, s: Rs, p: Rs) ->
 
 EFFECT = Effect(
     key="warmup",
-    meaning="friction that changes in time within a log and settles (warming up, bedding in)",
+    meaning="friction that changes in time within a log to a steady value (warming up, bedding in)",
     equation="(a*c*Piecewise((1, f > c), (at_rest_p, d > 0), (at_rest_n, True)) + b*Abs(v))"
     "*(1 - exp(-t/tau))*(1 + asymmetry*d)",
     source="Bittencourt, Wernholt, Sander-Tavallaey, Brogardh, IEEE/RSJ IROS 2010, 6161: friction"

@@ -25,7 +25,7 @@ NORMAL_SETS = 1024  # parameter sets that stand for a normal spread
 SMALL_TERM = 0.05  # sd relative to the force beside it at which a term is known to be small
 AT_ZERO = 1.1e-9  # size up to which a plant, which needs one, keeps a parameter that comes out 0
 LEAST_SD = 1e-9  # deviation over the value, below which it is rounding and no interval
-HELD = "held at its default: the logs call for no other value"
+HELD = "fixed at its default: the logs do not support another value"
 SILENT = "no interval: nothing that these logs show changes with it"
 EXCITE = "excite it more (speeds, reversals, rests) or log for longer"
 
@@ -82,18 +82,18 @@ def told_estimate(
     wide = not high - low <= 2.0 * NORMAL_95 * WIDEST_SD * abs(value)
     if wrong is None and (where == 0.0 or wide) and sd <= SMALL_TERM * beside:
         most = max(abs(low), abs(high))
-        reason = f"at most {most:.2g}, which is small beside the rest: not told from 0"
+        reason = f"not significantly different from 0 (|x| < {most:.2g}, 95 %)"
         return Estimate(None, unit, sd, reason=reason, assumed=value, at_most=most)
     if wrong is None and where is not None:
         wrong = (
-            "at its bound: the logs cannot tell it from 0"
+            "at its bound: not significantly different from 0"
             if where == 0.0
             else f"at its bound {where:.4g}: the logs only say that it lies there or beyond"
         )
     if wrong is None and wide:
         wrong = (
             f"found {value:.3g}, but the interval {low:.2g} to {high:.2g} is wider than the value:"
-            f" the logs do not tell it; {EXCITE}"
+            f" not identifiable from these logs; {EXCITE}"
         )
     if wrong is not None:
         return Estimate(None, unit, reason=wrong, assumed=value)

@@ -69,15 +69,16 @@ from identification.thresholds import (
     WORSE_THAN_EQUATION,
 )
 
-IMPOSED_WHY = "the motion is imposed: inertia is of no account in the force"
+IMPOSED_WHY = "prescribed motion: inertia is negligible in the force"
 LOST_WHY = "no free run follows these logs (inertia does not show beside what is left)"
 ENDED_EARLY = "ended early, with the best so far: give it more time with a larger budget"
 FLOOR_WHY = (
-    "the free run is not followed, and bends mass and friction; stick limits and band are not told"
+    "the free run does not follow the logs, which biases mass and friction; stick limits and band"
+    " are not identifiable"
 )
 SURER_WHY = (
-    "the equation of motion shows mass and friction more surely than the run, which a clock or a"
-    " command that is noisy hides; stick limits and band are not told"
+    "the equation of motion gives mass and friction with less error than the free run, because of"
+    " a noisy clock or command; stick limits and band are not identifiable"
 )
 CORRECTIONS = 3  # rounds in which bad samples are looked for
 WIDER_SEARCHES = 2  # for the plain plant, ever wider

@@ -54,15 +54,15 @@ SLIGHT_INERTIA = 1e-3  # of the force, of a mass that the equation does without
 ROUNDS = 2  # in which the rows' noise, which depends on mass and damping, settles
 ONE_WAY = {True: (0, 1, 3), False: (0, 2, 4)}  # columns of motion up alone, or down
 WHY_NOT = {
-    "m": "inertia explains {share} of the force, so it is not told apart; log faster motion",
-    "F_v": "constant friction predicts as much of these logs; add runs at other speeds to tell"
-    " viscous friction",
-    "stick": "no free run was fitted (see the notes), and the force equation does not hold it;"
+    "m": "inertia explains {share} of the force: the mass is not identifiable; log faster motion",
+    "F_v": "constant friction predicts as much of these logs; add runs at other speeds to"
+    " identify viscous friction",
+    "stick": "no free run was fitted (see the notes), and it is not in the force equation;"
     " log the body driven by a force, from rest",
 }
 FALLS_WHY = (
     "found {:.3g} {}: friction falls with speed, which viscous friction does not; 'workbench trace'"
-    " looks for why"
+    " searches for the cause"
 )
 
 
@@ -142,7 +142,7 @@ def untold(fit: KarnoppFit, share: float) -> KarnoppFit:
     """The fit with none of the nine told: its model leaves this share of the force."""
     reason = (
         f"the equation of motion with friction leaves {100 * share:.0f} % of the force: something"
-        " larger than friction acts (`workbench trace` looks for it), so no number would hold"
+        " larger than friction acts (`workbench trace` searches for it), so no estimate is valid"
     )
     values = dict(zip(NAMES, fit.friction.array.tolist(), strict=True))
     untold = {

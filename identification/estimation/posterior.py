@@ -138,5 +138,5 @@ def _verdict(found: Likelihood, walks: Walks) -> str:
         return f"converged: {figures}, of {len(walks.chains)} ensembles on {found.way}"
     return (
         f"not converged, so no interval: {figures}; R-hat up to {R_HAT_MOST} and {ESS_LEAST:.0f}"
-        " draws needed: log for longer, or fix what the logs do not tell"
+        " draws needed: log for longer, or fix what is not identifiable from the logs"
     )

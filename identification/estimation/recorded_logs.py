@@ -205,7 +205,7 @@ def chosen_drive(logs: Sequence[Log], rig: Rig, drive: Drive | None) -> Drive:
                 " (1 where it is not known: a force is then in units of the command)"
             )
         if drive == "force":
-            raise BadLog(f"{name}: a motor is driven by its command; leave out the drive by force")
+            raise BadLog(f"{name}: a motor is driven by its command, not by a force")
         return "command"
     logged = commanded(logs)
     if drive == "command" and not logged:

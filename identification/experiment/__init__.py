@@ -1,1 +1,2 @@
-"""What a run tells: Fisher information of its parameters, and which of several plants made it."""
+"""What a run identifies: Fisher information of its parameters, and which of several plants made
+it."""

@@ -1,4 +1,5 @@
-"""The gate before a fit: how well a log can tell each parameter, by its run at a first estimate.
+"""The gate before a fit: how well a log can identify each parameter, by its run at a first
+estimate.
 
 No fit is made. The equations and the breakaways give a first plant; the sensitivities of its run,
 in windows from measured states, are the information that the log holds. Bands and stick limits of
@@ -36,7 +37,7 @@ LEAST_SHARE_OF_FIRST = 1e-9  # of a first estimate, or its run could not be chan
 @dataclass(frozen=True)
 class Tellable:
     """Half the 95 % interval, over the value, that a fit should give at most; infinite where the
-    run says nothing. can: whether that is narrow enough to be told at all."""
+    run says nothing. can: whether that is narrow enough to be identified at all."""
 
     name: str
     within: float
@@ -48,7 +49,7 @@ class Tellable:
 
 
 def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
-    """How well logs can tell each of the nine, and k1 and k2 where a command drives their runs.
+    """How well logs can identify each of the nine, and k1 and k2 where a command drives their runs.
 
     Raises NotIdentifiable where nothing moves. Empty where no run of a first plant can be followed.
     """

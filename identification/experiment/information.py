@@ -35,16 +35,17 @@ NO_INFORMATION = 1e-9  # of the largest, an eigenvalue of the information that i
 LEAST_NOISE = 1e-12  # N or m, of a signal that is taken to be exact
 LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to be counted on
 LASTING_SHARE = 0.1  # of a sensitivity, by which it may differ to either side over that step
-BY_LUCK = 3.0  # in units of the noise, difference of both sides from which a run hangs on luck
+# in units of the noise, difference of both sides from which a run is sensitive to chance
+BY_LUCK = 3.0
 NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which it is not followed
 
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What runs tell of a plant's parameters `names` (d,).
+    """What runs identify of a plant's parameters `names` (d,).
 
     unit (d,): sizes in which the parameters are counted; matrix (d, d): J'J in these units; loose:
-    share of the samples in which the run hangs on luck. Runs of their own add up.
+    share of the samples in which the run is sensitive to chance. Runs of their own add up.
     """
 
     names: tuple[str, ...]
@@ -83,8 +84,8 @@ class Information:
 def information(
     plant: Plant, errors_of: Errors, drive: Drive, *, lost: float = NOT_FOLLOWED
 ) -> Information:
-    """What the runs with these errors (n,), in units of the sensors' noise, tell of the plant, as
-    far as it is to be counted on (`lasting_jacobian`).
+    """What the runs with these errors (n,), in units of the sensors' noise, identify of the plant,
+    as far as it is to be counted on (`lasting_jacobian`).
 
     lost: error of the plant itself from which a sample says nothing. A shape of an effect that is
     at its default is not asked for, as in a fit.
@@ -107,7 +108,7 @@ def lasting_jacobian(
     fun: Callable[[Array], Array], x: Array, lost: float = NOT_FOLLOWED
 ) -> tuple[Array, float]:
     """Derivatives of `fun` (n, k) at x (k,) where they hold as far as a fit comes from, else 0, and
-    the share of `fun`'s values that hang on luck.
+    the share of `fun`'s values that is sensitive to chance.
 
     Where a stop turns on next to nothing, a run depends on a parameter beyond all measure, but only
     within next to nothing: no fit finds the parameter by that, and many find a wrong one.

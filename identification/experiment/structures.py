@@ -1,8 +1,8 @@
 """Effects that a machine may have, as directions beside its parameters in the same information.
 
 An effect changes a run by so much; what of that no parameter, and no other effect, makes up for is
-what tells it. Atkinson, Fedorov, Biometrika 62 (1975) 57: T-optimality is the largest such rest.
-"""
+what discriminates it. Atkinson, Fedorov, Biometrika 62 (1975) 57: T-optimality is the largest such
+rest."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -61,7 +61,7 @@ def structures(
     plant: Plant, rivals: Sequence[Acting], errors_of: Errors, drive: Drive,
     *, lost: float = NOT_FOLLOWED,
 ) -> Information:  # fmt: skip
-    """What runs tell of the plant's parameters and, behind them, of each rival at its size.
+    """What runs identify of the plant's parameters and, behind them, of each rival at its size.
 
     plant: without the rivals; lost: as of `information`. names: the plant's parameters, then the
     rivals' keys; one that changes nothing has zeros.

@@ -54,8 +54,8 @@ class MachineResponses:
     """What the logs show at f [Hz]: acceleration by force [1/kg] without friction and with it, and
     the controller from the position to the force that counters it [N/m]; stretches: lengths [s].
 
-    controller is None without a reference, or where the runs tell it nowhere. instrument: whether
-    the reference was one.
+    controller is None without a reference, or where the runs identify it nowhere. instrument:
+    whether the reference was one.
     """
 
     body: Response

@@ -4,9 +4,9 @@
 
 is acceleration by force: a rigid body with viscous friction, elastic modes, and what modes beyond
 the range give way. Given tau, c, w_i and z_i the rest is linear and solved within (variable
-projection). Modes are added one by one while each explains far more than luck; told are those that
-stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal form,
-Ewins, Modal Testing, 2nd ed. (2000), chapter 4; variable projection, Golub, Pereyra, SIAM J.
+projection). Modes are added one by one while each explains far more than chance; reported are those
+that stand out where the logs reach. The zeros of the sum are the anti-resonances. Sources: modal
+form, Ewins, Modal Testing, 2nd ed. (2000), chapter 4; variable projection, Golub, Pereyra, SIAM J.
 Numer. Anal. 10 (1973) 413.
 """
 
@@ -32,14 +32,14 @@ OF_WHAT_IS_LEFT = 0.15  # of chi-square, the same
 STANDING_OUT = 0.25  # of the response without it, that a mode adds at its frequency
 DEEP = 0.6  # of the rigid body's response, that an anti-resonance leaves at most
 MOST_DAMPING = 0.3  # of what is called a resonance
-UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not told
+UNSURE_PEAK = 0.01  # of its frequency, deviation from which a peak is not identified
 AROUND_PEAK = 0.1  # of its frequency, within which points on either side show a peak
 POINTS_AROUND = 3  # that many, on either side
 MOSTLY_SEEN = 0.5  # of the frequencies there
 BEYOND = 2.0  # times the highest frequency seen, up to which a mode may lie that is felt
 FEWEST_POINTS = 30
 SHARED = 16.0  # points that are of the same stretches and neighbours, and count as one
-OF_A_BIN = 0.5  # by which windows may draw a peak aside
+OF_A_BIN = 0.5  # by which windows may shift a peak
 LONGEST_MODE_LAG = 0.05  # s
 
 
@@ -166,7 +166,7 @@ def _one_more(data: _Data, p: Array) -> Array | None:
 
 
 def _earns(data: _Data, before: Array, after: Array) -> bool:
-    """Whether the last mode explains more than luck."""
+    """Whether the last mode explains more than chance."""
     was, now = data.chi(before), data.chi(after)
     free = 2 * len(data.f) - 3 - 3 * ((len(after) - 2) // 2)
     gained = (was - now) / max(now / max(free, 1), 1.0)
@@ -175,7 +175,7 @@ def _earns(data: _Data, before: Array, after: Array) -> bool:
 
 
 def _apart(one: Array, other: Array) -> bool:
-    """Whether two modes, ln w and ln z each, are more than one that is told twice."""
+    """Whether two modes, ln w and ln z each, are more than one that is reported twice."""
     return bool(abs(one[0] - other[0]) > max(np.exp(one[1]), np.exp(other[1])))
 
 

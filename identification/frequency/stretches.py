@@ -19,7 +19,7 @@ from identification.errors import BadSpecification, NotIdentifiable
 
 ComplexArray = NDArray[np.complex128]
 
-REACHES = (4, 8, 16)  # neighbouring frequencies to either side by which one is told
+REACHES = (4, 8, 16)  # neighbouring frequencies to either side by which one is estimated
 LOWEST_BIN = 2  # of a stretch that is read: the first has what is left of its mean
 CYCLES_IN_STRETCH = 320.0  # of a frequency in its stretch, at least, where the logs are long enough
 LEAST_CYCLES_SEEN = float(LOWEST_BIN + REACHES[0])  # of a frequency in its stretch

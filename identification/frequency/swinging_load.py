@@ -8,7 +8,7 @@ rest and in slow motion,
 
 The second term is a further input of the body, whose response over that of the force is the
 constant share m. Frequencies are tried in turn, and the one is taken at which the force so made
-leaves least of the motion; a load is told only where it leaves much less than none.
+leaves least of the motion; a load is reported only where it leaves much less than none.
 """
 
 from collections.abc import Sequence

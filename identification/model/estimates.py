@@ -22,9 +22,9 @@ class Estimate:
     """One parameter: value, unit, standard deviation, 95 % interval [low, high].
 
     `value` is None where the log does not identify it: `reason` then says why, and `assumed` is
-    the value that simulations use in its place. at_most: where all that the log tells is that the
-    parameter is small, the size that it leaves to it. A value without an interval is no estimate
-    but given, as `reason` says.
+    the value that simulations use in its place. at_most: where all that the log identifies is that
+    the parameter is small, the size that it leaves to it. A value without an interval is no
+    estimate but given, as `reason` says.
     """
 
     value: float | None
@@ -38,7 +38,7 @@ class Estimate:
 
     @property
     def known(self) -> bool:
-        """Whether it is told: its value, or that it is too small to matter."""
+        """Whether it is identified: its value, or that it is too small to matter."""
         return self.value is not None or self.at_most is not None
 
 
@@ -61,14 +61,14 @@ class LogFit:
 class KarnoppFit:
     """The nine parameters and the actuator, identified from one or more logs.
 
-    friction: all nine, those that the logs do not tell at the value assumed for simulation.
+    friction: all nine, those that the logs do not identify at the value assumed for simulation.
     effects: that the plant has beside them. estimates: the nine ("k1", "k2" where the command is
     logged, effects' parameters as key.name) by name.
     free: names in the order of `covariance` (d, d) and of `samples` (k, d), equally likely sets.
     noise_y [m], noise_F [N]: standard deviations found in the residual.
     chi_square: mean squared residual over noise; near 1 the model leaves nothing but noise.
     adequate: whether the search found such a fit. remarks: one line each on what was noticed.
-    bad: samples of the logs that the run contradicts, which were set aside.
+    bad: samples of the logs that the run contradicts, which were excluded.
     command_period: time [s] after which the drive gives its next command, None where no log shows
     that it is sooner than the next sample. surroundings: what acts beside the applied force, which
     was taken out of the logs; what of it is an effect is among `effects` and `estimates` too.
@@ -101,5 +101,5 @@ class KarnoppFit:
 
     @property
     def imposed(self) -> bool:
-        """Whether no run was followed, only the force equation of a motion that is imposed."""
+        """Whether no run was followed, only the force equation of a prescribed motion."""
         return all(np.isnan(one.position_rms) for one in self.logs)

@@ -108,7 +108,8 @@ class InverseModel:
 
     @property
     def offset(self) -> float:
-        """Constant force [N]: it cannot be told from unequal F_cp = F_c + offset, F_cn = ..."""
+        """Constant force [N]: it is not distinguishable from unequal F_cp = F_c + offset, F_cn =
+        ..."""
         return 0.5 * (self.F_cp - self.F_cn)
 
 
@@ -196,7 +197,7 @@ def _independent(name: str, columns: Array) -> None:
     condition = float(np.linalg.cond(columns / size))
     if condition > MAX_CONDITION:
         raise NotIdentifiable(
-            f"{name}: mass, Coulomb and viscous friction cannot be told apart (condition"
+            f"{name}: mass, Coulomb and viscous friction are not separable (condition"
             f" {condition:.0f}, at most {MAX_CONDITION:.0f} needed); log motion of varied speed"
         )
 

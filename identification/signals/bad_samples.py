@@ -1,4 +1,4 @@
-"""What was set aside of a log: which samples of which signal, when, and what became of them."""
+"""Samples excluded from a log: which samples of which signal, when, and what became of them."""
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

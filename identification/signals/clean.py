@@ -54,7 +54,7 @@ class Repaired(NamedTuple):
 @dataclass(frozen=True)
 class Prepared:
     """Runs on an even clock, in `remarks` what had to be done for it, a line each, and in `bad`
-    which samples were set aside; period: of the samples in the file [s], where it is known."""
+    which samples were excluded; period: of the samples in the file [s], where it is known."""
 
     runs: tuple[Log, ...]
     remarks: tuple[str, ...]
@@ -193,7 +193,7 @@ def _found(
 
 
 def _limits(log: Log) -> list[BadSamples]:
-    """Where the command stands at its largest or smallest value: told, and kept."""
+    """Where the command stands at its largest or smallest value: reported, and kept."""
     return limits(log, "u") if "u" in log else []
 
 
@@ -253,7 +253,7 @@ def _without_spikes(log: Log, name: str, first_row: int, rotary: bool) -> Repair
 
 
 def _shown(name: str, rotary: bool) -> tuple[float, str]:
-    """Factor and unit in which a signal is told."""
+    """Factor and unit in which a signal is reported."""
     if name in ("y", "F"):
         linear, turning = (
             {"y": (1e3, "mm"), "F": (1.0, "N")},
@@ -339,7 +339,8 @@ def at_times(name: str, t: Array, values: Array, grid: Array, h: float) -> Array
 
 
 def applied_force(log: Log, rig: Rig) -> Array | None:
-    """The applied force F_e [N] by the rig's kind, shape (n,); `None` where the rig cannot tell.
+    """The applied force F_e [N] by the rig's kind, shape (n,); `None` where the rig does not give
+    it.
 
     "electro-pneumatic": S_p P_p - S_n P_n - (S_p - S_n) P_s. "force": F, plus S_p P_p and minus
     S_n P_n for each chamber whose area and pressure are known. "motor": k_a u. "velocity": none.

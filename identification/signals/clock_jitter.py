@@ -18,8 +18,8 @@ DIFFERENCES, OF_WHITE = (
     252.0,
 )  # of the differences, and the square that they make of white noise of 1
 STRETCH, GROUPS = 25, 8  # samples whose noise is one value, and groups of these by speed
-QUICK_GROUP = 2  # groups from the fastest, whose speed tells whether the jitter matters
-WEIGHINGS = 4  # in which the weights of the line settle
+QUICK_GROUP = 2  # groups from the fastest, whose speed decides whether the jitter matters
+WEIGHINGS = 4  # in which the weights of the line converge
 LEAST_OF_SQUARE = 0.05  # of a group's square, as which the line counts there at least
 
 

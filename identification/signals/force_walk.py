@@ -1,8 +1,8 @@
-"""How far an actuator's force walks away from what its logged command makes of it.
+"""Random-walk drift of an actuator's force from what its logged command makes of it.
 
 Noise of the logged command did not reach the valve: k1 times it adds up to a random walk of the
 force beside the model's, held back by the actuator's k2 alone. The measured force less
-k1 times the command's integral plus k2 y is then a walk seen through white noise (a local level;
+k1 times the command's integral plus k2 y is then a random walk in white noise (a local level;
 Durbin, Koopman, Time Series Analysis by State Space Methods, 2012, section 2). Its likelihood has
 the closed form of a filter of gain g, in which k1, k2, an offset of the rate and a start are
 linear. What is not white after it is no noise, but something that the model lacks.
@@ -21,7 +21,7 @@ FILTER_GAINS = (np.geomspace(1e-4, 0.97, 60), np.linspace(1.03, 1.9, 15))
 LAGS = 12  # over which what is left is to be white
 CHANCE = 1e-4  # chance below which it is not
 COUNTED = 3000  # values as which a log counts: with more, a correlation of no account would show
-LEAST_COMPARED = 60  # samples, from which anything is told
+LEAST_COMPARED = 60  # samples, from which anything is estimated
 
 
 def force_walk(F: Array, y: Array, impulse: Array, h: float, apart: float) -> float:
@@ -78,7 +78,7 @@ def _white(r: Array) -> bool:
 
 def corrected_share(walk: float, noise: float) -> float:
     """Share g of its distance to the measured force by which a run's force is best corrected at
-    every sample: the steady gain of a Kalman filter of a walk seen through white noise."""
+    every sample: the steady gain of a Kalman filter of a random walk in white noise."""
     if walk <= 0.0 or noise <= 0.0:
         return 0.0
     q, R = walk**2, noise**2

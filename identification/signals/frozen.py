@@ -18,7 +18,7 @@ WAYS_ALIKE = (
 LONGEST_OFF = 50  # samples for which a logger may drop out
 DROP_LEAPS = 5.0  # times the median step, that a value that drops out leaps
 STEADY_SPEED = 1.5  # ratio of the speeds before and after
-SLOW_BLOCK = 24  # samples that tell a signal's noise at their speed
+SLOW_BLOCK = 24  # samples that give a signal's noise at their speed
 CLOCK_SHARE = 0.1  # of a sample, by which a clock may jitter
 TELLING_PART = 0.05  # of these blocks, that have to show the noise
 SPEED_AROUND = 8  # samples to either side, whose speed is looked at
@@ -27,8 +27,8 @@ SPEED_AROUND = 8  # samples to either side, whose speed is looked at
 def noise_shows(x: Array, still: NDArray[np.bool_]) -> bool:
     """Whether a body at rest would not be shown by one value: a sensor's noise exceeds its count.
 
-    still (n,): samples that repeat one value for long, which tell nothing of the noise. Nor does
-    quick motion, where a jittering clock makes noise that is none at rest.
+    still (n,): samples that repeat one value for long, which have no information on the noise. Nor
+    does quick motion, where a jittering clock makes noise that is none at rest.
     """
     moves = np.asarray(x, dtype=np.float64)[~still]
     noise = block_noise(moves, SLOW_BLOCK)

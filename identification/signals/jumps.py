@@ -1,11 +1,11 @@
 """Samples that no body can have moved to: spikes, lasting jumps, and counters that wrap.
 
-A position is told from a sensor's fault by mechanics. Between two samples the step of a body
-changes by at most acceleration times h squared, so a step that differs by more than that from both
-its neighbours is none of the body's. An impact changes the step once and stays on one side; noise
-and an encoder's counts do it all along the log, and so are part of its own level.
+A position is distinguished from a sensor's fault by mechanics. Between two samples the step of a
+body changes by at most acceleration times h squared, so a step that differs by more than that from
+both its neighbours is none of the body's. An impact changes the step once and stays on one side;
+noise and an encoder's counts do it all along the log, and so are part of its own level.
 
-The factors were chosen on rough machines, the measured sets and the shipped recipes, and judged on
+The factors were chosen on rough machines, the measured sets and the shipped recipes, and tested on
 others: see benchmarks/sound_logs.py.
 """
 

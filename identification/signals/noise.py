@@ -1,4 +1,4 @@
-"""White noise of a signal, told from what it measures."""
+"""White noise of a signal, separated from what it measures."""
 
 import numpy as np
 

@@ -1,7 +1,7 @@
 """A position that jumps or wraps, put back where the body is, and cut there.
 
 What is left of a jump's size after it is taken out would still be an error of all that follows; so
-the log is cut there too, where that leaves pieces long enough to tell something.
+the log is cut there too, where that leaves pieces long enough to identify something.
 """
 
 import numpy as np

@@ -2,7 +2,9 @@
 
 from identification.thresholds import OTHER_WAY
 
-ONE_WAY_WHY = "motion one way, in which no free run tells friction from a constant force"
+ONE_WAY_WHY = (
+    "motion in one direction, in which friction is not distinguishable from a constant force"
+)
 
 
 def is_one_way(share_up: float) -> bool:

@@ -1,4 +1,5 @@
-"""How two signals of one machine hang together: what tells a position from a force without words.
+"""How two signals of one machine hang together: what distinguishes a position from a force without
+words.
 
 All times are in samples, so that the unit of the clock need not be known. A force accelerates the
 body and is eaten up by friction; a velocity is the position's derivative; a command changes a force
@@ -17,7 +18,7 @@ from identification.signals.differentiate import Motion, differentiate, low_pass
 SURE_OF_MOTION = 4.0  # times the velocity's noise, from which a sample counts as moving
 LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
 FEWEST_MOVING, FEWEST_OF_A_WAY = 60, 6  # samples in all, and in each direction
-ALIKE_CHANGES = 0.7  # correlation of two signals' changes, from which these tell the lead
+ALIKE_CHANGES = 0.7  # correlation of two signals' changes, from which these give the lead
 LONGEST_LEAD = 0.1  # of the log, that one signal may be ahead of another
 TELLS_SIGN = 0.1  # share of the exchanged work, from which its sign is that of the force
 

@@ -1,7 +1,8 @@
 """A position that is renewed more slowly than the log is written: the samples that are new.
 
 A bus or a slow sensor gives a value that the logger repeats until the next. Between two of them the
-body looks at rest, and each new one is a jump. What tells it from an encoder's counts in slow
+body looks at rest, and each new one is a jump. What distinguishes it from an encoder's counts in
+slow
 motion: new values come in step with the clock, whatever the speed, and they differ by many counts.
 """
 
@@ -14,7 +15,7 @@ from identification.log import Log
 from identification.signals.differentiate import resolution
 
 IN_STEP = 0.85  # of the times between new values, that are the usual one (or next to it)
-FEWEST_NEW = 40  # new values, which tell the step
+FEWEST_NEW = 40  # new values, which give the step
 MANY_COUNTS = 2.5  # counts between two new values: by so many, at their median
 USUAL_FROM = 2  # samples
 RENEWED_AT = "the position is renewed at"
@@ -44,7 +45,7 @@ def renewed(log: Log) -> Renewed:
     }
     rate = 1.0 / (step * log.h)
     said = (
-        f"{log.name}: {RENEWED_AT} {rate:.3g} Hz and held in between, the log is"
+        f"{log.name}: {RENEWED_AT} {rate:.3g} Hz (zero-order hold), the log is"
         f" written at {1.0 / log.h:.3g} Hz: only new positions were used"
     )
     return Renewed(Log(log.name, signals), (said,))

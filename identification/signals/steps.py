@@ -1,4 +1,5 @@
-"""Small jumps and spikes, told from a body's motion by their shape rather than by their size.
+"""Small jumps and spikes, distinguished from a body's motion by their shape rather than by their
+size.
 
 A position that jumps goes on with the speed that it had: lines through the samples before and
 after meet the place of the jump at different heights, however many samples they are laid through.
@@ -27,8 +28,8 @@ MOST_JUMPS = 12  # of one size
 PARABOLA_SIDE = 5  # samples to either side of a spike that the parabola goes through
 LONGEST_SMALL = 3  # samples of a spike
 USUAL_SHARE = 0.6  # of the neighbours, that lie as near to the parabola as counts for its own error
-NOISE_BLOCK = 96  # samples, of which the median tells the noise around one
-LOUDER = 1.5  # times the noise of the calmest, that it is to count: fewer samples tell it
+NOISE_BLOCK = 96  # samples, of which the median gives the noise around one
+LOUDER = 1.5  # times the noise of the calmest, that it is to count: fewer samples give it
 MEDIAN_OF_NOISE = 0.6745  # median size of white noise of unit deviation
 CALM_PART = 0.2  # of a log in which its noise is taken to be alone
 

@@ -40,7 +40,7 @@ from identification.simulation.karnopp_step import (
 
 AWAY = 2.0  # times the band, beyond which a body that speeds up cannot come to rest
 ROUNDED = 1.0 + 1e-9  # of a sub-step, that the last one may be too long
-MOST_PIECES = 100  # of a sample, after which its switches are no longer told from each other
+MOST_PIECES = 100  # of a sample, after which its switches are no longer distinguished
 SURE_AFTER = 1e-3  # of a sub-step, after which its acceleration is sure
 # y, v, F, mode, last acceleration
 State = tuple[float, float, float, int, float]

@@ -142,7 +142,7 @@ def free_run(
     Raises BadModel where drive is "command" and the plant has no actuator.
     """
     if drive == "command" and not isinstance(plant.actuator, Actuator | Motor):
-        raise BadModel("the model has no actuator: drive the run by force, not by the command")
+        raise BadModel("the model has no actuator: drive the run by the force, not by the command")
     motor = isinstance(plant.actuator, Motor)
     held = drive == "force" or motor
     k1, k2 = 0.0, stiffness

@@ -134,16 +134,16 @@ PIECES = (
     "several effects of place together follow what is missing: rather pieces of one law of place"
     " that the library does not have"
 )
-LONGER = "a force is said to repeat over more than the travel shows: it stands in for another"
-UNSURE = "an effect is named of which the logs leave every size open"
+LONGER = "a force periodic over more than the travel: it is confounded with another effect"
+UNSURE = "the size of an effect found is not identifiable from the logs"
 UNDER_HALF = "what was found explains less than half of what was missing on the test logs"
 AS_LARGE_AS_FRICTION = (
     "what is left of the force is larger than friction itself: by these logs' noise, or by what it"
     " hides"
 )
 STANDS_IN = (
-    "what explains the training logs does not explain the test logs: it stands in for something"
-    " else, or the machine differs in them"
+    "what explains the training logs does not explain the test logs: it is confounded with"
+    " another effect, or the machine differs in them"
 )
 
 
@@ -198,7 +198,9 @@ def _remarks(
         )
     if not after.imposed and driven_only(logs):
         motor = (
-            " nor a dead zone of the command be told from friction" if rig.kind == "motor" else ""
+            " nor a dead zone of the command be distinguishable from friction"
+            if rig.kind == "motor"
+            else ""
         )
         yield (
             "the force hardly ever opposes the motion, so friction in proportion to it would not"

@@ -100,8 +100,9 @@ def _by_command(train: Sequence[Log], rig: Rig, library: Library, remarks: list[
         left = min([left, *(left_share(one, rows.sd, rows.b) for one in fits if rows is not None)])
     if left > LINEAR_ACTUATOR:
         remarks.append(
-            f"the command tells little of the force (a linear actuator leaves {100 * left:.0f} % of"
-            " its rate), so effects between command and force were not looked for"
+            f"the command explains little of the force (a linear actuator leaves {100 * left:.0f}"
+            " % of"
+            " its rate), so effects between command and force were not tried"
         )
         return False
     return True
@@ -140,8 +141,8 @@ def told_by_speed(library: Library, logs: Sequence[MotionLog]) -> tuple[Library,
     if ratio >= SPEEDS_APART or not of_speed:
         return library, ()
     said = (
-        f"the speeds of each direction are too alike (a factor of {ratio:.2g} at most,"
-        f" {SPEEDS_APART:g} needed) to tell friction that depends on speed alone:"
+        f"the speeds of each direction are too similar (a factor of {ratio:.2g} at most,"
+        f" {SPEEDS_APART:g} needed) to identify friction that depends on speed alone:"
         f" {', '.join(of_speed)} not tried; add runs at other speeds"
     )
     return {key: effect for key, effect in library.items() if key not in of_speed}, (said,)
@@ -152,19 +153,19 @@ def _enough(logs: Sequence[MotionLog]) -> None:
     if rows < FEWEST_ROWS:
         raise NotIdentifiable(
             f"{logs[0].log.name}: {rows} stretches of sliding in one direction long enough to"
-            f" judge ({FEWEST_ROWS} needed); log longer or faster motion"
+            f" test ({FEWEST_ROWS} needed); log longer or faster motion"
         )
     up = np.concatenate([one.up for one in logs])
     if np.all(up) or not np.any(up):
         way = "negative" if up[0] else "positive"
         raise NotIdentifiable(
-            f"{logs[0].log.name}: no stretch of sliding in {way} direction is long enough to judge;"
+            f"{logs[0].log.name}: no stretch of sliding in {way} direction is long enough to test;"
             " log motion in both directions (identify takes one direction alone)"
         )
     share = float(np.mean(np.concatenate([one.signals["d"] != 0 for one in logs])))
     if share < SLIDES and rows < MANY_ROWS:
         raise NotIdentifiable(
             f"{logs[0].log.name}: the body slides for {100 * share:.1f} % of the log, in {rows}"
-            f" stretches ({100 * SLIDES:.0f} %, or {MANY_ROWS} stretches, needed to tell its mass"
-            " from its friction); drive it harder, or log longer motion"
+            f" stretches ({100 * SLIDES:.0f} %, or {MANY_ROWS} stretches, needed to separate its"
+            " mass from its friction); drive it harder, or log longer motion"
         )

@@ -60,9 +60,10 @@ from identification.tracing.verdict import (
 )
 
 OF_AN_ANGLE = ("gravity",)  # effects of rotary machines alone
-MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing is proved"
+MOVE_IT = "a held-out run in which the body moves: in this one it rests, so nothing can be tested"
 ONE_WAY_ALONE = (
-    "motion one way, in which nothing but cogging is told from friction and a constant force"
+    "motion in one direction, in which only cogging is distinguishable from friction and a constant"
+    " force"
 )
 FOR_NOW = "for now, since the trace ended early"
 

@@ -150,7 +150,7 @@ def next_experiment(verdict: TraceVerdict, choice: Choice, left: Dependence) -> 
         apart = [s for s in (*mine.depends_on, *other.depends_on)
                  if (s in mine.depends_on) != (s in other.depends_on)]  # fmt: skip
         how = RUNS.get(apart[0] if apart else mine.depends_on[0], "a run with richer motion")
-        return f"to tell {mine.key} from {other.key}: {how}"
+        return f"to discriminate {mine.key} from {other.key}: {how}"
     if verdict == "unknown" and not left.depends_on:
         return "to find what is missing: runs that vary speed, place, load and time one by one"
     if verdict == "unknown" and left.swing > 0.0:

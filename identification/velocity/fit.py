@@ -27,7 +27,7 @@ SCANNED_STEP = 0.02  # s between scanned delays
 SCANNED_SAMPLES = 6000
 STARTS = 3
 STEP_OF_SLOPE = 1e-4  # of a number's scale
-OPEN_WAY = 1e-9  # of the largest curvature, below which numbers are not told from each other
+OPEN_WAY = 1e-9  # of the largest curvature, below which numbers are not separable
 LOADED = 1e-3  # part of a number in such a combination
 OUTLYING = 3.0  # deviations, beyond which an error counts as its size
 
@@ -123,7 +123,7 @@ def refined(
             x_scale=1.0, max_nfev=60,
         )  # fmt: skip
         x = found.x
-    # A time that is none is left out; a dead zone is not, which a gain may stand in for.
+    # A time that is none is left out; a dead zone is not, which is confounded with a gain.
     inside = np.array([n[:2] == "d_" for n in names]) | (x > low + 1e-9) & (x < high - 1e-9)
     weight = 1.0 / np.sqrt(1.0 + (found.fun / (OUTLYING * spread)) ** 2)
     sizes = [rows.shape[1] for rows in _centred(record, valve(x), kept) for _ in rows]
@@ -154,7 +154,7 @@ def _slopes(errors: Callable[[Array], Array], x: Array, low: Array, high: Array)
 def _jackknife(errors: Array, slopes: Array, weight: Array, sizes: Sequence[int]) -> Array:
     """Covariance (d, d) by leaving out one window after the other, to first order.
 
-    Infinite where a number is not told from others. The windows' errors may be of any colour.
+    Infinite where a number is not separable from others. The windows' errors may be of any colour.
     Source: Bell & McCaffrey (2002), Bias reduction in standard errors for linear regression with
     multi-stage samples (the jackknife of clusters).
     """

@@ -1,7 +1,7 @@
 """The other way to move: a body that the command accelerates against friction, in seven numbers.
 
 v' = k u(t - delay) + f_0 - (f_p + f_vp v where v > 0, -f_n + f_vn v where v < 0), at rest while
-that holds it. Only for telling which kind of rig a log looks like: friction has a fit of its own.
+that holds it. Only to decide which kind of rig a log is of: friction has a fit of its own.
 """
 
 from collections.abc import Sequence

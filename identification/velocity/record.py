@@ -18,7 +18,7 @@ SHORTLY_AHEAD = 0.2  # s, the same
 RUN_IN = 1.0  # s at the start of a log, in which commands act that were given before it
 MOST_FOLDS = 5
 SLOWEST_PERIOD = 0.2  # s, of which a window has ten
-FEWEST_AHEAD = 4  # of all logs, below which no error of them is told
+FEWEST_AHEAD = 4  # of all logs, below which no error of them is given
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""What a log tells of a valve's numbers: values with intervals, or why there is none."""
+"""What a log identifies of a valve's numbers: values with intervals, or why there is none."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -30,9 +30,10 @@ def units(motion: str, command_unit: str) -> Mapping[str, str]:
 
 
 def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[str, Estimate]:
-    """Each number of the plain model with its 95 % interval, or the reason why it is not told.
+    """Each number of the plain model with its 95 % interval, or the reason why it is not
+    identified.
 
-    unit: of each number. Raises NotIdentifiable where no gain is told.
+    unit: of each number. Raises NotIdentifiable where no gain is identifiable.
     """
     values, bounds = asdict(found.valve), bounds_of(record)
     out = dict[str, Estimate]()
@@ -52,7 +53,7 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
             continue
         spread = sd[name] * wide if np.isfinite(sd[name]) else None
         if spread is None and values[name] <= low[0] + 1e-9 * max(record.u_max, 1.0):
-            zero = "at its bound: the logs cannot tell it from 0"
+            zero = "at its bound: not significantly different from 0"
             out[name] = Estimate(None, unit[name], reason=zero, assumed=0.0)
             continue
         out[name] = told_estimate(values[name], unit[name], spread, bounds=low, beside=size)
@@ -60,7 +61,7 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
         first = f"{record.runs[0].name}: "
         why = str(out["g_p"].reason).removeprefix(first)
         raise NotIdentifiable(
-            f"{first}the position does not tell how the velocity follows the command (g_p: {why})"
+            f"{first}how the velocity follows the command is not identifiable (g_p: {why})"
         )
     return out
 
@@ -71,20 +72,21 @@ def _entries(inside: BoolArray) -> int:
 
 
 def _together(name: str, record: Record) -> str:
-    """Why a number is not told from another one."""
+    """Why a number is not separable from another one."""
     if name not in ("g_p", "g_n", "d_p", "d_n"):
         return (
-            f"{record.runs[0].name}: not told from the other numbers; add commands of other sizes"
+            f"{record.runs[0].name}: not separable from the other parameters; add commands of"
+            " other sizes"
         )
     way = WAYS[name[-1]][0]
     return (
-        f"{record.runs[0].name}: gain and dead zone of the {way} direction cannot be told apart;"
+        f"{record.runs[0].name}: gain and dead zone of the {way} direction are not separable;"
         " add commands of other sizes"
     )
 
 
 def _silent(name: str, record: Record, valve: Valve) -> str | None:
-    """Why the command cannot tell a number, whatever the position does; None where it may."""
+    """Why the command cannot identify a number, whatever the position does; None where it may."""
     if name in ("delay", "lag"):
         return None
     way, sign = WAYS[name[-1]]
@@ -115,7 +117,7 @@ def _silent(name: str, record: Record, valve: Valve) -> str | None:
 def told_beside(
     found: ValveFit, names: Sequence[str], unit: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """The numbers `names` that a richer structure has beside the plain model's, told likewise."""
+    """The numbers `names` that a richer structure has beside the plain model's, likewise."""
     sd = dict(zip(found.free, np.sqrt(np.diag(found.covariance)).tolist(), strict=True))
     wide = float(student.ppf(0.975, max(found.clusters - 1, 1))) / NORMAL_95
     values = asdict(found.valve)

@@ -187,11 +187,11 @@ def test_predict_by_a_model_without_a_mass_gives_the_force_and_refuses_the_run(
     command = ["predict", str(tmp_path / "model.json"), log, "--card", card]
     for drive in ([], ["--drive", "force"], ["--drive", "command", "--window", "0.5"]):
         found = as_json(capsys, [*command, *drive, "--out", str(tmp_path / "p")])
-        assert found["run_refused"].startswith("no free run: the model does not tell m, which a")
+        assert found["run_refused"].startswith("no free run: m not identified, which a")
         assert "(m: log faster motion)" in found["run_refused"]
         assert found["position_rms"] is None and found["force_simulated_rms"] is None
         assert found["force_predicted_rms"] > 0
-        assert "force by assumed values of what no log told: m" in found["remarks"]
+        assert "force by assumed values of what is not identifiable: m" in found["remarks"]
     with (tmp_path / "p/prediction.csv").open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert len(rows) == 3001
@@ -199,7 +199,7 @@ def test_predict_by_a_model_without_a_mass_gives_the_force_and_refuses_the_run(
     assert all(row["force_predicted"] for row in rows)
     assert main([*command, "--out", str(tmp_path / "p")]) == 0
     shown = capsys.readouterr().out
-    assert shown.startswith("position: no free run: the model does not tell m")
+    assert shown.startswith("position: no free run: m not identified")
     assert "force, inverse model:" in shown
 
 
@@ -364,7 +364,7 @@ def test_axis_test_has_the_status_of_its_light(
         assert json.loads((tmp_path / "a/axis_test.json").read_text())["light"] == light
         assert ("next" in found) is (status == 1)
     assert main(["axis-test", log, "--card", str(card), "--out", out]) == 1
-    assert capsys.readouterr().out.startswith("YELLOW: no limits to judge by")
+    assert capsys.readouterr().out.startswith("YELLOW: no limits to test against")
     card.write_text(text + "\n[limits]\nF_cp = [6.0, 5.0]\n", encoding="utf-8")
     for arguments, said in (
         ([log, "--card", str(card)], "the lower limit first needed"),

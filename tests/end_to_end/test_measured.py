@@ -56,7 +56,7 @@ def test_imposed_motion_gives_friction_but_no_design(
     assert friction["F_cp"]["value"] is not None
     capsys.readouterr()
     assert main(["design", str(out / "model.json"), "--out", str(tmp_path / "d")]) == 1
-    assert "imposed" in capsys.readouterr().err
+    assert "prescribed" in capsys.readouterr().err
     assert not (tmp_path / "d").exists()
 
 

@@ -128,7 +128,7 @@ def test_what_is_wrong_is_said_in_one_line(here: Path, capsys: pytest.CaptureFix
     filled(capsys)
     assert "no machine 'bnch'" in refused(capsys, ["registry", "show", "bnch"])
     assert "no version 3" in refused(capsys, ["registry", "diff", "bench", "1", "3"])
-    assert "is in force already" in refused(capsys, ["registry", "promote", "bench", "2", *WHY])
+    assert "is active already" in refused(capsys, ["registry", "promote", "bench", "2", *WHY])
     assert "--reason" in refused(capsys, ["registry", "rollback", "bench"])
     empty = ["registry", "rollback", "bench", "--reason", " "]
     assert "--reason is empty" in refused(capsys, empty)

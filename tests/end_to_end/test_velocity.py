@@ -71,7 +71,7 @@ def test_identify(folder: Path) -> None:
         assert one["value"] == pytest.approx(getattr(TRUE, name), rel=0.03)
     assert model["valve"]["g_p"]["unit"] == "m/(s V)"
     assert model["fit"]["position_rms_2s"] < 1e-3
-    assert "six numbers" in (folder / "m" / "report.html").read_text("utf-8")
+    assert "six valve parameters" in (folder / "m" / "report.html").read_text("utf-8")
 
 
 def test_trace(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -108,7 +108,7 @@ def test_one_direction_carries_no_design(folder: Path, capsys: pytest.CaptureFix
     assert run(folder, "identify", "one_way.csv", "--card", "card.toml", "--out", "x") == 0
     assert "no command in the negative direction" in capsys.readouterr().out
     assert run(folder, "design", "x/model.json", "--out", "p") == 1
-    assert "g_n is not told" in capsys.readouterr().err
+    assert "g_n is not identified" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,10 @@ LOGS = tuple(f"day {n // 4}/run {n}.csv" for n in range(40))
 OUT = Path("results") / ("a folder with a long name " * 4)
 NOW = datetime(2024, 5, 6, 7, 8, 9, tzinfo=UTC)
 SLOW = Asked((20.0, 0.9))  # nothing to be searched
-WHY = "the interval is wider than the value: the logs do not tell it; excite it more, or log longer"
+WHY = (
+    "the interval is wider than the value: not identifiable from these logs; excite it more, or log"
+    " longer"
+)
 REMARKS = (
     *(f"{log}: uneven clock, resampled every {n % 3 + 5:.3g} ms" for n, log in enumerate(LOGS)),
     *(f"{log}: isolated spikes of 'y' in {n} samples interpolated" for n, log in enumerate(LOGS)),
@@ -302,7 +305,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
     for name in ("dv_p", "dv_n"):
         model.friction[name] = lost(model.friction[name], f"5 logs: {WHY}")  # type: ignore[index]
     shown = identified_view(replace(identified(), model=model, remarks=())).screen()
-    assert "dv_p, dv_n - m/s not told: the interval is wider than the value" in words_of(
+    assert "dv_p, dv_n - m/s not identifiable: the interval is wider than the value" in words_of(
         shown.text()
     )
     assert words_of(shown.text(verbose=True)).count("excite it more") == 2

@@ -37,14 +37,14 @@ def test_whatever_there_is_fits(parts: list[Part | str], room: int, width: int) 
 
 
 def test_a_long_list_is_cut_with_its_count_and_whole_with_verbose() -> None:
-    rows = [(f"run{n}.csv", str(n), "set aside") for n in range(70)]
+    rows = [(f"run{n}.csv", str(n), "excluded") for n in range(70)]
     shown = screen("70 logs", tabled(("log", "n", "verdict"), rows), "written: out/report.html")
     text = one_screen(shown)
     found = re.search(r"\.\.\. and (\d+) more: --verbose", text)
     assert found is not None
-    assert text.count("set aside") + int(found[1]) == len(rows)
+    assert text.count("excluded") + int(found[1]) == len(rows)
     assert "run0.csv" in text and "run69.csv" not in text and "written: out/report.html" in text
-    assert shown.text(verbose=True).count("set aside") == len(rows)
+    assert shown.text(verbose=True).count("excluded") == len(rows)
     assert "more: report()" in shown.text(rest="report()")
 
 

@@ -126,7 +126,7 @@ class RigSection(CardTable):
     """the older name of `control_limit`"""
     motor_inertia: Positive | str | None = None
     """of the motor alone, kg (kg m² of a rotary machine), or a text (`"0.3 kg cm^2"`); what is
-    identified is told as a multiple of it"""
+    identified is given as a multiple of it"""
     stroke_m: tuple[float, float] | None = None
     """low and high end of the motion, m (rad)"""
     motion: Literal["linear", "rotary"] = "linear"
@@ -149,7 +149,7 @@ class RigSection(CardTable):
         return self
 
     def value(self, signals: Mapping[str, SignalSpec]) -> Rig:
-        """The rig; signals tell the unit of its command where the card does not name it.
+        """The rig; signals give the unit of its command where the card does not name it.
 
         Raises BadCard where a number's unit is of another kind.
         """
@@ -173,7 +173,7 @@ class RigSection(CardTable):
         )
 
     def _command_unit(self, signals: Mapping[str, SignalSpec]) -> str:
-        """The unit of the command's column; a force where none is logged but its limit is told."""
+        """The unit of the command's column; a force where none is logged but its limit is given."""
         if self.kind == "velocity" and "u" in signals and signals["u"].written_gain is None:
             return signals["u"].unit.strip() or "1"  # as it is: no force is made of it
         if "u" in signals:

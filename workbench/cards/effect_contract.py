@@ -147,7 +147,7 @@ def check_linear(effect: Effect) -> None:
 def check_depends_on(effect: Effect) -> None:
     """Declared signals are those that move the contribution or its state; no parameter is idle."""
     found = {name for name in ("t", "y", "v", "F", "u") if moved_by(effect, name)}
-    by_friction = moved_by(effect, "f")  # or it but tells sliding from rest
+    by_friction = moved_by(effect, "f")  # or it only distinguishes sliding from rest
     found |= {"v"} if by_friction and not set(AT_REST) & set(effect.names) else set()
     found |= {"u"} if effect.place.delays else set()
     found |= {k for i, k in enumerate(effect.signals) if _moved_in(effect, "s", i, "value")}

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 @click.command(
     cls=StatusCommand,
     done="green",
-    refusal="yellow or red, or the log tells nothing; the first line says why",
+    refusal="yellow or red, or nothing is identifiable from the log; the first line says why",
     epilog="Example: workbench axis-test run1.csv --card bench-a/card.toml --registry registry.db",
 )
 @by_signature
@@ -39,7 +39,7 @@ def command(
 
     Each number has its limits, of the card's [limits], else the mean +- 3 sd of the machine's last
     logs in the registry. Green: within; red: surely beyond; yellow: not sure on which side, or
-    nothing to judge by. Writes axis_test.json, and report.html to be printed on one page.
+    nothing to test against. Writes axis_test.json, and report.html to be printed on one page.
     """
     from workbench.logs.sources import read_sources
     from workbench.report.axis_test import axis_view

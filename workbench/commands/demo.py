@@ -33,7 +33,7 @@ def command(
     """Run the whole chain on a shipped recipe and write a report.
 
     Simulates two runs of the paper's rig (table 2) with an effect that is declared nowhere but in
-    the truth file, finds that effect from one log, judges it on the other, designs PID and RST on
+    the truth file, finds that effect from one log, tests it on the other, designs PID and RST on
     the model found, and checks them in simulation.
     """
     from workbench.cards.card import load_card

@@ -226,7 +226,7 @@ def _robust(given: DesignOptions, model: "Model", asked: "Asked") -> int:
 
 
 def _drift(where: str | None, machine: str) -> dict[str, float]:
-    """By how much the machine's parameters have changed between its models in force."""
+    """By how much the machine's parameters have changed between its active models."""
     from pydantic import TypeAdapter
 
     from identification.model.estimates import Estimate

@@ -1,4 +1,4 @@
-"""`workbench doctor`: a log looked over before any fit; alone, the installation."""
+"""`workbench doctor`: a log checked before any fit; alone, the installation."""
 
 import os
 from collections.abc import Mapping
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=StatusCommand,
-    refusal="the log cannot be identified as it is or tells nothing, or something of the"
-    " installation does not work",
-    epilog="Example: workbench doctor run1.csv --card card.toml --out look",
+    refusal="nothing can be identified from the log as it is, or something of the installation"
+    " does not work",
+    epilog="Example: workbench doctor run1.csv --card card.toml --out check",
 )
 @by_signature
 def command(
@@ -38,11 +38,11 @@ def command(
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> int:  # fmt: skip
-    """Look a log over before any fit: clock, sensors, bad samples, motion, and what it can tell.
+    """Check a log before any fit: clock, sensors, bad samples, motion, and what is identifiable.
 
-    With LOG and --card: which of the nine parameters it can tell and which not, and what run to
-    add; with --out also doctor.json and a picture, doctor.png. Alone: versions, compiled kernels,
-    folder of data, registry.
+    With LOG and --card: which of the nine parameters are identifiable and which not, and what run
+    to add; with --out also doctor.json and a picture, doctor.png. Alone: versions, compiled
+    kernels, folder of data, registry.
     """
     if log is None:
         if card is not None or out is not None:

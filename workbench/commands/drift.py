@@ -1,4 +1,4 @@
-"""`workbench drift`: new logs against the model in force -> drift.json and report.html."""
+"""`workbench drift`: new logs against the active model -> drift.json and report.html."""
 
 from pathlib import Path
 
@@ -19,9 +19,9 @@ from workbench.signature import by_signature, option
 
 @click.command(
     cls=StatusCommand,
-    done="no drift; or NOT JUDGED, where no test alarmed but a change that matters could not have"
-    " been seen (the first line says so)",
-    refusal="drift, a changed structure, or no log that tells anything",
+    done="no drift; or INCONCLUSIVE, where no test alarmed but a change that matters is below the"
+    " minimum detectable change (the first line says so)",
+    refusal="drift, a changed structure, or no log from which anything is identifiable",
     epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json",
 )
 @by_signature
@@ -49,9 +49,9 @@ def command(
     as_json: bool = JSON_OPTION,
     out: Path | None = OUT_OPTION,
 ) -> int:  # fmt: skip
-    """Test new logs against the model in force: has the machine changed, and in which parameters?
+    """Test new logs against the active model: has the machine changed, and in which parameters?
 
-    Every log is judged alone and, with those before it, by their mean, which finds what changes
+    Every log is tested alone and, with those before it, by their mean, which finds what changes
     slowly. Writes drift.json and report.html.
     """
     from identification.drift.drift_test import DriftSettings

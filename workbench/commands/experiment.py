@@ -31,7 +31,7 @@ class ExperimentOptions:
         "--design", metavar="DESIGN",
     )  # fmt: skip
     parameters: str | None = option(
-        "Parameters that are to be told, as m,F_cp,dv_p.  [default: all]", metavar="NAME,..."
+        "Parameters to be identified, as m,F_cp,dv_p.  [default: all]", metavar="NAME,..."
     )
     stroke: tuple[float, float] | None = option(
         "Positions between which it may move [m, rad].  [default: the card's, or the logs']",
@@ -48,8 +48,8 @@ class ExperimentOptions:
         "How long the run lasts [s].", "--time", type=Finite(min=2, max=600), default=20.0
     )
     trace_file: Path | None = option(
-        "trace.json whose rivals (or, of an unknown effect, all of the library) the run is to tell"
-        " apart.",
+        "trace.json whose rivals (or, of an unknown effect, all of the library) the run is to"
+        " discriminate.",
         "--rivals", metavar="TRACE",
     )  # fmt: skip
     budget: float = option(
@@ -70,7 +70,8 @@ class ExperimentOptions:
 )
 @by_fields(ExperimentOptions)
 def command(given: ExperimentOptions) -> int:
-    """Find the run to make next: the reference, within the machine's limits, that tells most.
+    """Find the run to make next: the reference, within the machine's limits, that is most
+    informative.
 
     Writes reference.csv (t, r at the controller's rate), experiment.json with what it promises, and
     report.html. The run begins with the machine at rest at the first r.

@@ -26,8 +26,8 @@ SINGLE = ("c", "st", "plcopen")  # targets that have single precision too
 NO_MEANING = "{} has no meaning for this file and --to; leave it out."
 WHAT_NEXT = {
     "c": "compile it with -ffp-contract=off and call {name}_self_test() once: 0 where all is well",
-    "st": "import it; FB_{name}_test.passed tells whether the controller computes as it should",
-    "plcopen": "import it as PLCopen XML; FB_{name}_test.passed tells whether it computes as it"
+    "st": "import it; FB_{name}_test.passed says whether the controller computes as it should",
+    "plcopen": "import it as PLCopen XML; FB_{name}_test.passed says whether it computes as it"
     " should",
     "fmu": "it holds C source: compile it by your tool, or by 'fmpy compile'",
     "json": "what it holds is said in the manual: Contract, design.json",

@@ -67,11 +67,11 @@ class FleetOptions:
 )
 @by_fields(FleetOptions)
 def command(given: FleetOptions) -> int:
-    """Identify the logs of many machines, or judge them by the models in force.
+    """Identify the logs of many machines, or test them against the active models.
 
     LOGS is a folder, a file, a pattern or any fsspec URL of Parquet logs, <machine>/*.parquet or
-    <machine>.parquet. A machine without a model in force gets its first (without a design) where it
-    leaves only noise; else the log is judged as by 'workbench reidentify'. Results go into the
+    <machine>.parquet. A machine without an active model gets its first (without a design) where it
+    leaves only noise; else the log is tested as by 'workbench reidentify'. Results go into the
     registry and DIR/results/*.parquet while the run goes on. A run that was killed goes on where it
     was; logs that are done are skipped.
     """
@@ -108,7 +108,7 @@ def clock() -> datetime:
 def after_fleet(
     done: "Report", logs: str, card: str | None, where: str | None, *, in_registry: bool
 ) -> Step | None:
-    """Look at the first machine or log that somebody has to look at; else run again."""
+    """Check the first machine or log that somebody has to check; else run again."""
     from workbench.addresses import shown
 
     if not (done.bad or done.later):
@@ -121,7 +121,7 @@ def after_fleet(
     if in_registry and first.verdict in ("structure", "promoted", "refused"):
         return step("what was found, and why", "registry", "show", first.log.machine, *registry)
     beside = str(Path(first.log.path).with_name("card.toml"))
-    return step("what the log can tell", "doctor", first.log.path, "--card", card or beside)
+    return step("what the log identifies", "doctor", first.log.path, "--card", card or beside)
 
 
 def fleet_view(done: "Report", out: Path) -> "Screen":
@@ -149,7 +149,7 @@ def fleet_view(done: "Report", out: Path) -> "Screen":
 
 
 def _bad(one: Any) -> dict[str, Any]:
-    """A result to look at, as JSON has it."""
+    """A result to check, as JSON has it."""
     return {"machine": one.log.machine, "log": one.log.name, "verdict": one.verdict,
             "reason": one.reason}  # fmt: skip
 

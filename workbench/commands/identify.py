@@ -23,7 +23,7 @@ from workbench.steps.stages import IDENTIFY_STAGES
 
 @click.command(
     cls=StatusCommand,
-    refusal="the logs tell nothing",
+    refusal="nothing is identifiable from the logs",
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
 @by_signature
@@ -48,8 +48,8 @@ def command(
 ) -> None:  # fmt: skip
     """Find friction, plant and actuator of a machine from its logs.
 
-    Writes model.json (every parameter with its 95 % interval, or why the logs do not tell it) and
-    report.html. LOG is a path, or a file name of the card's set.
+    Writes model.json (every parameter with its 95 % interval, or why it is not identifiable)
+    and report.html. LOG is a path, or a file name of the card's set.
     """
     begun = time.monotonic()
     from workbench.logs.sources import card_of_velocity, read_sources

@@ -35,12 +35,12 @@ def command(
 ) -> None:  # fmt: skip
     """Propose a card for a log that has none: which column is what, in which unit, and the rig.
 
-    It looks at the headers, and at how the columns hang together: a force accelerates the body and
-    is eaten up by friction, a reference is ahead of the position, a speed is its derivative, what
+    It uses the headers, and how the columns depend on each other: a force accelerates the body and
+    is balanced by friction, a reference is ahead of the position, a speed is its derivative, what
     comes out of a limiter acts. On a terminal it asks about each guess; else the card is written
     with a remark on each line, "sure" or "guess", why, and what it would be otherwise; and with
-    what the log will hardly tell. Of several axes --axis names the one. A card that is there is
-    replaced only with --force or your yes.
+    what is hardly identifiable from the log. Of several axes --axis names the one. A card that is
+    there is replaced only with --force or your yes.
     """
     from workbench.report.first_card import proposal_view
     from workbench.steps.first_card.looked_over import looked_over

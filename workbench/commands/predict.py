@@ -41,7 +41,7 @@ def command(
 
     Writes prediction.csv: t, force_applied, force_predicted (inverse model), force_simulated
     (actuator driven by the command), position_measured, position_simulated (free run). The force
-    is predicted also where the model does not tell what a free run needs (mass, friction of
+    is predicted also where the model does not identify what a free run needs (mass, friction of
     sliding, by command the actuator); then `run_refused` says so.
     """
     from workbench.cards.own_effects import library

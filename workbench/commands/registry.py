@@ -1,4 +1,4 @@
-"""`workbench registry`: what is in force on each machine, what was, and why."""
+"""`workbench registry`: the active version of each machine, the earlier ones, and why."""
 
 import getpass
 import json
@@ -32,7 +32,7 @@ REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", ca
 
 @click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
 def command() -> None:
-    """Models and designs of machines, append-only, with one version in force each.
+    """Models and designs of machines, append-only, with one active version each.
 
     Every subcommand takes --registry FILE|URL and --json; 'show --out DIR' writes a version's
     files.
@@ -42,7 +42,7 @@ def command() -> None:
 @command.command("list", epilog="Example: workbench registry list --registry fleet.db")
 @by_signature
 def list_machines(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
-    """List the machines, what is in force on each, and how many logs wait."""
+    """List the machines, the active version of each, and how many logs wait."""
     from workbench.registry.views import list_view
 
     with _open(where) as found:
@@ -59,9 +59,9 @@ def show(
     where: str | None = REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
-    """Show a machine: what is in force, every decision with its reason, every log's result.
+    """Show a machine: the active version, every decision with its reason, every log's result.
 
-    NUMBER: a version whose files --out writes, by default the one in force.
+    NUMBER: a version whose files --out writes, by default the active one.
     """
     from workbench.registry.queue import Queue
     from workbench.registry.views import machine_view
@@ -89,7 +89,7 @@ def diff(
 ) -> None:
     """Show the parameters of two versions side by side, with units and 95 % intervals.
 
-    FIRST: by default the version before SECOND; SECOND: by default the one in force.
+    FIRST: by default the version before SECOND; SECOND: by default the active one.
     """
     from workbench.registry.difference import difference
     from workbench.registry.errors import BadRegistry
@@ -117,7 +117,7 @@ def add(
     model_file: Path = MODEL_ARGUMENT,
     design_file: Path | None = argument("[DESIGN]"),
     validation: Path | None = option("validation.json of the design.", metavar="FILE"),
-    promote: bool = option("Put it in force as well."),
+    promote: bool = option("Make it the active version as well."),
     effects: tuple[Path, ...] = EFFECTS_OPTION,
     reason: str = REASON_OPTION,
     by: str | None = BY_OPTION,
@@ -126,7 +126,7 @@ def add(
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
 
-    What is in force stays in force unless --promote is given. The same files again are the same
+    The active version stays active unless --promote is given. The same files again are the same
     version.
     """
     from workbench.cards.own_effects import library
@@ -149,7 +149,7 @@ def add(
         current = found.in_force(machine)
         if promote and (current is None or current.number != version.number):
             found.promote(machine, version.number, reason=reason, by=who, now=now)
-    state = "in force" if promote else "not in force yet: 'workbench registry promote'"
+    state = "active" if promote else "not active yet: 'workbench registry promote'"
     said = [f"{machine}: version {version.number}, {state}", *(f"note: {r}" for r in remarks)]
     emit({**asdict(version), "remarks": remarks}, as_json, lambda: "\n".join(said))
 
@@ -164,7 +164,7 @@ def promote(
     where: str | None = REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
-    """Put a version of a machine in force."""
+    """Activate a version of a machine."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         decision = found.promote(machine, number, reason=reason, by=who, now=now)
@@ -180,7 +180,7 @@ def rollback(
     where: str | None = REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
-    """Put the version in force that was before the present one; again goes one further back."""
+    """Activate the version before the present one; again goes one further back."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         decision = found.rollback(machine, reason=reason, by=who, now=now)
@@ -197,18 +197,16 @@ def retry(
     where: str | None = REGISTRY_OPTION,
     as_json: bool = JSON_OPTION,
 ) -> None:
-    """Have logs judged again by the next pass; their earlier results stay on record.
+    """Have logs tested again by the next pass; their earlier results stay on record.
 
-    LOG: a file name or the beginning of a fingerprint; by default all that were set aside.
+    LOG: a file name or the beginning of a fingerprint; by default all that were excluded.
     """  # fmt: skip
     from workbench.registry.queue import Queue
 
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
         files = Queue(found.database).reopen(machine, logs, reason=reason, by=who, now=now)
-    said = (
-        f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none set aside"
-    )
+    said = f"{machine}: waiting again: {', '.join(files)}" if files else f"{machine}: none excluded"
     emit({"machine": machine, "logs": files}, as_json, lambda: said)
 
 
@@ -220,13 +218,13 @@ def _open(where: str | None, *, create: bool = False) -> "Registry":
 
 
 def _version(found: "Registry", machine: str, number: int | None) -> "Version":
-    """The version of that number, by default the one in force."""
+    """The version of that number, by default the active one."""
     from workbench.registry.errors import BadRegistry
 
     found.machine(machine)
     version = found.in_force(machine) if number is None else found.version(machine, number)
     if version is None:
-        raise BadRegistry(f"{machine}: no version in force; name a version's number")
+        raise BadRegistry(f"{machine}: no active version; name a version's number")
     return version
 
 
@@ -238,4 +236,4 @@ def _write(found: "Registry", version: "Version", out: Path) -> None:
 
 
 def _said(decision: "Decision") -> str:
-    return f"{decision.machine}: version {decision.number} in force ({decision.reason})"
+    return f"{decision.machine}: version {decision.number} active ({decision.reason})"

@@ -20,20 +20,20 @@ MOST_LINES = 6  # of one screen on machines left for later, and on alarms
 
 @click.command(
     cls=StatusCommand,
-    refusal="an alarm: drift, another structure, a log set aside",
+    refusal="an alarm: drift, another structure, an excluded log",
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
 @by_signature
 @by_fields(JobOptions)
 def command(given: JobOptions, as_json: bool = JSON_OPTION) -> int:
-    """Judge each new log of each machine once; where friction has drifted, re-tune.
+    """Test each new log of each machine once; where friction has drifted, re-tune.
 
     ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
-    tested against the model in force ('workbench registry add' puts the first there); on drift a
+    tested against the active model ('workbench registry add' puts the first there); on drift a
     new model and design are made, on another structure the log is traced; what is new replaces the
     old only if it wins on held-out data and in simulation. Safe to run at any time and many at
-    once; what a killed run left, the next does. A log older than one behind the model in force is
-    judged and recorded, and changes nothing. Progress is told as JSON lines on standard error.
+    once; what a killed run left, the next does. A log older than one behind the active model is
+    tested and recorded, and changes nothing. Progress is written as JSON lines on standard error.
     Exit status 2 also where a machine could not be handled, the registry is away, or the webhook
     has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
     given up after a day.
@@ -54,7 +54,7 @@ def command(given: JobOptions, as_json: bool = JSON_OPTION) -> int:
 
 
 def after_pass(done: "PassReport", where: str | None) -> Step | None:
-    """Look at the first machine with an alarm."""
+    """Check the first machine with an alarm."""
     from workbench.addresses import shown
     from workbench.registry.values import ALARMING
 
@@ -73,7 +73,7 @@ def undelivered(alarms: "Delivery") -> str:
     if alarms.given_up:
         parts.append(f"{alarms.given_up} alarm(s) given up after a day")
     why = f" ({alarms.reason})" if alarms.reason else ""
-    return f"--webhook: {', '.join(parts)}{why}; look after the receiver"
+    return f"--webhook: {', '.join(parts)}{why}; check the receiver"
 
 
 def pass_view(done: "PassReport") -> "Screen":
@@ -82,7 +82,7 @@ def pass_view(done: "PassReport") -> "Screen":
     from workbench.registry.views import outcomes_table
     from workbench.screen import listed, screen
 
-    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) judged"
+    judged = f"{done.machines} machine(s), {len(done.outcomes)} log(s) tested"
     alarming = dict.fromkeys(o.machine for o in done.outcomes if o.verdict in ALARMING)
     then = (
         next_step(f"`workbench registry show {machine}` says what has changed, and what was done")
@@ -104,5 +104,5 @@ def remarks(done: "PassReport") -> Sequence[str]:
     if done.busy:
         out.append(f"in another worker's hands: {', '.join(done.busy)}")
     for name in done.without_model:
-        out.append(f"{name}: no model in force; 'workbench registry add {name} ...', or --first")
+        out.append(f"{name}: no active model; 'workbench registry add {name} ...', or --first")
     return out

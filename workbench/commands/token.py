@@ -40,7 +40,7 @@ def add_token(
         secret = Access(found.database).add(
             name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
         )
-    shown = f"{secret}\nThe token of {name} ({role}); it is shown this once and kept nowhere."
+    shown = f"{secret}\nThe token of {name} ({role}); it is shown only now and stored nowhere."
     emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
 
 
@@ -56,7 +56,7 @@ def list_tokens(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION
         tokens = Access(found.database).tokens()
     rows = [
         (one.name, one.role, one.made_by, moment(one.at),
-         "in force" if one.ended is None else f"revoked {moment(one.ended)}")
+         "active" if one.ended is None else f"revoked {moment(one.ended)}")
         for one in tokens
     ]  # fmt: skip
     head = ("token", "role", "made by", "at", "state")

@@ -30,7 +30,7 @@ from workbench.steps.stages import TRACE_STAGES
 def command(
     logs: tuple[str, ...] = argument("[LOG...]", shell_complete=complete_file),
     tests: tuple[str, ...] = option(
-        "Held-out log, which neither fit nor choice sees; may be given several times.",
+        "Held-out log, used by neither fit nor model selection; may be given several times.",
         "--test", metavar="LOG", shell_complete=complete_file,
     ),
     card: str = CARD_OPTION,

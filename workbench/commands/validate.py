@@ -52,7 +52,7 @@ def command(
 ) -> int:
     """Check a design on a plant in simulation: margins, steps, a smooth reference, limit cycles.
 
-    Judged too: overshoot, largest force, and whether the command reaches the card's limit.
+    Tested too: overshoot, largest force, and whether the command reaches the card's limit.
 
     Writes validation.json and report.html.
     """

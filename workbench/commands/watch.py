@@ -66,7 +66,7 @@ def command(
 
 
 def _once(found: "Worker") -> bool:
-    """One pass; whether it has to come again soon. What it dies of is told, and tried again."""
+    """One pass; whether it has to come again soon. What it dies of is reported, and tried again."""
     from identification.errors import UserError
 
     try:

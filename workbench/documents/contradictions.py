@@ -108,7 +108,7 @@ def _impossible_mass(found: "ModelFile", peak: float, speed: float, most: str) -
     """Too heavy to reach the logs' speed, or known better than the logs' noise allows.
 
     A mass that is off by dm shifts the position by at most speed/F_v dm, so that n positions with
-    noise tell it no better than to noise F_v/(speed sqrt(n)): the bound of Cramer and Rao.
+    noise gives it no better than to noise F_v/(speed sqrt(n)): the bound of Cramer and Rao.
     """
     mass = found.friction["m"]
     duration = max(entry.duration for entry in found.log)
@@ -121,8 +121,8 @@ def _impossible_mass(found: "ModelFile", peak: float, speed: float, most: str) -
     least = found.fit.noise_y * 0.5 * sum(viscous) / speed / sqrt(samples)
     if mass.sd < least / _SHARPER:
         return (
-            f"its standard deviation would be {mass.sd:.2g} {mass.unit}, and the noise of its logs"
-            f" tells no mass better than to {least:.2g} {mass.unit}"
+            f"its standard deviation would be {mass.sd:.2g} {mass.unit}, but with the noise of its"
+            f" logs it is at least {least:.2g} {mass.unit}"
         )
     return None
 

@@ -146,7 +146,7 @@ class CompensatorValues:
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Names of the nine that no log told."""
+        """Names of the nine that no log identifies."""
         return tuple(name for name in NAMES if self.friction[name].value is None)
 
     @property

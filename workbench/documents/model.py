@@ -64,7 +64,7 @@ class ArxPlant:
 class LogEntry:
     """One fitted run: its file, the state in which it starts (m, m/s, N) and what the fit leaves.
 
-    position_rms is None where no free run follows the log: the motion is imposed on the body.
+    position_rms is None where no free run follows the log: the motion is prescribed.
     travel: lowest and highest measured position [m]; force_peak: largest applied force [N];
     duration, h [s]; speed: what 1 % of the measured speeds exceed [m/s]; period: of the samples in
     the file [s], where h is that of the samples fitted; both None in older files.
@@ -141,10 +141,11 @@ class ParameterCorrelation:
 
 @dataclass(frozen=True)
 class Told:
-    """Whether the logs can tell a parameter, why (not), and what run to add where they cannot.
+    """Whether the logs can identify a parameter, why (not), and what run to add where they cannot.
 
     within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
-    only_if: what has to hold for it to be told where that is not known before the fit; "": it is.
+    only_if: what has to hold for it to be identified where that is not known before the fit; "":
+    it is.
     """
 
     name: str
@@ -208,9 +209,9 @@ class Model(ModelFile):
     friction: the nine by the paper's names; actuator: k1, k2, or k_a, None without a command;
     effects: parameters by key and name. plant is None with the reason in `plant_reason`.
     posterior: what `--posterior` found; correlation: of the parameters' errors; own_logs: how far
-    the logs lie from the model, each alone; bad_samples: what was set aside of them; controller:
-    the one that the machine has now; identifiability: what the logs could tell before a fit, empty
-    where not asked; lag: of the motion behind the force's column [s], None where none shows;
+    the logs lie from the model, each alone; bad_samples: samples excluded from them; controller:
+    the one that the machine has now; identifiability: what the logs could identify before a fit,
+    empty where not asked; lag: of the motion behind the force's column [s], None where none shows;
     resonance: of a second mass (`frequency`, `anti_resonance` [Hz], `damping`, `m_1`, `m_2`);
     falling: slopes below 0 (F_vp, F_vn [N s/m]) with which friction falls with speed: of a motion
     that is predicted, never of one that is simulated.
@@ -227,7 +228,7 @@ class Model(ModelFile):
 
     @property
     def karnopp(self) -> Karnopp:
-        """The nine that simulations use; assumed ones where the log does not tell them."""
+        """The nine that simulations use; assumed ones where the log does not identify them."""
         return Karnopp(**{name: used(self.friction[name]) for name in NAMES})
 
     @property
@@ -245,7 +246,7 @@ class Model(ModelFile):
 
     @property
     def assumed(self) -> tuple[str, ...]:
-        """Names of the nine that no log told."""
+        """Names of the nine that no log identifies."""
         return tuple(name for name in NAMES if not self.friction[name].known)
 
     @property
@@ -275,7 +276,7 @@ class Model(ModelFile):
 
     @property
     def imposed(self) -> bool:
-        """Whether a rig led the body along a path: no drive of its own shows in the logs."""
+        """Whether the motion was prescribed by a rig: no drive of its own shows in the logs."""
         driven = self.rig.kind == "motor" or self.actuator is not None
         return self.by_equation and not driven
 

@@ -102,7 +102,7 @@ def model_remarks(model: Model) -> tuple[str, ...]:
 
 
 def stored_remarks(model: Model) -> tuple[str, ...]:
-    """As `model_remarks`, and what a model file tells of its logs and rig, for who reads it."""
+    """As `model_remarks`, and what a model file says of its logs and rig, for who reads it."""
     logs, rig = model.log, model.rig
     periods = _extremes([entry.h for entry in logs])
     lines = [_judged("period", h, rig, "t of its logs", "sampled every") for h in periods]

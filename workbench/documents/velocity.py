@@ -78,7 +78,7 @@ class VelocityModel:
 
     @property
     def simulated(self) -> Valve:
-        """The valve as simulations use it; assumed numbers where the logs do not tell them."""
+        """The valve as simulations use it; assumed numbers where the logs do not identify them."""
         return self._with(lambda one: one.assumed if one.value is None else one.value)
 
     def end(self, low: bool) -> Valve:

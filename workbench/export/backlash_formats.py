@@ -129,7 +129,7 @@ def known_play(what: Compensation) -> Estimate:
     if what.play is None or not what.play.value:
         raise BadModel(
             f"{what.model.card}: the model has no backlash, so there is no value for it; 'workbench"
-            " trace' looks for one"
+            " trace' searches for one"
         )
     return what.play
 

@@ -96,7 +96,7 @@ def ax8000_cogging(what: Compensation) -> TableFile:
             f" whole from 1 to {AX8000_HIGHEST}; give the travel in one turn by --per-turn"
         )
     costs = tuple(
-        Cost(f"cogging of order {number(what.turn / one.period, 4)}: not held, up to",
+        Cost(f"cogging of order {number(what.turn / one.period, 4)}: not compensated, up to",
              one.amplitude)
         for one in left
     )  # fmt: skip
@@ -136,7 +136,7 @@ def known_harmonics(what: Compensation) -> tuple[Harmonic, ...]:
             raise BadModel(f"{what.model.card}: no cogging table, as {why}")
         raise BadModel(
             f"{what.model.card}: the model has no cogging, so there is no cogging table; 'workbench"
-            " trace' looks for one"
+            " trace' searches for one"
         )
     return what.harmonics
 
@@ -147,5 +147,5 @@ def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
 
 
 def _untold(what: Compensation) -> tuple[str, ...]:
-    """Lines on what of the cogging no log tells."""
+    """Lines on what of the cogging no log identifies."""
     return tuple(line for line in what.untold_places if line.startswith("cogging"))

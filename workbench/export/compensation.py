@@ -50,7 +50,8 @@ class TablesAsked:
 
 @dataclass(frozen=True)
 class Cost:
-    """What a table leaves uncompensated, in words; force [N or N m], None where no log tells it."""
+    """What a table leaves uncompensated, in words; force [N or N m], None where not
+    identifiable from the logs."""
 
     what: str
     force: float | None
@@ -132,19 +133,19 @@ class Compensation:
                 raise BadModel(self.untold(what, name, found))
 
     def untold(self, what: str, name: str, found: Estimate) -> str:
-        """The refusal of what needs a number that no log tells."""
+        """The refusal of what needs a number that no log identifies."""
         return (
             f"{self.model.card}: {what} needs {name}, which is not identified"
             f" ({first_of(found.reason)}); no number is assumed for it"
         )
 
     def small(self, names: Iterable[str]) -> Iterator[str]:
-        """A line for each parameter of which the logs tell no more than that it is small."""
+        """A line for each parameter of which the logs show only that it is small."""
         for name in names:
             found = self.model.friction[name]
             if found.value is None and found.at_most is not None:
                 yield (
-                    f"{name}: too small for the logs to tell, at most"
+                    f"{name}: not significantly different from 0, at most"
                     f" {number(found.at_most)} {found.unit}; the table has"
                     f" {number(found.assumed or 0.0)}"
                 )
@@ -173,13 +174,13 @@ class Compensation:
 
     @cached_property
     def places(self) -> tuple[Acting, ...]:
-        """Effects that are forces of place, with the sizes that the logs tell; `untold_places` has
-        the others, which are 0 here."""
+        """Position-dependent forces among the effects, with the sizes that the logs identify;
+        `untold_places` has the others, which are 0 here."""
         return tuple(one for one, _ in self._places if one is not None)
 
     @property
     def untold_places(self) -> tuple[str, ...]:
-        """A line for each number of a force of place that no log tells."""
+        """A line for each number of a position-dependent force that no log identifies."""
         return tuple(line for _, lines in self._places for line in lines)
 
     @cached_property
@@ -187,7 +188,8 @@ class Compensation:
         return [self._told(one) for one in self.model.acting if is_of_place(one)]
 
     def _told(self, one: Acting) -> tuple[Acting | None, list[str]]:
-        """The effect without the sizes that no log tells; None where its shape is not told."""
+        """The effect without the sizes that no log identifies; None where its shape is not
+        identified."""
         found, lines, values = self.model.effects[one.key], list[str](), dict(one.values)
         for p in one.effect.params:
             if found[p.name].known:
@@ -201,7 +203,7 @@ class Compensation:
 
     @cached_property
     def harmonics(self) -> tuple[Harmonic, ...]:
-        """Cogging of the axis by its waves, the largest first; empty where none is told."""
+        """Cogging of the axis by its waves, the largest first; empty where none is identified."""
         return cogging_harmonics(self.places)
 
     @cached_property
@@ -284,7 +286,7 @@ class AtMotor:
 
 def first_of(reason: str | None) -> str:
     """What a reason says, without its advice."""
-    return (reason or "no log tells it").partition(";")[0]
+    return (reason or "not identifiable from the logs").partition(";")[0]
 
 
 def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
@@ -307,7 +309,7 @@ def friction_costs(what: Compensation, *, signed: bool) -> tuple[Cost, ...]:
     ):
         found = what.model.friction[name]
         if not found.known:
-            out.append(Cost(f"breakaway in {way} direction, not identified, so not told", None))
+            out.append(Cost(f"breakaway in {way} direction: not identified", None))
             continue
         limit = abs(found.value if found.value is not None else found.assumed or 0.0)
         more = limit - float(level[0])
@@ -327,10 +329,15 @@ def other_costs(what: Compensation) -> Iterator[Cost]:
         if effect.place.unit != "N" or effect.evolve is not None or effect.signals:
             yield Cost(f"{said}: {NO_TABLE_HOLDS}", None)
         elif set(effect.depends_on) <= {"y", "v"}:
-            kind = "a force of place, not friction" if is_of_place(one) else "varies with place"
+            kind = (
+                "a position-dependent force, not friction"
+                if is_of_place(one)
+                else "varies with position"
+            )
             yield Cost(f"{said}: {kind}, up to", largest_along(what.model, one))
         else:
-            yield Cost(f"{said}: depends on {', '.join(effect.depends_on)}, so not held", None)
+            of = ", ".join(effect.depends_on)
+            yield Cost(f"{said}: depends on {of}, so not compensated", None)
 
 
 def largest_along(model: Model, one: Acting) -> float:

@@ -23,7 +23,7 @@ from workbench.steps.closed_loop import DrivenLoop
 Precision = Literal["double", "single"]
 REAL: Mapping[Precision, type[np.floating[Any]]] = {"double": np.float64, "single": np.float32}
 BEFORE_DIGIT = "servo_"  # before a name that begins with no letter
-LONGEST_NAME = 31  # characters that every linker and PLC tells apart
+LONGEST_NAME = 31  # characters that every linker and PLC distinguishes
 DESIGN_AGAIN = "run 'workbench design' again"
 
 

@@ -41,7 +41,8 @@ class PlaceForce:
 
 
 def place_force(acting: tuple[Acting, ...]) -> PlaceForce:
-    """The forces of place among the effects that a feed-forward holds; others it leaves."""
+    """The position-dependent forces among the effects that a feed-forward holds; others it
+    leaves."""
     constant = k = k_3 = 0.0
     waves = list(cogging_harmonics(acting))
     for one in acting:
@@ -93,7 +94,7 @@ def _remarks_of(what: Compensation) -> tuple[str, ...]:
 
 
 def _costs(what: Compensation) -> tuple[Cost, ...]:
-    """As of a friction table, but for the forces of place that it holds."""
+    """As of a friction table, but for the position-dependent forces that it has."""
     held = {one.key.replace("_", " ") for one in what.model.acting if is_held(one)}
     return tuple(
         one for one in friction_costs(what, signed=True) if one.what.partition(":")[0] not in held

@@ -74,8 +74,8 @@ def twincat_cnc(what: Compensation) -> TableFile:
     rated, motor = what.asked.rated, what.at_motor
     if rated is None:
         raise BadModel(
-            "the friction table of TwinCAT CNC is in 0.1 % of the motor's rated torque, which no"
-            " model tells; give it by --rated [N m, or N of a linear motor]"
+            "the friction table of TwinCAT CNC is in 0.1 % of the motor's rated torque, which is"
+            " not in the model; give it by --rated [N m, or N of a linear motor]"
         )
     points = unsigned(what, CNC_POINTS - 1)
     factor, unit = CNC_SPEED[what.rotary]

@@ -16,7 +16,7 @@ LEASE = timedelta(minutes=2)
 
 
 class Recorder(Protocol):
-    """Where results are recorded beside Parquet, and what is in force on a machine."""
+    """Where results are recorded beside Parquet, and the active version on a machine."""
 
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
         """The log as a worker takes it."""
@@ -31,7 +31,7 @@ class NoRegistry:
     """A recorder that records nothing: Parquet alone."""
 
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
-        """The log as a worker takes it, without a model in force."""
+        """The log as a worker takes it, without an active model."""
         return Item(url, log, card, seed)
 
     def record(self, result: Result) -> bool:
@@ -53,7 +53,7 @@ class InRegistry:
     patience: Patience = field(default_factory=Patience)
 
     def item(self, url: str, log: LogFile, card: str, seed: int) -> Item:
-        """The log as a worker takes it, with the model and design in force on its machine."""
+        """The log as a worker takes it, with the active model and design of its machine."""
         retry, registry = self.patience, self.registry
         version = retry(registry.in_force, log.machine)
         if version is None:
@@ -67,8 +67,8 @@ class InRegistry:
     def record(self, result: Result) -> bool:
         """Whether the registry holds a result of this log; the first one counts.
 
-        False where another worker has the machine in hand, or has changed what is in force there
-        since the log was judged.
+        False where another worker has the machine in hand, or has changed the active version there
+        since the log was tested.
         """
         if not result.sha256:
             return True  # nothing was read, so there is no fingerprint to record it under

@@ -130,7 +130,7 @@ class FleetRun:
 
     def _results(self, logs: Sequence[LogFile]) -> Iterator[Result]:
         """Results as they come; a machine's logs one after the other, as each may change what the
-        next is judged against."""
+        next is tested against."""
         machines: dict[str, deque[LogFile]] = {}
         for log in logs:
             machines.setdefault(log.machine, deque()).append(log)

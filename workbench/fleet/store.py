@@ -169,7 +169,7 @@ def row_of(result: Result, now: datetime) -> dict[str, Any]:
 
 
 def _keys(path: Path) -> list[tuple[str, int, int]]:
-    """What tells the logs of a part."""
+    """The logs of a part by their key."""
     try:
         table = pq.read_table(path, columns=["log", "size", "mtime_ns"])
     except (pa.ArrowException, OSError, KeyError) as error:

@@ -10,8 +10,8 @@ from workbench.registry.values import Candidate, Judgement, Version
 from workbench.registry.values import LogVerdict as Judged
 
 FleetVerdict = Literal[
-    "identified", "inadequate",  # without a model in force
-    "none", "structure", "promoted", "refused",  # judged against the one in force
+    "identified", "inadequate",  # without an active model
+    "none", "structure", "promoted", "refused",  # tested against the active one
     "not_judged", "set_aside", "failed",
     "waits",  # not recorded: the machine has to be looked after, and the next run tries again
 ]  # fmt: skip
@@ -58,13 +58,13 @@ class LogFile:
 
     @property
     def key(self) -> tuple[str, int, int]:
-        """What tells a log that is done from one that is not, without reading it."""
+        """What distinguishes a log that is done from one that is not, without reading it."""
         return self.name, self.size, self.mtime_ns
 
 
 @dataclass(frozen=True)
 class Item:
-    """One log for a worker: where it is, its card as text, and what is in force on its machine.
+    """One log for a worker: where it is, its card as text, and the active version on its machine.
 
     url: of the folder that was listed; document and evidence as `workbench.jobs.passes.Task` has.
     """

@@ -1,4 +1,4 @@
-"""What a worker does with one log: read it there, identify or judge it, and tell the result."""
+"""What a worker does with one log: read it there, identify or test it, and return the result."""
 
 import hashlib
 import resource
@@ -82,12 +82,12 @@ def _identified(item: Item, path: Path, card: Path, blank: Result) -> Result:
     if found.model.fit.adequate:
         return replace(out, verdict="identified", reason="the machine's first model")
     chi = found.model.fit.chi_square
-    reason = f"the model leaves more than noise (chi-square {chi:.3g}); 'workbench trace' tells"
+    reason = f"the model leaves more than noise (chi-square {chi:.3g}); run 'workbench trace'"
     return replace(out, verdict="inadequate", reason=reason)
 
 
 def _judged(item: Item, path: Path, card: Path, blank: Result) -> Result:
-    """The log against what is in force: drift test, and where it has drifted the chain anew."""
+    """The log against the active version: drift test, and where it has drifted the chain anew."""
     log = item.log
     seen = SeenLog(blank.sha256, path.name, log.size, log.mtime_ns)
     task = Task(log.machine, card, path, seen, item.version, item.model, item.design, item.previous)

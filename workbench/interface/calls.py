@@ -98,7 +98,7 @@ def identify(
     """Friction, plant and actuator of a machine from its logs, as `workbench identify`.
 
     options: what drives the fitted run, orders and period of the ARX plant; posterior: sample it
-    too, which takes half a minute and more. Raises NotIdentifiable where the logs tell nothing.
+    too, which takes half a minute and more. Raises NotIdentifiable where nothing is identifiable.
     """
     found = sources(logs, card, rig, signals)
     with _bar("identifying", 1.0) as bar:
@@ -194,7 +194,7 @@ def validate(
 ) -> ValidateResult:  # fmt: skip
     """A design on its model in the simulated loop, as `workbench validate`.
 
-    plant: another machine on which it has to work too; limits: what the judged controller keeps.
+    plant: another machine on which it has to work too; limits: what the tested controller keeps.
     """
     known = _model(model)
     made = _design(design)
@@ -212,9 +212,9 @@ def experiment(
     """The run to make next on a machine, as `workbench experiment`.
 
     design: whose controller moves the machine, by default the model's present one; wanted:
-    parameters, limits, seed, keys of effects that are to be told apart; rivals: a trace that leaves
-    such effects open. budget [s]: end the search after so long. Raises NotIdentifiable where no
-    run within the limits tells anything.
+    parameters, limits, seed, keys of effects that are to be discriminated; rivals: a trace that
+    leaves such effects open. budget [s]: end the search after so long. Raises NotIdentifiable where
+    no run within the limits identifies anything.
     """
     known = _model(model)
     asked = wanted or Wanted()

@@ -106,7 +106,7 @@ class ValidateResult(Result):
 
     @property
     def passed(self) -> bool:
-        """Whether the judged controller keeps every limit on every plant."""
+        """Whether the tested controller keeps every limit on every plant."""
         return self.found.passed
 
     def _made(self) -> "View":

@@ -129,7 +129,7 @@ class TraceResult(_OfModel):
         """What the equation of motion leaves of the training logs, a row a short stretch.
 
         `before` the effects and `after` them, with its `noise` (one sigma) [N]; `t` [s] over all
-        logs in a row; the signals at the stretch by name. Empty where nothing was judged.
+        logs in a row; the signals at the stretch by name. Empty where nothing was tested.
         """
         import pandas as pd
 

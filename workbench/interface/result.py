@@ -48,7 +48,7 @@ class Result(ABC):
         return self._view.page()
 
     def plot(self) -> "Figure":
-        """The telling picture, a figure of matplotlib."""
+        """The main chart, a figure of matplotlib."""
         return self._view.figure()
 
     def save(self, out: PathLike | None = None) -> Path:

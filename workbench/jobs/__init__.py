@@ -1,1 +1,1 @@
-"""Jobs: new logs of many machines judged by themselves, once each, whatever dies on the way."""
+"""Jobs: new logs of many machines tested automatically, once each, whatever dies on the way."""

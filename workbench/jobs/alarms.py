@@ -1,7 +1,7 @@
-"""Alarms: what a webhook is told, until it has taken it; one that is not taken delays itself alone.
+"""Alarms: what a webhook is sent, until it has taken it; one that is not taken delays itself alone.
 
 A webhook's address holds secrets (user, password, a token in its path or query), and so do the
-texts of errors that quote it: only `Webhook.shown` is ever told.
+texts of errors that quote it: only `Webhook.shown` is ever shown.
 """
 
 import json
@@ -79,7 +79,7 @@ class Webhook:
     def send(self, alarm: Alarm, client: httpx.Client) -> None:
         """Send one alarm; raises Refused or Unreachable where it is not taken after all tries.
 
-        It may arrive twice, where an answer is lost: the key tells one alarm from another.
+        It may arrive twice, where an answer is lost: the key distinguishes one alarm from another.
         """
         again = Retrying(
             retry=retry_if_exception_type((Busy, Unreachable)),
@@ -118,7 +118,7 @@ class Delivery:
 
 
 def told(alarm: Alarm) -> dict[str, str | int | None]:
-    """What a webhook is told."""
+    """What a webhook is sent."""
     return {
         "machine": _readable(alarm.machine),
         "log": _readable(alarm.log),
@@ -131,7 +131,7 @@ def told(alarm: Alarm) -> dict[str, str | int | None]:
 
 
 def key(alarm: Alarm) -> str:
-    """What tells the alarm from every other; in ASCII, as a header has to be."""
+    """What identifies the alarm; in ASCII, as a header has to be."""
     name = alarm.machine
     if not (name.isascii() and name.isprintable() and name == name.strip()):
         name = quote(name.encode("utf-8", "surrogatepass"), safe=PRINTABLE.replace("%", ""))

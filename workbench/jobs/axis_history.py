@@ -1,4 +1,4 @@
-"""What the registry has of a machine for its axis test: its last logs, and its model in force."""
+"""What the registry has of a machine for its axis test: its last logs, and its active model."""
 
 from collections.abc import Sequence
 
@@ -17,13 +17,13 @@ from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
 
-LOOKED_AT = 120  # of a machine's last logs, among which those are that tell its parameters
+LOOKED_AT = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see
 HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
 
 def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0) -> Earlier:
-    """The machine's last logs, and this log by the model in force where that has further effects.
+    """The machine's last logs, and this log by the active model where that has further effects.
 
     Raises BadRegistry where there is no such machine.
     """
@@ -35,7 +35,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     said = ""
     if len(logs) < FEWEST_EARLIER:
         said = (
-            f"{machine} has {len(logs)} judged logs that tell its parameters, at least"
+            f"{machine} has {len(logs)} tested logs with identified parameters, at least"
             f" {FEWEST_EARLIER} needed"
         )
     if state.in_force is None:
@@ -45,7 +45,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     further = [key.replace("_", " ") for key in model.effects if not _held(key)]
     if further:
         remarks.append(
-            f"by the fit of version {state.in_force.number}, in force, which has"
+            f"by the fit of the active version {state.in_force.number}, which has"
             f" {', '.join(further)}"
         )
         found = drift_by_chart(model, sources, np.random.default_rng(seed), {})
@@ -54,12 +54,12 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     if width is not None and width.value is not None and "backlash" not in (estimates or {}):
         in_force = Estimate(width.value, width.unit, width.sd, width.low, width.high)
         estimates = {**(estimates or {}), "backlash": in_force}
-        remarks.append(f"backlash is that of version {state.in_force.number}, in force")
+        remarks.append(f"backlash is that of the active version {state.in_force.number}")
     return Earlier(machine, values, state.in_force.number, estimates, said, tuple(remarks))
 
 
 def untold(model: Model, why: str) -> dict[str, Estimate]:
-    """The nine as a log has them that the fit of the model in force does not tell."""
+    """The nine as a log has them that the fit of the active model does not identify."""
     return {
         name: Estimate(None, one.unit, reason=why)
         for name, one in model.friction.items()

@@ -2,7 +2,7 @@
 
 They have to win twice, with margin: on held-out logs or time blocks that neither was fitted on
 (free run in windows, and the force equation), and in the simulated loop of the machine as it is
-now, along one reference for both designs. Where only the model wins and the design in force still
+now, along one reference for both designs. Where only the model wins and the active design still
 keeps every limit, the model alone is replaced. The rule is ours; the paper re-tunes without asking.
 """
 
@@ -108,7 +108,7 @@ def challenge(
 
 
 def held_out_errors(model: Model, logs: Sequence[Log], drive: Drive) -> HeldOut:
-    """Root mean squares over the logs, by their lengths; no free run where motion is imposed."""
+    """Root mean squares over the logs, by their lengths; no free run with prescribed motion."""
     found = []
     for log in logs:
         window = WINDOW if log.duration >= 2 * WINDOW else None
@@ -157,9 +157,7 @@ def _lost_held_out(old: HeldOut, new: HeldOut, terms: Terms) -> str:
         if before is None or after is None:
             continue
         if not after <= before * (1.0 + terms.worse):
-            return (
-                f"held out, {name}: {after:.4g} against {before:.4g}, worse than the one in force"
-            )
+            return f"held out, {name}: {after:.4g} against {before:.4g}, worse than the active one"
         better = better or after <= before * (1.0 - terms.held_out)
     if better:
         return ""
@@ -180,7 +178,7 @@ def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
     if new.rms <= old.rms * (1.0 - terms.loop):
         return ""
     return (
-        f"simulation: tracking error {new.rms:.4g} against {old.rms:.4g} of the design in force on"
+        f"simulation: tracking error {new.rms:.4g} against {old.rms:.4g} of the active design on"
         f" the same machine, at least {100 * terms.loop:g} % less needed"
     )
 
@@ -194,7 +192,7 @@ def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
     if old is None:
         return f"{text}, no design before"
     if old.missed or old.rms is None:
-        return f"{text}, the design in force misses: {'; '.join(old.missed)}"
+        return f"{text}, the active design misses: {'; '.join(old.missed)}"
     return f"{text} against {old.rms:.4g}"
 
 

@@ -1,4 +1,4 @@
-"""The drift test over a machine's logs as the judge of new logs takes it.
+"""The drift test over a machine's logs as the test of new logs takes it.
 
 Its state goes from log to log in the registry, with each log's result.
 """
@@ -24,7 +24,7 @@ from workbench.steps.drift import Drifted, Stream, drift_of, model_key, seen_siz
 def drift_by_chart(
     model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]
 ) -> Drift:
-    """The verdict on a log alone and by the mean of those since the model is in force.
+    """The verdict on a log alone and by the mean of those since the model is active.
 
     Raises BadModel where the stored state is none, or model and card are of different machines.
     """

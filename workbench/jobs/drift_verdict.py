@@ -14,7 +14,7 @@ JudgedDrift = Literal["none", "drift", "structure", "not_judged"]
 
 @dataclass(frozen=True)
 class Moved:
-    """A parameter that has changed: its unit, value in force and now, p-value of the change."""
+    """A parameter that has changed: its unit, active value and now, p-value of the change."""
 
     name: str
     unit: str
@@ -25,7 +25,7 @@ class Moved:
 
 @dataclass(frozen=True)
 class Reading:
-    """A parameter by one log, with its 95 % interval, beside its value in force.
+    """A parameter by one log, with its 95 % interval, beside its active value.
 
     change: relative to that, with its standard deviation.
     """
@@ -47,7 +47,7 @@ class Drift:
     p_value: of the smallest kind, over all parameters. unsure: parameters of which some have
     changed, and nobody can say which; could_have_seen: smallest relative change of each that would
     have been found, None where none would. state: what the same test wants to be given with the
-    next log; plain JSON. parameters: what the log told of each, moved or not.
+    next log; plain JSON. parameters: what the log gave of each, moved or not.
     """
 
     verdict: JudgedDrift
@@ -61,7 +61,7 @@ class Drift:
 
 
 class DriftJudge(Protocol):
-    """A test of a machine's new log against its model in force."""
+    """A test of a machine's new log against its active model."""
 
     def __call__(
         self, model: Model, sources: Sources, rng: np.random.Generator, state: Mapping[str, Any]

@@ -35,7 +35,7 @@ class Chain:
     """A judge (`workbench.jobs.passes.Judge`): drift test, identification, design, contest.
 
     The model is fitted on the first 65 % of each run; the rest is held out. Logs on which the
-    model in force was fitted do not judge it. library: the effects that models may name, by
+    active model was fitted do not test it. library: the effects that models may name, by
     default all but a user's own files.
     """
 
@@ -51,7 +51,7 @@ class Chain:
             return self._first(sources)
         champion = _contender(task, self.library)
         if any(entry.sha256 == task.log.sha256 for entry in champion.model.log):
-            return Judgement("none", "the model in force was fitted on this log")
+            return Judgement("none", "the active model was fitted on this log")
         rng = np.random.default_rng(self.seed)
         state = (task.previous or {}).get("state", {})
         found = self.drift(champion.model, sources, rng, state)
@@ -76,7 +76,7 @@ class Chain:
     def _traced(
         self, champion: Contender, sources: Sources, found: Drift, evidence: Mapping[str, Any]
     ) -> Judgement:
-        """What the model in force lacks, by the trace; a model that has it, against that one."""
+        """What the active model lacks, by the trace; a model that has it, against that one."""
         train, held_out = divided(sources)
         library = self.library or installed()
         try:
@@ -106,7 +106,7 @@ class Chain:
         said: str,
         evidence: Mapping[str, Any],
     ) -> Judgement:
-        """A model of the machine as it is now, against the one in force; said: why it was made."""
+        """A model of the machine as it is now, against the active one; said: why it was made."""
         rng = np.random.default_rng(self.seed)
         contest = challenge(champion, challenger, held_out, rng, self.terms)
         evidence = {**evidence, "contest": contest_document(contest)}
@@ -120,7 +120,7 @@ class Chain:
         return Judgement("promoted", stays, kept, evidence, (candidate, reason))
 
     def _kept(self, champion: Contender, challenger: Contender) -> Candidate | None:
-        """The new model with the controllers in force, where they pass on it.
+        """The new model with the active controllers, where they pass on it.
 
         The compensator holds the friction of the new model, as of any design made for it.
         """
@@ -141,7 +141,7 @@ class Chain:
     def _anew(
         self, champion: Model, train: Sources, held_out: Sequence[Log]
     ) -> tuple[Contender | None, Candidate | None, str]:
-        """A drifted machine's model, with the effects of the one in force where they show."""
+        """A drifted machine's model, with the effects of the active one where they show."""
         if champion.acting:
             known = {one.key: one.effect for one in champion.acting}
             traced = trace_sources(train, _as_test(train, held_out), known, self.seed)
@@ -208,12 +208,12 @@ def _summary(traced: Traced) -> dict[str, Any]:
 
 
 def _contender(task: Task, library: Library | None) -> Contender:
-    """The model and design in force, read as from their files."""
+    """The active model and design, read as from their files."""
     try:
         found = read_model(Stored("model.json", task.model or {}), library)
         made = None if task.design is None else read_design(Stored("design.json", task.design))
     except BadModel as error:
-        raise BadModel(f"{task.machine}: in force: {error}") from None
+        raise BadModel(f"{task.machine}: active version: {error}") from None
     return Contender(found, made)
 
 

@@ -56,7 +56,7 @@ def write_metrics(path: Path, figures: MachineFigures) -> None:
 
 def _of_machines(registry: Registry) -> Iterator[GaugeMetricFamily]:
     machines = registry.machines()
-    version = _family("version_in_force", "Number of the version in force.", "machine")
+    version = _family("version_in_force", "Number of the active version.", "machine")
     waiting = _family("logs_waiting", "Logs that wait for a result.", "machine")
     unsent = _family("alarms_waiting", "Alarms that no webhook has taken yet.", "machine")
     lost = _family("alarms_failed", "Alarms given up, as no webhook took them.", "machine")
@@ -67,7 +67,7 @@ def _of_machines(registry: Registry) -> Iterator[GaugeMetricFamily]:
         waiting.add_metric([one.name], one.waiting)
         for family, count in zip((unsent, lost), alarms.get(one.name, (0, 0)), strict=True):
             family.add_metric([one.name], count)
-    judged = _family("logs_judged", "Logs by what they led to.", "machine", "verdict")
+    judged = _family("logs_judged", "Logs by verdict.", "machine", "verdict")
     for labels, count in sorted(Queue(registry.database).verdicts().items()):
         judged.add_metric(list(labels), count)
     yield from (version, waiting, judged, unsent, lost)

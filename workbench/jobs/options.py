@@ -55,7 +55,7 @@ class JobOptions:
         metavar="SUFFIX", callback=_suffix,
     )  # fmt: skip
     order: Literal["time-or-name", "time"] = option(
-        "What tells that a log is older than another, so that it puts no model in force: the"
+        "What makes a log older than another, so that its model does not become active: the"
         " file's time, or also the numbers in its name.",
         default="time-or-name",
     )

@@ -27,10 +27,10 @@ OUT_OF_RESOURCES = (errno.ENOSPC, errno.EDQUOT, errno.EIO, errno.ENOMEM, errno.E
 
 @dataclass(frozen=True)
 class Task:
-    """One log of one machine to be judged: where it lies, and the model and design in force.
+    """One log of one machine to be tested: where it lies, and the active model and design.
 
     model, design: documents, None where there is none. previous: what was found of the log before
-    under the same version in force (`Judgement.evidence`), for tests that look at several logs.
+    under the same active version (`Judgement.evidence`), for tests that look at several logs.
     """
 
     machine: str
@@ -46,7 +46,7 @@ class Task:
 class Judge(Protocol):
     """What a worker makes of a log.
 
-    Raises BadLog where the file cannot be judged: it is set aside. BadCard and BadModel say that
+    Raises BadLog where the file cannot be tested: it is excluded. BadCard and BadModel say that
     the machine has to be looked after: its logs wait.
     """
 
@@ -60,9 +60,9 @@ class PassSettings:
     """How a pass works.
 
     lease: time after which a silent worker counts as dead; settle: how long a file must not have
-    changed; attempts: after how many starts without a result a log is set aside; first: whether a
+    changed; attempts: after how many starts without a result a log is excluded; first: whether a
     machine without a model gets its first from its log. owner: name of the worker. order: how
-    an older log is told from a newer one; marker: ending of the files beside finished logs.
+    an older log is known from a newer one; marker: ending of the files beside finished logs.
     """
 
     owner: str
@@ -98,7 +98,7 @@ class Pass:
     """One worker's way through the machines of a folder.
 
     clock: the one that all workers share, for claims and records; files: the one by which the ages
-    of files are told, by default the same.
+    of files are known, by default the same.
     """
 
     def __init__(
@@ -189,13 +189,13 @@ class Pass:
         return done
 
     def _ready(self, log: SeenLog, found: Scan) -> bool:
-        """Whether a waiting log can be judged now: it is there, or something else in its place."""
+        """Whether a waiting log can be tested now: it is there, or something else in its place."""
         return log.sha256 in found.complete or _replaced(log, found)
 
     def _logs(
         self, folder: MachineFolder, found: Scan, claim: Claim, outcomes: list[LogOutcome]
     ) -> None:
-        """Judge the machine's logs; what is waiting is asked again, now that it is ours."""
+        """Test the machine's logs; what is waiting is asked again, now that it is ours."""
         for log, begun in self._settings.patience(self._queue.waiting, folder.name):
             if self._stop():
                 break
@@ -212,7 +212,7 @@ class Pass:
         retry, settings = self._settings.patience, self._settings
         if _replaced(log, found):
             judgement = Judgement(
-                "set_aside", f"{log.file}: changed before it was judged; what it holds now counts"
+                "set_aside", f"{log.file}: changed before it was tested; its present content counts"
             )
         elif begun >= settings.attempts:
             judgement = Judgement(
@@ -236,7 +236,8 @@ class Pass:
         return outcome
 
     def _judged(self, task: Task) -> Judgement:
-        """The judgement; "set_aside" for a bad log, "not_judged" for one that tells too little."""
+        """The judgement; "set_aside" for a bad log, "not_judged" for one with too little
+        information."""
         file = task.log.file
         try:
             return self._judge(task)

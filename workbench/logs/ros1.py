@@ -23,7 +23,7 @@ _NESTED = 32  # definitions within each other
 class _Field(NamedTuple):
     kind: str
     name: str
-    length: int | None  # of an array; 0: told by the message, None: no array
+    length: int | None  # of an array; 0: given by the message, None: no array
 
 
 Definitions = dict[str, list[_Field]]

@@ -85,7 +85,7 @@ def shown_name(path: Path) -> str:
 
 
 def with_force(log: Log, path: Path, card: Card) -> Log:
-    """The log with the applied force F_e in `F`, by the card's rig, where it can be told."""
+    """The log with the applied force F_e in `F`, by the card's rig, where it is known."""
     rig = card.rig(path.name)
     F = applied_force(log, rig)
     if F is None:

@@ -34,7 +34,7 @@ class Source:
 @dataclass(frozen=True)
 class Sources:
     """The card, its rig for these files, their runs, what had to be repaired in them, and which
-    samples were set aside."""
+    samples were excluded."""
 
     card: Card
     rig: Rig
@@ -124,7 +124,7 @@ def refuse_twins(train: Sequence[Source], test: Sequence[Source]) -> None:
         if source.sha256 in names:
             raise BadLog(
                 f"--test {source.file}: the same bytes as the training log"
-                f" {names[source.sha256]}; test on a log that the fit has not seen"
+                f" {names[source.sha256]}; test on a log that the fit has not used"
             )
 
 

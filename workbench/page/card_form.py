@@ -61,7 +61,7 @@ class CardForm:
         return self.fields.get(name, "")
 
     def with_fields(self, given: Mapping[str, Any]) -> "CardForm":
-        """The form with what a visitor has put into its fields; others are left aside."""
+        """The form with what a visitor has put into its fields; others are left out."""
         texts = {
             name: " ".join(str(given.get(name, "")).split())[:LONGEST_FIELD] for name in _names()
         }
@@ -78,7 +78,7 @@ class CardForm:
         return CardForm(texts, self.columns, why, self.remarks, self.layout, {**others, **back})
 
     def _shown(self, name: str) -> str:
-        """What a field holds, as the other of a guess is told."""
+        """What a field holds, as the other of a guess is shown."""
         part, _, signal = name.partition("_")
         if part != "column" or signal not in FORM_SIGNALS:
             return self[name] or "none"

@@ -27,7 +27,7 @@ LONGEST_REASON = 500
 
 
 def keep(request: Request, visitor: Visitor) -> Response:
-    """Keep what came of a dropped log as a machine, its version in force."""
+    """Keep what came of a dropped log as a machine with an active version."""
     settings, registry = request.app.state.settings, registry_of(request)
     task = Bench(registry.database).task(request.path_params["task"])
     machine, reason = _text(request, "machine"), _text(request, "reason")
@@ -52,7 +52,7 @@ def keep(request: Request, visitor: Visitor) -> Response:
 
 
 def promote(request: Request, visitor: Visitor) -> Response:
-    """Put a version in force."""
+    """Activate a version."""
     machine, number = request.path_params["machine"], _text(request, "number")
     if not number.isascii() or not number.isdigit():
         raise HTTPException(400, "Which version? Choose one.")
@@ -64,7 +64,7 @@ def promote(request: Request, visitor: Visitor) -> Response:
 
 
 def rollback(request: Request, visitor: Visitor) -> Response:
-    """Put the version in force that was before."""
+    """Activate the version before."""
     machine, reason = request.path_params["machine"], _text(request, "reason")
     now, registry = datetime.now(UTC), registry_of(request)
     decision = registry.rollback(machine, reason=reason, by=visitor.name, now=now)

@@ -102,7 +102,8 @@ def card(request: Request, visitor: Visitor) -> Response:
 
 
 def correct(request: Request, visitor: Visitor) -> Response:
-    """Take the corrected card; one that does not read the log is told, and the last one stays."""
+    """Take the corrected card; one that does not read the log is reported, and the last one
+    stays."""
     before = kept_form(_folder(request)) or _proposed(request)[0]
     form = before.with_fields(given_form(request))
     said = _keep_card(request, form)
@@ -129,7 +130,7 @@ def picture(request: Request, visitor: Visitor) -> Response:
 
 
 def words(request: Request, visitor: Visitor) -> Response:
-    """What the doctor says the log can tell."""
+    """What the doctor finds identifiable in the log."""
     path, place = _log(request), _card(request)
     if not place.exists():
         return show(request, visitor, "said", said="", bad=False)

@@ -39,7 +39,7 @@ def fleet(request: Request, visitor: Visitor) -> Response:
 
 
 def asked_for(query: Mapping[str, Any], silent_days: float) -> FleetAsked:
-    """What the address asks for; what cannot be is left aside."""
+    """What the address asks for; what cannot be is left out."""
     page = str(query.get("page", "1"))
     state: Any = query.get("state")
     order: Any = query.get("order")

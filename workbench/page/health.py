@@ -60,7 +60,7 @@ class TaskFigures(Collector):
         self._bench = Bench(registry.database)
 
     def collect(self) -> Iterator[GaugeMetricFamily]:
-        """The figure; nothing where the registry is away, which its own figures tell."""
+        """The figure; nothing where the registry is away, which its own figures show."""
         out = GaugeMetricFamily(f"{PREFIX}_page_tasks", "Tasks by state.", labels=["state"])
         try:
             counts = self._bench.counts()

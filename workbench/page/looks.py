@@ -81,7 +81,8 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 
 
 def proposal(path: Path) -> "Proposal":
-    """The card that `init` proposes, and what the log will hardly tell; raises BadLook."""
+    """The card that `init` proposes, and what is hardly identifiable from the log; raises
+    BadLook."""
     from workbench.steps.first_card.looked_over import looked_over
     from workbench.steps.first_card.proposal import proposed
 
@@ -128,7 +129,7 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
 
 
 def _said_of(one: "Told") -> str:
-    """Why a parameter is told, on what that hangs, or what run would tell it."""
+    """Why a parameter is identifiable, on what that depends, or what run would identify it."""
     if one.only_if:
         return f"only if {one.only_if}"
     return one.why if one.can else one.add or one.why

@@ -1,4 +1,4 @@
-"""A machine's parameters over its last logs, each with its interval and its value in force."""
+"""A machine's parameters over its last logs, each with its interval and its active value."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds
 
 
 def parameter_charts(logs: Sequence[JudgedLog]) -> list[Chart]:
-    """The parameters that the logs tell, the one that moved most first; none of a single log.
+    """The parameters that the logs identify, the one that moved most first; none of a single log.
 
     logs: the oldest first.
     """
@@ -44,7 +44,7 @@ def _panel(name: str, told: Mapping[int, Mapping[str, Any]], x: Array, label: st
     unit = str(told[int(at[0])].get("unit", ""))
     return Panel(
         label, f"{name} [{unit}]",
-        [Line("in force", place, column("before"), "reference", "dashed"),
+        [Line("active model", place, column("before"), "reference", "dashed"),
          Line("by each log", place, column("after"), "measured")],
         areas=[Area("95 %", place, column("low"), column("high"), "band")], height=PARAMETER_HEIGHT,
     )  # fmt: skip

@@ -20,7 +20,7 @@ STATE_WORDS = {
     "drifting": "drifting",
     "structure": "structure changed",
     "log_bad": "log bad",
-    "not_judged": "not judged",
+    "not_judged": "inconclusive",
     "no_log": "no log yet",
     "silent": "not heard from",
 }

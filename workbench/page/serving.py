@@ -26,7 +26,7 @@ APPLICATION = "workbench.page.app:served"
 def serve(settings: PageSettings, report: "Report") -> int:
     """Serve until Ctrl-C or SIGTERM; the exit status. Raises BadRegistry and RegistryAway first."""
     with Registry(settings.where):
-        pass  # its layout is brought up to date once, and what is wrong is told before all else
+        pass  # its layout is brought up to date once, and what is wrong is reported before all else
     settings.root.mkdir(parents=True, exist_ok=True)
     hand_over(settings)
     shown = f"http://{settings.host}:{settings.port}{settings.prefix}/"

@@ -74,7 +74,7 @@ class Limiter:
 
 
 class Doorkeeper:
-    """Tells who asks by their token.
+    """Identifies who asks by their token.
 
     open_reading: whether somebody without one may read.
     """

@@ -80,7 +80,7 @@ def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report)
         report("task_over", task=task.id, state=state, said=said)
     except (NotOurs, LostClaim):
         report("task_lost", task=task.id)
-    except BaseException:  # told to end: another begins it anew
+    except BaseException:  # asked to end: another begins it anew
         bench.give_back(claim)
         raise
 

@@ -51,7 +51,7 @@ class Access:
         self._database = database
 
     def add(self, name: str, role: Role, *, by: str, now: datetime) -> str:
-        """A new token, which is told this once; the registry keeps its hash.
+        """A new token, which is shown only now; the registry keeps its hash.
 
         Raises BadRegistry where the name is taken or none.
         """
@@ -63,7 +63,7 @@ class Access:
         with self._database.writing() as session:
             if session.scalar(select(AccessTokenRow.id).where(AccessTokenRow.name == name)):
                 raise BadRegistry(
-                    f"token {name!r}: is there already, in force or revoked; give another name"
+                    f"token {name!r}: exists already, active or revoked; give another name"
                 )
             row = AccessTokenRow(name=name, role=role, sha256=hashed(secret), made_by=by, at=now)
             session.add(row)

@@ -1,4 +1,4 @@
-"""What one result says of its machine at a glance: a state, and the parameter that moved most.
+"""What one result says of its machine: a state, and the parameter that moved most.
 
 It is kept beside the results, within the transaction that writes them.
 """
@@ -38,7 +38,7 @@ def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
 
 
 def glance(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
-    """The parameter that moved most, with its relative change; None where the log told none.
+    """The parameter that moved most, with its relative change; None where the log gave none.
 
     That is the one whose change is largest beyond its own 95 % interval; where all lie within
     theirs, the one nearest to its edge.
@@ -56,7 +56,7 @@ def glance(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
 
 
 def with_log(trend: Mapping[str, Sequence[float]], evidence: Mapping[str, Any]) -> Trend:
-    """The trend with what a log told of each parameter at its end."""
+    """The trend with what a log gave of each parameter at its end."""
     out = {name: list(values) for name, values in trend.items()}
     for one in _parameters(evidence):
         if one.get("after") is not None:
@@ -72,7 +72,7 @@ def _drift(evidence: Mapping[str, Any]) -> Mapping[str, Any]:
 
 
 def _parameters(evidence: Mapping[str, Any]) -> list[Mapping[str, Any]]:
-    """What the drift test told of each parameter; of older results only of those that moved."""
+    """What the drift test gave of each parameter; of older results only of those that moved."""
     drift = _drift(evidence)
     found = drift.get("parameters")
     if found:
@@ -114,7 +114,7 @@ def glance_judged(
 
 
 def glance_moved(session: Session, machine: str) -> None:
-    """Somebody has put another version in force: the next log tells how that fits."""
+    """Somebody has activated another version: the next log shows how that fits."""
     nothing = dict.fromkeys(("moved", "moved_by", "moved_trend"))
     values = {"state": "not_judged", **nothing}
     session.execute(update(MachineNowRow).where(MachineNowRow.machine == machine).values(values))

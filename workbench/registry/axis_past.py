@@ -1,4 +1,4 @@
-"""The axis test of a machine's newest judged log against those before it, out of the registry."""
+"""The axis test of a machine's newest tested log against those before it, out of the registry."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +23,8 @@ class AxisLine(NamedTuple):
 
 
 def newest_lights(logs: Sequence[JudgedLog]) -> tuple[str, Sequence[AxisLine]]:
-    """The file of the newest log that tells parameters, and its lines; none of them without one.
+    """The file of the newest log that identifies parameters, and its lines; none of them without
+    one.
 
     logs: the newest first.
     """

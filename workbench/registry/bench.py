@@ -57,7 +57,7 @@ class WorkItem:
 
 @dataclass(frozen=True)
 class WorkClaim:
-    """A task in a worker's hands; the token tells this claim from every other."""
+    """A task in a worker's hands; the token identifies this claim."""
 
     task: WorkItem
     token: str
@@ -180,7 +180,7 @@ class Bench:
         self._write(claim, state=state, said=storable_text(said), ended_at=now, **share)
 
     def give_back(self, claim: WorkClaim) -> None:
-        """The task waits again: its worker was told to end. Nothing where it is another's."""
+        """The task waits again: its worker was asked to end. Nothing where it is another's."""
         with self._database.writing() as session:
             values = {"state": "waiting", "token": None, "until": None, "begun": TaskRow.begun - 1}
             session.execute(update(TaskRow).where(_own(claim)).values(values))

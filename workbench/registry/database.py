@@ -252,7 +252,7 @@ def _begin_sqlite(connection: Connection) -> None:
 def _away(where: str, error: Exception) -> str:
     said = error.orig if isinstance(error, DBAPIError) else error
     line = " ".join(str(said).split())
-    advice = "nothing is lost; look after the database and run again"
+    advice = "nothing is lost; check the database and run again"
     if "full" in line or "I/O" in line:
         advice = "nothing is lost; free some space on its disk and run again"
     elif "locked" in line:

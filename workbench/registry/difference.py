@@ -11,7 +11,8 @@ LEFT_OUT = ("compensator.friction",)  # the model's own nine
 
 @dataclass(frozen=True)
 class Number:
-    """A parameter as a document has it; value None with a reason where the logs do not tell it."""
+    """A parameter as a document has it; value None with a reason where the logs do not identify
+    it."""
 
     value: float | None
     low: float | None

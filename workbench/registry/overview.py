@@ -123,7 +123,7 @@ def _lines(
 
 
 def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int, datetime]]:
-    """Versions in force and since when, looked up for the page's machines alone."""
+    """Active versions and since when, looked up for the page's machines alone."""
     query = (
         select(InForceRow.machine, VersionRow.number, DecisionRow.at)
         .join(VersionRow, VersionRow.id == InForceRow.version_id)

@@ -1,4 +1,4 @@
-"""Tables of the page: who may use it, what was dropped and worked on, and the fleet at a glance.
+"""Tables of the page: who may use it, what was dropped and worked on, and the summary of the fleet.
 
 Tokens, uploads and the audit are append-only, as the rest of the registry is. `task` is the page's
 background work; `machine_now` and `machine_trend` repeat what the results say, so that a list of
@@ -42,7 +42,7 @@ class AccessTokenEndRow(Base):
 
 
 class UploadRow(Base):
-    """A log that was dropped on the page: its name there, and what tells its content."""
+    """A log that was dropped on the page: its name there, and what identifies its content."""
 
     __tablename__ = "upload"
     id: Mapped[str] = mapped_column(primary_key=True)
@@ -100,7 +100,7 @@ class AuditRow(Base):
 class MachineNowRow(Base):
     """What is known of a machine now: state by its last log, when one came, what moved most.
 
-    moved_by: relative change of that parameter against the version in force; moved_trend: its
+    moved_by: relative change of that parameter against the active version; moved_trend: its
     values over the last logs, as JSON.
     """
 

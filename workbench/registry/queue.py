@@ -1,6 +1,6 @@
 """New logs and who has them in hand: one result a log, however many workers and whatever dies.
 
-A machine's logs are judged one after the other, since a result may change what the next is judged
+A machine's logs are tested one after the other, since a result may change what the next is tested
 against. So a worker claims a machine, for the time of a lease that it renews. Every result is one
 transaction that holds only while the claim does: a worker that has been taken for dead and comes
 back finds another's token, and its result is dropped.
@@ -52,7 +52,7 @@ from workbench.registry.values import (
 )
 
 OFTEN = 5
-OLDER = "older_than"  # key of the evidence that names the newer log behind the model in force
+OLDER = "older_than"  # key of the evidence that names the newer log behind the active model
 CLOCKS_APART = timedelta(minutes=1)  # by which the clocks of workers may differ
 SHORTEST = 4  # characters of a fingerprint by which a log may be named
 
@@ -175,8 +175,8 @@ class Queue:
     ) -> LogOutcome:
         """Record a log's result, with its candidate and the decision on it, all or nothing.
 
-        What an older log than one behind the model in force has led to is recorded and not put
-        in force. A second call with the same claim gives the first's: a commit may have been kept
+        What an older log than one behind the active model has led to is recorded and not
+        activated. A second call with the same claim gives the first's: a commit may have been kept
         although its answer was lost. Raises LostClaim where another has taken over.
         """
         with self._database.writing() as session:
@@ -297,7 +297,7 @@ def _newer(session: Session, machine: str, log: SeenLog, order: Order) -> SeenLo
 def _of_older(judgement: Judgement, log: SeenLog, newer: SeenLog) -> Judgement:
     """The judgement of a log older than `newer`, from which a model comes: nothing is promoted."""
     promoted = judgement.verdict == "promoted"
-    so = "not put in force: " if promoted else ""
+    so = "not made active: " if promoted else ""
     said = f"{so}{log.file} is older than {newer.file}, from which a later model comes"
     return replace(
         judgement,

@@ -18,9 +18,9 @@ Told = Literal["", "sent", "waiting", "given up"]
 
 @dataclass(frozen=True)
 class JudgedLog:
-    """A log of the machine, when it was recorded and judged; verdict None: it waits.
+    """A log of the machine, when it was recorded and tested; verdict None: it waits.
 
-    parameters: what it told of each; told: whether the webhook has been told.
+    parameters: what it gave of each; told: whether the webhook has been told.
     """
 
     file: str

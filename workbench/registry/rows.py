@@ -177,13 +177,13 @@ def numbered(session: Session, machine: str, number: int) -> VersionRow:
 
 
 def version_in_force(session: Session, machine: str) -> VersionRow | None:
-    """The row of the version in force."""
+    """The row of the active version."""
     pointer = session.get(InForceRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
 
 
 def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
-    """The logs from which the version in force comes, and those that have put another in force.
+    """The logs from which the active version comes, and those that have activated another.
 
     The latter count after a rollback too: what a person took back was still seen on a later log.
     """

@@ -1,4 +1,4 @@
-"""The registry of machines: what is in force, what was, and why it changed."""
+"""The registry of machines: the active version, the earlier ones, and why it changed."""
 
 import json
 import re
@@ -40,7 +40,7 @@ MOVES = ("promoted", "rolled_back")
 
 
 class Registry:
-    """Models, designs and validations of machines, append-only, one version in force a machine.
+    """Models, designs and validations of machines, append-only, one active version a machine.
 
     where: a file of SQLite or a PostgreSQL URL. Everything that changes is one transaction. All
     raise BadRegistry for a question it cannot answer, RegistryAway where the database is away.
@@ -62,7 +62,7 @@ class Registry:
     def add(
         self, machine: str, candidate: Candidate, *, reason: str, by: str, now: datetime
     ) -> Version:
-        """The version that holds these documents; not in force yet. The same again adds nothing.
+        """The version that holds these documents; not active yet. The same again adds nothing.
 
         Raises BadRegistry where the name could be no folder's.
         """
@@ -80,25 +80,25 @@ class Registry:
     def promote(
         self, machine: str, number: int, *, reason: str, by: str, now: datetime
     ) -> Decision:
-        """Put a version in force; raises BadRegistry where it already is, or is not there."""
+        """Activate a version; raises BadRegistry where it already is, or is not there."""
         with self.database.writing() as session:
             need_machine(session, machine, lock=True)
             row = numbered(session, machine, number)
             current = version_in_force(session, machine)
             if current is not None and current.id == row.id:
-                raise BadRegistry(f"{machine}: version {number} is in force already")
+                raise BadRegistry(f"{machine}: version {number} is active already")
             made = decide(session, "promoted", row, reason=reason, by=by, now=now)
             return decision_value(session, made)
 
     def rollback(self, machine: str, *, reason: str, by: str, now: datetime) -> Decision:
-        """Put the version in force that was before the present one; a second call goes further."""
+        """Activate the version before the present one; a second call goes further."""
         with self.database.writing() as session:
             need_machine(session, machine, lock=True)
             earlier = self._earlier(session, machine)
             if len(earlier) < 2:
                 have = "one version" if earlier else "no version"
                 raise BadRegistry(
-                    f"{machine}: {have} has been in force, so there is none to go back to"
+                    f"{machine}: {have} has been active, so there is none to go back to"
                 )
             row = session.get_one(VersionRow, earlier[-2])
             made = decide(session, "rolled_back", row, reason=reason, by=by, now=now)
@@ -117,7 +117,7 @@ class Registry:
             return found
 
     def in_force(self, machine: str) -> Version | None:
-        """The version in force; None where nothing has been promoted."""
+        """The active version; None where nothing has been promoted."""
         with self.database.reading() as session:
             row = version_in_force(session, machine)
             return None if row is None else version_value(session, row)
@@ -165,7 +165,7 @@ class Registry:
         }
 
     def _earlier(self, session: Session, machine: str) -> Sequence[int]:
-        """Versions in force one after the other, the present one last; a rollback takes one off."""
+        """Active versions one after the other, the present one last; a rollback takes one off."""
         stack: list[int] = []
         rows = session.execute(
             select(DecisionRow.kind, DecisionRow.version_id)

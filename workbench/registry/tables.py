@@ -78,7 +78,8 @@ class MachineRow(Base):
 
 
 class LogRow(Base):
-    """A log file by its fingerprint; size and mtime tell a known file without reading it again."""
+    """A log file by its fingerprint; size and mtime identify a known file without reading it
+    again."""
 
     __tablename__ = "log"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -108,7 +109,7 @@ class RecordRow(Base):
 
 
 class VersionRow(Base):
-    """A model and its design, numbered from 1 a machine: what can be put in force."""
+    """A model and its design, numbered from 1 a machine: what can be activated."""
 
     __tablename__ = "version"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -142,7 +143,7 @@ class DecisionRow(Base):
 
 
 class InForceRow(Base):
-    """The one version in force of a machine, and the decision that put it there."""
+    """The one active version of a machine, and the decision that put it there."""
 
     __tablename__ = "in_force"
     machine: Mapped[str] = mapped_column(ForeignKey("machine.name"), primary_key=True)
@@ -169,7 +170,7 @@ class ClaimRow(Base):
 
 
 class ReopeningRow(Base):
-    """A log is to be judged again; the number of these is the log's turn, from 0."""
+    """A log is to be tested again; the number of these is the log's turn, from 0."""
 
     __tablename__ = "reopening"
     id: Mapped[int] = mapped_column(primary_key=True)

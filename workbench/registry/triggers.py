@@ -1,4 +1,4 @@
-"""Triggers that keep tables append-only, and the pointer to the version in force moving forward."""
+"""Triggers that keep tables append-only, and the pointer to the active version moving forward."""
 
 from collections.abc import Iterable, Iterator
 
@@ -32,7 +32,7 @@ SQLITE_POINTER = (
 
 
 def keep_pointer(connection: Connection) -> None:
-    """From now on the pointer to the version in force moves by a new decision only.
+    """From now on the pointer to the active version moves by a new decision only.
 
     Before `keep_append_only`, whose triggers call one of these functions on PostgreSQL.
     """

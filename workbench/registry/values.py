@@ -44,9 +44,9 @@ class Decision:
 
 @dataclass(frozen=True)
 class MachineState:
-    """A machine: the version in force with the decision behind it, and how many logs it had.
+    """A machine: the active version with the decision behind it, and how many logs it had.
 
-    waiting: logs seen and not yet judged; set_aside: those that could not be.
+    waiting: logs seen and not yet tested; set_aside: those that could not be.
     """
 
     name: str
@@ -60,7 +60,8 @@ class MachineState:
 
 @dataclass(frozen=True)
 class SeenLog:
-    """A log file as it was found: its fingerprint, and what tells it without reading it again."""
+    """A log file as it was found: its fingerprint, and what identifies it without reading it
+    again."""
 
     sha256: str
     file: str
@@ -70,7 +71,7 @@ class SeenLog:
 
 @dataclass(frozen=True)
 class LogOutcome:
-    """What a log led to; number: the version in force against which it was judged.
+    """What a log led to; number: the active version against which it was tested.
 
     turn: how often the log had been reopened before.
     """
@@ -87,7 +88,7 @@ class LogOutcome:
 
 @dataclass(frozen=True)
 class Alarm:
-    """What a webhook is told of one log; version: the number in force against which it was judged.
+    """What a webhook is sent of one log; version: the active number against which it was tested.
 
     log_id, turn: its place in the registry; turn is how often the log had been reopened before.
     """
@@ -114,7 +115,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Judgement:
-    """What a worker makes of one log; a candidate is put in force where it is "promoted".
+    """What a worker makes of one log; a candidate is activated where it is "promoted".
 
     rival: one that was made too and is refused, with its reason.
     """
@@ -128,7 +129,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Claim:
-    """A machine in a worker's hands until `until`; the token tells this claim from every other."""
+    """A machine in a worker's hands until `until`; the token identifies this claim."""
 
     machine: str
     token: str

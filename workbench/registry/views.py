@@ -14,7 +14,7 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
     """A line a machine."""
     if not machines:
         return "no machine yet; 'workbench registry add MACHINE MODEL DESIGN' makes one"
-    head = ("machine", "in force", "since", "versions", "logs", "waiting", "set aside")
+    head = ("machine", "active", "since", "versions", "logs", "waiting", "excluded")
     rows = [
         (
             one.name,
@@ -30,13 +30,13 @@ def list_view(machines: Sequence[MachineState]) -> Screen | str:
 def machine_view(
     state: MachineState, decisions: Sequence[Decision], outcomes: Sequence[LogOutcome]
 ) -> Screen:
-    """A machine: what is in force and why, the latest decisions and results of logs; with
+    """A machine: the active version and why, the latest decisions and results of logs; with
     --verbose all of them."""
     if state.in_force is None or state.since is None:
-        first = f"{state.name}: nothing in force; 'workbench registry promote {state.name} N'"
+        first = f"{state.name}: no active version; 'workbench registry promote {state.name} N'"
     else:
         first = (
-            f"{state.name}: version {state.in_force.number} in force since"
+            f"{state.name}: version {state.in_force.number} active since"
             f" {moment(state.since.at)}, by {state.since.made_by}: {state.since.reason}"
         )
     parts: list[Part | str] = [first]

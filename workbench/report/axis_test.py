@@ -28,7 +28,7 @@ def axis_sentence(test: AxisTest) -> str:
     light = test.light.upper()
     judged = sum(1 for one in test.quantities if one.light)
     if test.light == "green":
-        return f"{light}: {test.machine} is within its limits in {judged} of {judged} numbers."
+        return f"{light}: {test.machine} is within its limits in {judged} of {judged} quantities."
     return f"{light}: {_first(test)}."
 
 
@@ -51,7 +51,7 @@ def _row(one: Quantity) -> Row:
         low, high = (number(factor * x, 4) for x in (one.allowed.low, one.allowed.high))
         limits = f"{low} to {high} ({SOURCE_OF_LIMITS[one.allowed.source]})"
     if told.value is None:
-        why = (told.reason or "not told").partition(";")[0]
+        why = (told.reason or "not identifiable").partition(";")[0]
         return one.meaning, "-", unit, why, limits, LAMPS[one.light]
     if told.low is None or told.high is None:
         return one.meaning, number(factor * told.value, 4), unit, "", limits, LAMPS[one.light]

@@ -10,6 +10,7 @@ from workbench.cards.readable import as_shown, in_digits, number, shown_unit
 from workbench.documents.design import Design
 from workbench.output import Row, next_step, written
 from workbench.report.design_tables import design_lines
+from workbench.report.model_tables import not_identified
 from workbench.report.notes import notes
 from workbench.report.trace_tables import errors_table, logs_of_trace
 from workbench.report.trace_words import trace_sentence, words
@@ -25,8 +26,8 @@ from workbench.steps.recommend import percent, settled
 from workbench.steps.trace import effect_estimates
 
 SIMULATED = (
-    "Simulated: two logs of a pneumatic positioning rig, one to learn from and one held out. Its"
-    " friction hides an effect of which no model here was told; only the logs were used."
+    "Simulated: two logs of a pneumatic positioning rig, one for training and one held out. Its"
+    " friction has an effect that was not given to any model; only the logs were used."
 )
 LETTERS = (
     "m: mass; F_c: Coulomb friction, F_v: viscous, F_s: breakaway, dv: stick band; p, n: direction"
@@ -45,8 +46,7 @@ def demo_view(found: Demonstration, folder: Path) -> Screen:
         replace(errors, entries=(rows[0], rows[2])),
         tabled(TRUTH_HEAD, [*_friction(found), *_effects(found)]),
         LETTERS,
-        f"Of mass and plain friction the worst parameter is {number(100 * found.worst_error, 2)} %"
-        " off the truth.",
+        f"Largest error of mass and friction parameters: {number(100 * found.worst_error, 2)} %.",
         controller_sentence(found),
         controller_table(found),
         more(validation_sentence(found.validation)),
@@ -87,7 +87,7 @@ def called(name: str) -> str:
 def controller_table(found: Demonstration) -> Part:
     """The present controller and the recommended one, side by side."""
     units, name = shown(found.traced.model.rotary), taken(found.design)
-    head = ("controller", "off at rest", "overshoot", "settled in", "off in motion",
+    head = ("controller", "static error", "overshoot", "settling", "tracking error",
             f"peak force [{units.force}]", "modulus margin")  # fmt: skip
     beside = "+comp" if name.endswith(COMPENSATED) else ""
     figures = {key: places["model"] for key, places in found.validation.figures.items()}
@@ -139,7 +139,7 @@ def _beside(e: Estimate, true: str) -> Row:
     unit = "" if e.unit == "1" else e.unit
     if e.value is None or e.low is None or e.high is None:
         why = (e.reason or "no interval").partition(";")[0].partition(":")[0]
-        return ("-", unit, f"not told: {why}", true)
+        return ("-", unit, not_identified(why), true)
     value, low, high = in_digits((e.value, e.low, e.high), e.value, e.sd)
     return (value, unit, f"{low} to {high}", true)
 

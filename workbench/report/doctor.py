@@ -17,7 +17,7 @@ from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
 from workbench.steps.told_by_log import Way
 
-LABEL_WIDTH = 9
+LABEL_WIDTH = 17
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 
@@ -48,9 +48,9 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
                                       f" {ways.rested:.3g} s"])  # fmt: skip
     if found.told:
         can = ", ".join(_within(one) for one in found.told if one.can)
-        lines += _labelled("told", [can or "nothing"])
+        lines += _labelled("identifiable", [can or "nothing"])
     lines += _labelled("only if", _open(found.told))
-    lines += _labelled("not told", _not_told(found.told), 6)
+    lines += _labelled("not identifiable", _not_told(found.told), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]
@@ -68,7 +68,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
 
 
 def _within(one: Told) -> str:
-    """A parameter, and within what share of its value it can be told."""
+    """A parameter, and within what share of its value it can be identified."""
     return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
 
@@ -77,10 +77,10 @@ def _verdict(found: Examined) -> str:
         return "cannot be identified as it is (see refused)"
     what = "six numbers of the valve" if found.rig.kind == "velocity" else "nine parameters"
     if found.verdict == "nothing":
-        return f"tells none of the {what}"
+        return f"none of the {what} is identifiable from it"
     can = sum(one.can for one in found.main)
     many = "all of" if can == len(found.main) else f"{can} of"
-    return f"can be identified; {many} the {what} can be told from it"
+    return f"{many} the {what} are identifiable from it"
 
 
 def _then(found: Examined) -> str:
@@ -129,7 +129,7 @@ def _sensor(found: Examined, one: SensorState) -> str:
     low, high = factor * one.low, factor * one.high
     if low == high:
         return f"{one.name}: always {low:.4g} {unit}".rstrip()
-    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no step seen"
+    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no quantization step found"
     noise = f"noise {number(factor * one.noise, 2)}"
     share = max(one.noise, one.step / np.sqrt(12.0)) / (one.high - one.low)
     span = f"{low:.4g} to {high:.4g} {unit}".rstrip()
@@ -140,7 +140,7 @@ def _delay(one: Delay) -> str:
     what = {"u": "the command acts on the ", "r": "the position is behind its reference"}[one.of]
     what += one.on if one.of == "u" else ""
     if one.seconds is None:
-        return f"{what}: none seen"
+        return f"{what}: none found"
     return f"{what}{' after' if one.of == 'u' else ' by'} {1e3 * one.seconds:.3g} ms"
 
 
@@ -158,7 +158,8 @@ def _not_told(told: Iterable[Told]) -> list[str]:
 
 
 def _open(told: Iterable[Told]) -> list[str]:
-    """On what it hangs whether others are told, each with the parameters that it holds for."""
+    """On what it depends whether others are identifiable, each with the parameters that it holds
+    for."""
     return _together((one.only_if, one.name) for one in told if one.only_if)
 
 

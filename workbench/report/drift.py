@@ -35,7 +35,7 @@ STATISTICS: tuple[tuple[str, str, Colour], ...] = (
     ("mean of the logs", "mean", "reference"),
 )
 DRIFT_CAPTION = (
-    "Left: each parameter of this log and of the model in force, with 95 % intervals. Right:"
+    "Left: each parameter of this log and of the active model, with 95 % intervals. Right:"
     " how far all of them together have moved; above 1 it is drift."
 )
 
@@ -82,7 +82,7 @@ def drift_chart(found: Drifted, last: Tested) -> Chart:
 
 
 def _changes(found: Drifted, last: Tested) -> Panel:
-    """Every judged parameter's change with its interval, the model's own, and the margin."""
+    """Every tested parameter's change with its interval, the model's own, and the margin."""
     shifts = list(last.test.shifts.values())
     moved = {shift.name for shift in last.test.moved}
     margin, n = 100 * found.settings.margin, len(shifts)
@@ -90,14 +90,14 @@ def _changes(found: Drifted, last: Tested) -> Panel:
     change = np.array([100 * shift.change for shift in shifts])
     half = np.array([196 * shift.sd for shift in shifts])
     own = np.array([196 * one.before_sd / max(abs(one.before), 1e-300) for one in shifts])
-    lines = _with_intervals("model in force", place - BESIDE, np.zeros(n), own, "reference")
+    lines = _with_intervals("active model", place - BESIDE, np.zeros(n), own, "reference")
     for name, is_moved, colour in THIS_LOG:
         of = np.array([(shift.name in moved) is is_moved for shift in shifts], dtype=bool)
         if np.any(of):
             where = place[of] + BESIDE
             lines += _with_intervals(name, where, change[of], half[of], colour)
     return Panel(
-        "", "change [%]", lines, f"{last.source.file}: change from the model in force",
+        "", "change [%]", lines, f"{last.source.file}: change from the active model",
         bands=[Band("does not matter", -margin, margin, "y", "band")],
         x_range=(-0.5, n - 0.5), names=[shift.name for shift in shifts], height=NAMED_HEIGHT,
     )  # fmt: skip
@@ -116,7 +116,7 @@ def _with_intervals(
 
 
 def _over_logs(found: Drifted) -> Panel:
-    """Both statistics over their thresholds, log by log since the model was put in force."""
+    """Both statistics over their thresholds, log by log since the model became active."""
     seen = found.stream.seen
     number = np.arange(1.0, len(seen) + 1.0)
     lines = []
@@ -129,7 +129,7 @@ def _over_logs(found: Drifted) -> Panel:
     if len(other):
         lines.append(Line("other structure", other, np.ones(len(other)), "model", "dots"))
     return Panel(
-        "log since the model was put in force", "statistic over its threshold", lines,
+        "log since the model became active", "statistic over its threshold", lines,
         marks=[Mark(1.0)], x_range=(0.5, len(seen) + 0.5), log_y=wide,
         y_range=None if wide else (0.0, 1.1 * most), height=NAMED_HEIGHT,
     )  # fmt: skip

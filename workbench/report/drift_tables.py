@@ -27,12 +27,12 @@ def drift_sentence(found: Drifted) -> str:
         return f"Drift in {_files(found, 'drift')}: {_what_changed(last)}; the structure holds."
     if found.verdict == "not_judged":
         newest = [test for test in tests if test.tested] or tests
-        return f"NOT JUDGED, which is no all-clear: {newest[-1].reason}"
+        return f"INCONCLUSIVE, which is no all-clear: {newest[-1].reason}"
     known = sum(test.verdict == "none" for test in tests)
     margin = f"{100 * found.settings.margin:.3g} %"
-    said = f"No drift in {known} of {len(tests)} log(s): no change surely beyond {margin}."
+    said = f"No drift in {known} of {len(tests)} log(s): no change significantly beyond {margin}."
     coarse = sum(test.verdict == "not_judged" for test in tests)
-    return said + (f" {coarse} NOT JUDGED: see the notes." if coarse else "")
+    return said + (f" {coarse} INCONCLUSIVE: see the notes." if coarse else "")
 
 
 def _what_changed(test: DriftTest) -> str:
@@ -46,7 +46,7 @@ def _what_changed(test: DriftTest) -> str:
 
 
 def seen_sentence(test: DriftTest, limit: float) -> str:
-    """Which changes a test could have seen, and which parameters it does not judge by that.
+    """The minimum detectable changes of a test, and on which parameters it is inconclusive.
 
     limit: relative change that it must be able to see. "" where nothing was tested.
     """
@@ -55,9 +55,9 @@ def seen_sentence(test: DriftTest, limit: float) -> str:
         return ""
     seen = [f"{n} {_percent(x)}" for n, x in sizes.items() if x <= limit]
     coarse = [f"{n} ({_percent(x)})" for n, x in sizes.items() if x > limit]
-    coarse += [f"{n} (not told)" for n in test.not_judged]
-    said = f"could have seen: {', '.join(seen) or 'nothing'}"
-    return said + (f"; not judged: {', '.join(coarse)}" if coarse else "")
+    coarse += [f"{n} (not identifiable)" for n in test.not_judged]
+    said = f"minimum detectable change: {', '.join(seen) or 'none'}"
+    return said + (f"; inconclusive: {', '.join(coarse)}" if coarse else "")
 
 
 def reason_sentence(test: DriftTest, limit: float) -> str:
@@ -72,7 +72,7 @@ def _all_that_moved(test: DriftTest) -> str:
     by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
     moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
     if test.unsure:
-        moved.append(f"something that it cannot tell apart, of {', '.join(test.unsure)}")
+        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
     return f"moved{by}: {', '.join(moved)}"
 
 
@@ -119,7 +119,7 @@ def _over(found: Statistic | None) -> str:
 
 
 def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
-    """Every parameter of a run before and after; those not judged with the reason."""
+    """Every parameter of a run before and after; those inconclusive with the reason."""
     head = ("parameter", "before", "after", "unit", "change", "95 % interval")
     rows = [_shift_row(shift) for shift in one.test.shifts.values()]
     rows += [(name, "-", "-", "", "-", why) for name, why in one.test.not_judged.items()]
@@ -147,8 +147,8 @@ def then_of_drift(found: Drifted) -> list[str]:
             logs = _files(found, "structure").replace(", ", " ")
             return [f"`workbench trace {logs} --card CARD` finds the effect that joined"]
         case "not_judged":
-            return ["log longer, with more speeds, reversals and rests; the notes say what could"
-                    " not be seen"]  # fmt: skip
+            return ["log longer, with more speeds, reversals and rests; the notes give the minimum"
+                    " detectable change"]  # fmt: skip
         case _:
             return ["nothing to change; test the next log with the same `--state FILE`, which finds"
                     " slow changes too"]  # fmt: skip
@@ -168,7 +168,7 @@ def what_the_columns_say(found: Drifted) -> list[str]:
 
 
 def seen_lines(found: Drifted) -> list[str]:
-    """What each test could have seen, and why a log was not judged."""
+    """The minimum detectable change of each test, and why a log was inconclusive."""
     out = []
     for one in found.tests:
         said = seen_sentence(one.test, found.settings.to_be_seen)
@@ -182,7 +182,7 @@ def seen_lines(found: Drifted) -> list[str]:
 
 
 def drift_notes(found: Drifted) -> list[str]:
-    """What to know of the tests: thresholds, runs not judged, remarks."""
+    """What to know of the tests: thresholds, inconclusive runs, remarks."""
     return [*what_the_columns_say(found), *seen_lines(found), *found.remarks]
 
 
@@ -196,8 +196,8 @@ def drift_parts(found: Drifted) -> list[Part | str]:
     """Every run, the parameters of the last one, and what to know of the tests."""
     logs = logs_of_drift(found)
     legend, seen = what_the_columns_say(found), seen_lines(found)
-    # What is not judged, and why, stands in the table too.
-    told = told_once((line.partition("; not judged: ")[0] for line in seen), logs)
+    # What is inconclusive, and why, stands in the table too.
+    told = told_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
     short = [line for line in told if line not in drift_sentence(found)]
     return [
         run_table(found),

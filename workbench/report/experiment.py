@@ -44,8 +44,8 @@ def promise_table(found: Experiment) -> Part:
 
 
 def _row(one: Promised) -> Row:
-    now = "not told" if one.before is None else f"{one.before:.2g}"
-    after = "not told" if one.after is None else f"{one.after:.2g}"
+    now = "not identifiable" if one.before is None else f"{one.before:.2g}"
+    after = "not identifiable" if one.after is None else f"{one.after:.2g}"
     share = "-" if one.after is None or one.value == 0.0 else _percent(one.after / abs(one.value))
     return one.name, f"{one.value:.4g}", one.unit, now, after, share
 
@@ -58,7 +58,7 @@ def experiment_lead(found: Experiment) -> str:
     """What the run is for and what it promises, in a sentence or two."""
     told = [one for one in found.promise if one.after is not None]
     seconds = f"{found.h * (len(found.r) - 1):.3g} s"
-    what = f"{len(told)} of {len(found.promise)} parameters told by a run of {seconds}"
+    what = f"{len(told)} of {len(found.promise)} parameters identifiable from a run of {seconds}"
     worst = max(
         told, key=lambda one: (one.after or 0.0) / max(abs(one.value), 1e-300), default=None
     )
@@ -68,8 +68,8 @@ def experiment_lead(found: Experiment) -> str:
     if found.separation:
         least = min(found.separation, key=lambda one: one.deviations)
         what += (
-            f". Tells {least.one} from {least.other}, the hardest to tell apart, by"
-            f" {least.deviations:.3g} deviations of the noise"
+            f". Hardest to discriminate: {least.one} and {least.other}, by"
+            f" {least.deviations:.3g} standard deviations of the noise"
         )
     return f"{what}. {_safe(found)}"
 
@@ -108,8 +108,8 @@ def search_lines(found: Experiment) -> list[str]:
     out = [f"{len(found.segments)} pieces out of {tried[0]}, {tried[1]} whole runs tried"]
     if found.efficiency is not None:
         out.append(
-            f"whole pieces tell {found.efficiency:.0%} of what the best shares of the time would,"
-            " a parameter"
+            f"D-efficiency of the whole pieces: {found.efficiency:.0%} of that of the optimal"
+            " shares of time"
         )
     return out
 
@@ -150,7 +150,7 @@ def _sections(found: Experiment) -> list[Section]:
     if found.separation:
         apart = [(one.one, one.other, f"{one.deviations:.3g}") for one in found.separation]
         between = ("if the machine has", "rival", "deviations of the noise")
-        sections.append(table_section("What it tells apart", tabled(between, apart)))
+        sections.append(table_section("What it discriminates", tabled(between, apart)))
     return [*sections, table_section("Pieces", tabled(("", "piece", "amplitude", "pace"), pieces))]
 
 
@@ -190,7 +190,7 @@ def run_chart(found: Experiment) -> Chart:
 
 
 def promise_chart(found: Experiment) -> Chart:
-    """Half intervals over the value, now and after the run; none where one is not told."""
+    """Half intervals over the value, now and after the run; none where one is not identified."""
     lines = []
     for key, colour, shift, name in PROMISE_LOOKS:
         sizes = [getattr(one, key) for one in found.promise]

@@ -11,17 +11,18 @@ NEXT_COMMAND = "workbench doctor {log} --card {card}"
 
 
 def proposal_view(of: Proposal, card: Path) -> Screen:
-    """What the card says, what the log will hardly tell, what is left out, and what to do next."""
+    """What the card says, what is hardly identifiable from the log, what is left out, and what to
+    do next."""
     rows = [*map(_signal_row, of.signals), *map(_rig_row, of.rig)]
     guesses = [row[0] for row in rows if row[3] == "guess"]
-    looked = f"look at the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
+    looked = f"check the guesses in it: {', '.join(guesses)}" if guesses else "all is sure"
     parts: list[Part | str] = [f"Card proposed: rig of kind {of.kind}, {of.motion}; {looked}."]
     parts.append(next_step(NEXT_COMMAND.format(log=of.path, card=card)))
     if of.refused:
         parts.append(f"With this card the log cannot be read yet: {of.refused}")
     left_out = (f"left out: {shown} ({why})" for shown, why in of.unused.items())
     parts += [
-        listed(f"hardly told: {line}" for line in of.hardly),
+        listed(f"hardly identifiable: {line}" for line in of.hardly),
         tabled(("", "column or value", "unit", "", "why"), rows, right=()),
         listed(f"note: {line}" for line in of.remarks),
         listed(left_out, MOST_LEFT_OUT),

@@ -33,8 +33,8 @@ UNSEEN_BAND = 1e-4  # of all speeds, up to which a band is not seen
 class FrictionData:
     """Velocity [m/s], acceleration [m/s^2] and friction force F_e - m a [N] of a log, (n,).
 
-    Without the model's forces of place (gravity, cogging, a spring), and of two masses with the
-    second's own acceleration, so that what is left is friction alone.
+    Without the model's position-dependent forces (gravity, cogging, a spring), and of two masses
+    with the second's own acceleration, so that what is left is friction alone.
     """
 
     v: Array
@@ -185,5 +185,5 @@ def _caption(model: Model) -> str:
         " breakaway limits (the bar at zero)."
     )
     if model.friction["m"].value is None:
-        text += " The mass is not identified, so the assumed one stands in for the inertia."
+        text += " The mass is not identified, so the assumed one is used for the inertia."
     return text

@@ -103,12 +103,14 @@ def logs_of(model: Model) -> tuple[str, ...]:
 
 
 WIDE = re.compile(r"found (\S+), but the interval (.+) is wider than the value")
-WHAT_TO_DO = re.compile(r"(: the logs do not tell it)?; .*")  # at the end of a reason
+# At the end of a reason; in older files it begins with ": the logs".
+WHAT_TO_DO = re.compile(r"(: (the logs|not identifiable)[a-z ]*)?; .*")
+INSIGNIFICANT = "not significantly different from 0"
 
 
 def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> list[Row]:
-    """Rows of parameters for one screen: those that are not told for the same reason in one row,
-    without the reason's advice.
+    """Rows of parameters for one screen: those that are not identified for the same reason in one
+    row, without the reason's advice.
 
     value: column of the value, before those of the unit and of the interval or reason.
     """
@@ -123,7 +125,7 @@ def reasons_once(rows: Iterable[Row], logs: Iterable[str], value: int = 1) -> li
 
 
 def _together(alike: Sequence[Row], reason: Sequence[str], value: int) -> Row:
-    """Rows of parameters that are not told for the same reason as one."""
+    """Rows of parameters that are not identified for the same reason as one."""
     names, units = ", ".join(row[0] for row in alike), {row[value + 1] for row in alike}
     unit, rest = units.pop() if len(units) == 1 else "", len(alike[0]) - value - 3
     return (names, *alike[0][1:value], "-", unit, *reason, *[""] * rest)
@@ -135,8 +137,13 @@ def _short(reason: str, logs: Iterable[str]) -> str:
     for name in (*logs, *re.findall(r"^\d+ logs", said)):
         said = said.removeprefix(f"{name}: ")
     if not said:
-        return "not told"
-    return "not told: " + WIDE.sub(r"found \1, anywhere in \2", WHAT_TO_DO.sub("", said))
+        return "not identifiable"
+    return not_identified(WIDE.sub(r"found \1, anywhere in \2", WHAT_TO_DO.sub("", said)))
+
+
+def not_identified(why: str) -> str:
+    """Why a parameter has no interval; one near 0 is well known, and said to be so alone."""
+    return why if why.startswith(INSIGNIFICANT) else f"not identifiable: {why}"
 
 
 def summary(model: Model) -> str:
@@ -146,7 +153,7 @@ def summary(model: Model) -> str:
     logs = "one log" if len(model.log) == 1 else f"{len(model.log)} logs"
     text = f"{many} friction parameters identified from {logs}."
     if model.assumed:
-        text += f" Not told: {', '.join(model.assumed)}."
+        text += f" Not identifiable: {', '.join(model.assumed)}."
     if model.fit.adequate:
         return f"{text} The model leaves nothing but sensor noise."
     if model.resonance is not None:
@@ -173,7 +180,7 @@ def next_of_model(model: Model) -> str:
 
 
 def fit_lines(model: Model) -> list[str]:
-    """What the fit leaves, and what would tell the rest, in words."""
+    """What the fit leaves, and what would identify the rest, in words."""
     by = "the command" if model.fit.drive == "command" else f"the applied force, {held(model)}"
     lines = [
         f"{e.file}: simulated position within {length(e.position_rms, model.rotary)} rms over"
@@ -188,7 +195,7 @@ def fit_lines(model: Model) -> list[str]:
         lines.append(f"force while sliding: {share:.2f} % unexplained by the equation of motion")
     runs = runs_to_add(model)
     if runs:
-        lines.append(f"to tell the rest: {'; '.join(runs)}")
+        lines.append(f"to identify the rest: {'; '.join(runs)}")
     if model.posterior is not None:
         lines.append(f"posterior: {model.posterior['verdict']}")
     return lines
@@ -207,7 +214,7 @@ def plant_lines(model: Model) -> list[str]:
 
 
 def runs_to_add(model: Model) -> tuple[str, ...]:
-    """Runs that would tell what neither the logs could, by the look before the fit, nor the fit."""
+    """Runs that would identify what neither the gate before the fit nor the fit could."""
     found = {**model.friction, **(model.actuator or {})}
     return tuple(
         dict.fromkeys(
@@ -226,4 +233,4 @@ def held(model: Model) -> str:
     if model.fit.stiffness == 0.0:
         return anew
     unit = shown(model.rotary).stiffness
-    return f"held to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"
+    return f"corrected to the measured position by {number(model.fit.stiffness)} {unit} and {anew}"

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0
-LOOK_FOLDER = "look"  # where a picture of a log is proposed
+LOOK_FOLDER = "check"  # where a picture of a log is proposed
 
 
 def looked_over(logs: Sequence[str], card: str) -> Callable[[str], Step]:
@@ -74,7 +74,7 @@ def after_design(
     if of_margins and modulus > 0.0:
         samples = math.inf if delay is None else _floor(delay)
         least = () if samples >= 2.0 else ("--delay", f"{samples:g}")
-        return step("the goals that can be kept", *words, "--modulus", f"{modulus:g}", *least)
+        return step("the goals that can be met", *words, "--modulus", f"{modulus:g}", *least)
     return step("a slower loop", *words, "--poles", _poles(best, SLOWER))
 
 
@@ -102,7 +102,7 @@ def after_validate(
     found: "Validation", of: "Design", model: "Model", model_file: Path, plant_file: Path | None,
     card: str | None,
 ) -> Step | None:  # fmt: skip
-    """What to change where the judged controller misses a limit; None where it keeps all."""
+    """What to change where the tested controller misses a limit; None where it keeps all."""
     failed = {place: one for place, one in found.figures[found.judged].items() if not one.passed}
     if not failed:
         return None
@@ -133,7 +133,8 @@ def _too_fast(one: "LoopFigures", limits: "Limits") -> bool:
 
 
 def after_drift(found: "Drifted", logs: Sequence[str], card: str) -> Step | None:
-    """Trace another structure, re-tune after drift, look over a log that tells nothing."""
+    """Trace another structure, re-tune after drift, check a log from which nothing is
+    identifiable."""
     if found.verdict == "none" or (found.verdict == "not_judged" and found.tested):
         return None
     files = {one.source.file for one in found.tests if one.test.verdict == found.verdict}
@@ -158,7 +159,7 @@ def after_experiment(
 
 
 def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> Step | None:
-    """Another card where the log is refused, a picture where it tells nothing."""
+    """Another card where the log is refused, a picture where nothing is identifiable from it."""
     if found.verdict not in ("refused", "nothing"):
         return None
     if found.verdict == "nothing" and out is None:

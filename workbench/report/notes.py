@@ -1,4 +1,4 @@
-"""Remarks for a screen and a report: told once for all logs that they hold for."""
+"""Remarks for a screen and a report: printed once for all logs that they hold for."""
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace

@@ -100,5 +100,5 @@ def _caption(model: Model) -> str:
         return f"What is left is {how} the sensors' noise: nothing is missing."
     return (
         f"What is left is {left_of(model)}: the machine has an effect that the model has not, or"
-        " another structure. The command `workbench trace` tells which."
+        " another structure. The command `workbench trace` finds which."
     )

@@ -44,7 +44,7 @@ def response_sentence(found: Responded) -> str:
     """What the logs show of the machine, in a sentence or two."""
     body = found.found.body
     spans = ranges(body.f, body.seen)
-    said = f"The plant is seen {_spans(spans)}"
+    said = f"The plant is identified {_spans(spans)}"
     peaks = found.peaks
     if not peaks:
         return f"{said}; no resonance stands out there."
@@ -68,7 +68,7 @@ def _cells(one: Size, unit: str) -> tuple[str, str]:
     told = told_estimate(one.value, unit, one.sd)
     shown_unit = "" if unit == "1" else f" {unit}"
     if told.low is None or told.high is None:
-        return f"{number(one.value)}{shown_unit}", "not told"
+        return f"{number(one.value)}{shown_unit}", "not identifiable"
     return (
         f"{number(one.value, 4)}{shown_unit}", f"{number(told.low, 4)} to {number(told.high, 4)}"
     )  # fmt: skip
@@ -77,7 +77,7 @@ def _cells(one: Size, unit: str) -> tuple[str, str]:
 def loop_line(found: Responded) -> str:
     """The open loop's crossover and margins, in words."""
     if found.open_loop is None or found.margins is None:
-        return "open loop: not shown, since the logs do not tell the controller" + (
+        return "open loop: not shown, since the controller is not identifiable from the logs" + (
             "" if found.found.instrument else " (no moving reference is logged)"
         )
     m = found.margins
@@ -103,7 +103,9 @@ def _where_it_crosses(loop: Response) -> str:
             " show it (--lowest reaches further down)"
         )
     if len(f) and np.all(size > 1.0):
-        return f"crosses 0 dB above {number(float(f[-1]))} Hz, the highest at which it is seen"
+        return (
+            f"crosses 0 dB above {number(float(f[-1]))} Hz, the highest at which it is identified"
+        )
     return "its crossing of 0 dB is not within what the logs show"
 
 

@@ -20,8 +20,8 @@ from workbench.steps.robust.document import robust_document
 from workbench.steps.robust.outcomes import MEASURES, Measure
 from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spread
 
-ROBUST_HEAD = ("over the machines drawn", "limit", "kept", "5 %", "median", "95 %")
-BESIDE_HEAD = ("median, and share that keeps the limit", "robust", "nominal", "present")
+ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
+BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")
 CURVE_LOOKS: dict[str, tuple[Colour, Look]] = {
     ROBUST: ("model", "line"),
     NOMINAL: ("before", "dotted"),
@@ -133,7 +133,7 @@ def choice_lines(found: Robust, rotary: bool) -> list[str]:
     return [
         f"the best of {found.tried} loops, chosen on {found.asked.draws} machines; the shares are"
         f" counted on as many drawn anew (seed {found.asked.seed})",
-        *([f"drawn with the drift seen so far: {drift}"] if drift else []),
+        *([f"drawn with the drift found so far: {drift}"] if drift else []),
         f"slow ramp: {number(factor * speed)} {unit}, half the narrowest stick band",
     ]
 

@@ -32,7 +32,7 @@ from workbench.steps.trace import Traced, trace_document
 EVERY_EQUATION = ("mechanical", "actuator")
 HIDDEN = (
     "{} shows in neither equation while the body slides, but at rest, at breakaway or in what the"
-    " transducer shows: the free run tells it, no residual of an equation does."
+    " transducer shows: only the free run identifies it, no residual of an equation."
 )
 
 

@@ -132,7 +132,7 @@ def _worth(e: FoundEffect) -> str:
         chance = f"p < {FLOOR:.1g}, none of {DRAWS} draws"
     return (
         f"It explains {100 * e.explained:.3g} % of what was missing where it shows"
-        f" (by luck: {chance})"
+        f" (by chance: {chance})"
     )
 
 

@@ -16,7 +16,7 @@ NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
 class Told(NamedTuple):
-    """The error by which a trace is told: its name, before, after, its noise, and how each is
+    """The error by which a trace is reported: its name, before, after, its noise, and how each is
     written."""
 
     name: str
@@ -74,7 +74,7 @@ def _verdict_sentence(traced: Traced) -> str:
             )
         case "inseparable":
             others = " or ".join(words(key) for key in dict.fromkeys(equal_rival_keys(found)))
-            rival = f" They do not tell it from {others}." if others else ""
+            rival = f" It is not distinguishable from {others}." if others else ""
             return f"Inseparable: these logs call for {names}.{rival}{errors}"
         case _:
             return _partly(traced, names, errors) if found.effects else _unknown(traced)

@@ -33,7 +33,7 @@ def _head(found: Validation, rotary: bool) -> tuple[str, ...]:
         "delay",
         "at rest",
         "over",
-        "settled",
+        "settling",
         "smooth",
         f"force {units.force}",
         *command,
@@ -112,7 +112,7 @@ def columns_line(found: Validation, rotary: bool = False) -> str:
 
 
 def missed(found: Validation) -> str | None:
-    """Why the judged controller does not pass, in one line; None where it does."""
+    """Why the tested controller does not pass, in one line; None where it does."""
     return None if found.passed else "; ".join(_missed(found, found.judged))
 
 
@@ -125,13 +125,13 @@ def _missed(found: Validation, name: str) -> list[str]:
 
 
 def validation_verdict(found: Validation) -> str:
-    """Whether the judged controller passed, in one line."""
+    """Whether the tested controller passed, in one line."""
     word = "passes" if found.passed else "fails"
     return f"{found.judged.upper()} {word} in simulation"
 
 
 def validation_sentence(found: Validation) -> str:
-    """Whether the judged controller passed and with which figures; what it misses."""
+    """Whether the tested controller passed and with which figures; what it misses."""
     said = validation_verdict(found)
     if not found.passed:
         return f"{said}: {missed(found)}."
@@ -146,7 +146,7 @@ def then_of_validation(found: Validation) -> list[str]:
 
 
 def validation_parts(found: Validation, rotary: bool = False) -> list[Part | str]:
-    """The figures of each loop; what controllers miss that are not judged, with --verbose."""
+    """The figures of each loop; what controllers miss that are not tested, with --verbose."""
     others = other_figures(found.why)
     alone = [name for name in found.figures if not name.endswith(COMPENSATED)]
     return [

@@ -63,7 +63,7 @@ def valve_rows(model: VelocityModel) -> list[Row]:
 def _errors(model: VelocityModel) -> str:
     fit, rotary = model.fit, model.rotary
     return (
-        f"position predicted by the command alone, on stretches that no fit has seen: within"
+        f"position predicted by the command alone, on stretches held out of the fit: within"
         f" {length(fit.position_rms_2s, rotary)} rms over 2 s,"
         f" {length(fit.position_rms_02s, rotary)} over 0.2 s (sensor's noise"
         f" {length(fit.noise_y, rotary)})"
@@ -74,8 +74,8 @@ def _summary(model: VelocityModel) -> str:
     known = [name for name, one in model.valve.items() if one.known]
     lost = [name for name in model.valve if name not in known]
     many = "All six" if not lost else f"{len(known)} of the six"
-    said = f"{many} numbers of the valve are told (the velocity follows the command; no friction)."
-    return f"{said} Not told: {', '.join(lost)}." if lost else said
+    said = f"{many} valve parameters identified (the velocity follows the command; no friction)."
+    return f"{said} Not identifiable: {', '.join(lost)}." if lost else said
 
 
 def _logs(model: VelocityModel) -> tuple[str, ...]:
@@ -110,7 +110,7 @@ def velocity_model_view(model: VelocityModel) -> View:
 def after_velocity(model: VelocityModel, logs: Sequence[str], card: str, folder: Path) -> Step:
     """Look for what is missing where more than noise is left; add a run; else design."""
     if any(not model.valve[name].known for name in ("g_p", "g_n", "d_p", "d_n")):
-        return step("with a run that tells the rest added", "identify", *logs, "--card", card)
+        return step("with a run that identifies the rest added", "identify", *logs, "--card", card)
     if not is_noise(model.fit.position_rms_2s**2, model.fit.noise_y):
         return step("more than noise is left", "trace", *logs, "--card", card)
     return step("a controller for it", "design", folder / "model.json")

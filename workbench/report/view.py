@@ -29,7 +29,7 @@ def no_sections() -> Sequence[Section]:
 class View:
     """A result: what was found in a sentence, what to do next, and what stands below.
 
-    parts: tables, lines and notes in their order. sections, chart: of the page, and the telling
+    parts: tables, lines and notes in their order. sections, chart: of the page, and the main
     picture, drawn when they are asked for. content: the document by which other programs read it;
     files: what the command writes, by name, a text or a document, and the page where it has_page.
     then_by_command: its command ends with the step to type, so that its screen leaves `then` out.
@@ -84,7 +84,7 @@ class View:
         return "\n".join(shown)
 
     def figure(self) -> "Figure":
-        """The telling picture, a figure of matplotlib."""
+        """The main chart, a figure of matplotlib."""
         from workbench.report.chart_figure import chart_figure
 
         assert self.chart is not None

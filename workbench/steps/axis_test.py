@@ -1,7 +1,7 @@
 """One log of an axis as a maintenance engineer reads it: its numbers, their limits, and a light.
 
 A number is green within its limits, red where its whole 95 % interval lies beyond one, yellow
-where the log cannot tell on which side it is. Limits are the card's, else what the machine's own
+where the log cannot decide on which side it is. Limits are the card's, else what the machine's own
 logs have shown.
 """
 
@@ -36,7 +36,8 @@ WORST: tuple[Light, ...] = ("red", "yellow", "green", "")
 
 @dataclass(frozen=True)
 class Quantity:
-    """One line of the test: its estimate, its limits, its light ("": no limits, or not told)."""
+    """One line of the test: its estimate, its limits, its light ("": no limits, or not
+    identifiable)."""
 
     name: str
     meaning: str
@@ -49,9 +50,9 @@ class Quantity:
 @dataclass(frozen=True)
 class Earlier:
     """What the registry has of a machine: values of its last logs by quantity, oldest first, with
-    the seconds since 1970 at which they were recorded; version: of the model in force.
+    the seconds since 1970 at which they were recorded; version: of the active model.
 
-    estimates: of this log, by the fit of the model in force, where that has effects which the
+    estimates: of this log, by the fit of the active model, where that has effects which the
     equation of motion alone does not hold. said: why there are no limits, where there are none;
     remarks: on these, a line each.
     """
@@ -91,7 +92,8 @@ class AxisTest:
 
     @property
     def light(self) -> Light:
-        """The worst light; yellow where nothing has limits, or a Coulomb friction is not told."""
+        """The worst light; yellow where nothing has limits, or a Coulomb friction is not
+        identified."""
         found = {one.light for one in self.quantities}
         worst = next(light for light in WORST if light in found)
         if worst == "red" or not (self.unjudged or self.blind):
@@ -100,7 +102,7 @@ class AxisTest:
 
     @property
     def blind(self) -> bool:
-        """Whether the log does not tell Coulomb friction of both directions."""
+        """Whether the log does not identify Coulomb friction of both directions."""
         return any(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
 
     @property
@@ -120,10 +122,10 @@ class AxisTest:
         if self.blind:
             found = (self.of(name).estimate for name in ("F_cp", "F_cn"))
             why = next(one.reason or "" for one in found if one.value is None)
-            out.append(f"Coulomb friction is not told: {why.partition(';')[0]}")
+            out.append(f"Coulomb friction is not identifiable: {why.partition(';')[0]}")
         if self.unjudged:
             why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"
-            out.append(f"no limits to judge by: {why}")
+            out.append(f"no limits to test against: {why}")
         return tuple(out)
 
 
@@ -159,12 +161,12 @@ def axis_test(
 def told_of(
     found: AxisEquation, around: Surroundings, units: Mapping[str, str]
 ) -> dict[str, Estimate]:
-    """Every quantity of the test, by name, as far as the equation of motion tells it."""
+    """Every quantity of the test, by name, as far as the equation of motion identifies it."""
     out = {}
     scale = max(abs(found.values["F_cp"]), abs(found.values["F_cn"]))
     unheld = (
-        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no number holds;"
-        " `workbench trace` looks for what acts"
+        f"mass and friction leave {100 * found.relative:.0f} % of the force, so no estimate is"
+        " valid; `workbench trace` searches for the cause"
     )
     for name in ("F_cp", "F_cn", "F_vp", "F_vn", "F_sp", "F_sn", "m"):
         if name not in found.values:
@@ -187,15 +189,15 @@ def told_of(
 
 
 def _why_not(name: str, found: AxisEquation) -> str:
-    """Why a number is not told."""
+    """Why a number is not identified."""
     if name == "m":
         return "inertia is too small a part of the force; add faster reversals"
     if name.startswith("F_v"):
-        return "speeds too alike to tell it from Coulomb friction; add strokes at others"
+        return "speeds too similar to separate it from Coulomb friction; add strokes at others"
     if "m" not in found.values:
         return "without mass a start from rest is not placed; add faster reversals"
     many = found.breakaways[0 if name == "F_sp" else 1]
-    return f"{many} breakaways seen, too few; add starts from rest"
+    return f"{many} breakaways, too few; add starts from rest"
 
 
 def friction_along(found: AxisEquation) -> Travel:
@@ -238,8 +240,8 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
     """A quantity with its light and, where it is not green, the reason in a sentence."""
     meaning = MEANING_OF[name]
     if told.value is None and allowed is not None and allowed.source == "card":
-        why = (told.reason or "the log does not tell it").partition(";")[0]
-        said = f"{_whole(meaning)} is not told, and the card has limits for it: {why}"
+        why = (told.reason or "not identifiable from this log").partition(";")[0]
+        said = f"{_whole(meaning)} is not identifiable, and the card has limits for it: {why}"
         return Quantity(name, meaning, told, allowed, "yellow", said)
     if told.value is None or allowed is None:
         return Quantity(name, meaning, told, allowed, "", "")

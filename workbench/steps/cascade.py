@@ -142,7 +142,7 @@ def reference_limits(
 
 def _notes(tuned: TunedCascade) -> Iterator[str]:
     """What to know of a cascade, in words."""
-    yield f"disturbances are held off up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"
+    yield f"disturbances are rejected up to {number(tuned.bandwidth)} Hz (|S_yp| at -3 dB)"
     if tuned.series is not None:
         yield filter_words(tuned.series)
 
@@ -169,7 +169,7 @@ def beside_resonance(model: Model, found: Design, chosen: Recommended) -> Iterat
     taken = every.get(chosen, next(iter(every.values())))
     said = f"designed on two masses with a resonance at {number(resonance, 4)} Hz"
     if taken.series is not None:
-        yield f"{said}, held off by a {filter_words(taken.series)}"
+        yield f"{said}, suppressed by a {filter_words(taken.series)}"
         return
     bandwidth = taken.dominant[0] / (2.0 * np.pi)
     where = f"the loop's poles lie at {bandwidth:.3g} Hz, {resonance / bandwidth:.2g} times below"

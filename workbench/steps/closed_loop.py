@@ -84,14 +84,15 @@ def present_loop(machine: Model, now: Present) -> DrivenLoop:
     """The controller that the machine has now, as its drive runs it.
 
     Where no command is logged its force loop is not known to the model, and gives what is asked.
-    Raises BadModel where the controller gives a command of which the logs do not tell the force.
+    Raises BadModel where the controller gives a command of which the logs do not identify the
+    force.
     """
     drive = machine.simulated.actuator
     force = now.force if isinstance(drive, Actuator) else None
     command = command_of(machine, force)
     if drive is None and now.output == "command" and machine.rig.command_unit != command.unit:
         raise BadModel(
-            f"it gives a command in {machine.rig.command_unit}, and no log tells what force that"
+            f"it gives a command in {machine.rig.command_unit}, and no log shows what force that"
             " makes; log the command"
         )
     return DrivenLoop(now.law, force, now.rate, command.limit, direct=now.output == "command")
@@ -146,7 +147,7 @@ def run_plant(
 def load_of(machine: Model) -> SecondMass | None:
     """The load that swings behind the machine's body; None where it shows none.
 
-    Of a mass that the log does not tell, its share of the mass that simulations use.
+    Of a mass that the log does not identify, its share of the mass that simulations use.
     """
     two = machine.resonance
     if two is None:

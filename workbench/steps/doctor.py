@@ -1,8 +1,8 @@
-"""A log looked over before any fit: clock, sensors, bad samples, what moves, and what that tells.
+"""A log checked before any fit: clock, sensors, bad samples, what moves, and what that identifies.
 
 Nothing here has rules of its own: a log is repaired, refused and resampled as for `identify`, and
-whether a parameter can be told is asked of the same thresholds, with the events that the measured
-motion shows in place of those of a fitted run.
+whether a parameter can be identified is asked of the same thresholds, with the events that the
+measured motion shows in place of those of a fitted run.
 """
 
 from collections.abc import Mapping
@@ -42,8 +42,8 @@ from workbench.steps.told_by_log import Ways
 DOCTOR_SCHEMA = "doctor/1"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
 LONGEST_LAG = 0.1  # s that a command may act late
-HALF_A_HOLD, LEAST_LAG = 0.5, 0.5  # samples: of a held command, and that are told
-SURE_LAG = 0.01  # share of the equation that a lag explains beyond none, to be told
+HALF_A_HOLD, LEAST_LAG = 0.5, 0.5  # samples: of a zero-order hold, and that are reported
+SURE_LAG = 0.01  # share of the equation that a lag explains beyond none, to be reported
 
 
 @dataclass(frozen=True)
@@ -83,9 +83,10 @@ class Delay:
 class Examined:
     """What a log shows before any fit.
 
-    told: what each parameter of the model can be known by, by name; add: runs that would tell the
-    rest; effects: by how many deviations of the noise each would show at a size that matters, None
-    where that was not asked; refused: why `identify` would not take the log, empty where it would.
+    told: what each parameter of the model can be known by, by name; add: runs that would identify
+    the rest; effects: by how many deviations of the noise each would show at a size that matters,
+    None where that was not asked; refused: why `identify` would not take the log, empty where it
+    would.
     log and motion: the first run, for the picture; None where the log is refused before.
     """
 
@@ -108,13 +109,13 @@ class Examined:
 
     @property
     def main(self) -> tuple[Told, ...]:
-        """What is told of the nine, or of all numbers of a rig that has no friction."""
+        """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
         of_valve = self.rig.kind == "velocity"
         return tuple(one for one in self.told if of_valve or one.name in NAMES)
 
     @property
     def verdict(self) -> str:
-        """ "refused", "ready" (all nine can be told), "in part", or "nothing" (none can)."""
+        """ "refused", "ready" (all nine can be identified), "in part", or "nothing" (none can)."""
         if self.refused:
             return "refused"
         can = [one.can for one in self.main]
@@ -123,7 +124,7 @@ class Examined:
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """A log as far as it is seen without asking what it tells: the first and quick part of a look.
+    """A log as far as it is known without identifiability: the first and quick part of a check.
 
     raw: signals as recorded; log: the longest run, None where there is none.
     """

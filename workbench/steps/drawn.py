@@ -15,12 +15,12 @@ NO_BAND_SHARE, USUAL_BAND_SHARE = (
     1e-3,
     0.03,
 )  # of the logs' speed: a band that none has, and a usual one
-UNTOLD_SPREAD = 0.3  # log of a value that no log tells, one sigma
+UNTOLD_SPREAD = 0.3  # log of a value that no log identifies, one sigma
 
 
 def in_loop(model: Model) -> Plant:
     """The plant as its simulated loop has it; a band that is next to none is taken for one that no
-    log told, whatever its interval."""
+    log identifies, whatever its interval."""
     plant = replace(model.simulated, effects=in_the_loop(model))
     lost = lost_bands(model)
     return plant_with(plant, tuple(lost), np.array(list(lost.values()))) if lost else plant
@@ -38,7 +38,7 @@ def lost_bands(model: Model) -> dict[str, float]:
 
 
 def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Plant, ...]:
-    """Plants drawn from the errors of the model's parameters; those that no log tells within a
+    """Plants drawn from the errors of the model's parameters; those that no log identifies within a
     third of what is assumed."""
     known = model_in_force(model, "")
     plant = in_loop(model)
@@ -50,7 +50,7 @@ def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Pl
     free = np.exp(UNTOLD_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
     sets = np.hstack([told, free * np.array(list(assumed.values()))])
-    last = {name: i for i, name in enumerate(names)}  # what is assumed stands in for what was lost
+    last = {name: i for i, name in enumerate(names)}  # what is assumed replaces what was lost
     kept = [i for name, i in last.items() if _is_of(plant, name)]
     return tuple(plant_with(plant, [names[i] for i in kept], row[kept]) for row in sets)
 
@@ -61,7 +61,8 @@ def _is_of(plant: Plant, name: str) -> bool:
 
 
 def _assumed(model: Model, untold: Mapping[str, str]) -> dict[str, float]:
-    """Values that simulations use of the friction and actuator parameters that no log tells."""
+    """Values that simulations use of the friction and actuator parameters that no log
+    identifies."""
     every = {**model.friction, **(model.actuator or {})}
     return {
         name: used(one)

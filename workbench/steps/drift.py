@@ -1,4 +1,4 @@
-"""A model in force and new runs -> drift tests, the state that is stored, and drift.json."""
+"""An active model and new runs -> drift tests, the state that is stored, and drift.json."""
 
 import hashlib
 from collections.abc import Mapping
@@ -61,7 +61,7 @@ class Tested:
 
 @dataclass(frozen=True)
 class Drifted:
-    """The tests of new runs against a model in force, and the stream after them."""
+    """The tests of new runs against an active model, and the stream after them."""
 
     model: Model
     key: str
@@ -131,7 +131,8 @@ def model_in_force(model: Model, key: str) -> InForce:
 
 
 def _covariance(model: Model, told: Mapping[str, Estimate]) -> Any:
-    """Covariance (d, d) of the told parameters by their deviations and the model's correlation."""
+    """Covariance (d, d) of the identified parameters by their deviations and the model's
+    correlation."""
     sd = np.array([e.sd or 0.0 for e in told.values()])
     together = np.eye(len(told))
     if model.correlation is not None:

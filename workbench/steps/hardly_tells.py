@@ -1,4 +1,4 @@
-"""What the motion in a log will hardly let any fit tell, said before one is made.
+"""What is hardly identifiable from the motion in a log, said before a fit.
 
 Quick, and of the motion and the work alone: `init` says it with the first card, doctor with the
 rest of what it sees.
@@ -40,7 +40,7 @@ class _Moved:
 
 
 def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
-    """A line for each thing that the runs will hardly tell; nothing where there is no run."""
+    """A line for each thing that the runs will hardly identify; nothing where there is no run."""
     if not runs:
         return ()
     log = max(runs, key=len)
@@ -52,7 +52,8 @@ def _of_rate(log: Log) -> Iterator[str]:
     if rate < 0.999 * TELLING_RATE:
         yield (
             f"sampled at {rate:.3g} Hz, slower than {TELLING_RATE:g} Hz: starts and stops lie"
-            " between two samples, so bands and breakaway forces will hardly be told; log faster"
+            " between two samples, so bands and breakaway forces are hardly identifiable; log"
+            " faster"
         )
 
 
@@ -64,8 +65,8 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     count = int(np.sum(found.sure))
     if count < FEWEST_MOVING:
         yield (
-            f"hardly anything moves: {count} of {len(log)} samples are surely in motion, which"
-            " tells no friction; log a run with strokes in both directions"
+            f"hardly anything moves: {count} of {len(log)} samples are surely in motion, so"
+            " friction is not identifiable; log a run with strokes in both directions"
         )
         return
     up = float(np.mean(found.motion.v[found.sure] > 0.0))
@@ -81,15 +82,16 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     work = None if one_way else work_share(found.y, found.drive)
     if _bears_place_alone(found, drive, rotary=rig.motion == "rotary"):
         yield (
-            f"the {found.name} goes with the place alone, as a weight's or a spring's, and takes no"
-            " part in the motion: something else moves the body, by hand it seems; then no friction"
-            " is told; log a run in which the machine moves itself"
+            f"the {found.name} depends on position alone, as a weight's or a spring's, and does not"
+            " drive the motion: something else moves the body, perhaps by hand; then friction is"
+            " not"
+            " identifiable; log a run in which the machine moves itself"
         )
     elif work is not None and work < NO_WORK:
         yield (
             f"the {found.name} does hardly any work on the body in all ({work:.0%} of what the two"
             " exchange): no friction takes it up, or something else moves the body, by hand or by a"
-            " load; friction will hardly be told"
+            " load; friction is hardly identifiable"
         )
         return
     if (
@@ -98,7 +100,8 @@ def _of_motion(log: Log, rig: Rig) -> Iterator[str]:
     ):
         yield (
             f"the velocity follows the {found.name} ({share:.0%} of it is the velocity alone), as"
-            ' of a valve and cylinder: inertia will hardly be told; kind = "velocity" is such a rig'
+            " of a valve and cylinder: inertia is hardly identifiable; use kind ="
+            ' "velocity"'
         )
 
 
@@ -108,8 +111,8 @@ def _said_of_one_way(up: float) -> str:
     if is_one_way(up):
         return f"{ONE_WAY_WHY} ({share:.0%} of it goes towards {side}); log both ways"
     return (
-        f"motion nearly one way ({share:.0%} of it goes towards {side}): the little that goes back"
-        " will hardly tell friction from a constant force; log both ways"
+        f"motion nearly one way ({share:.0%} of it goes towards {side}): friction is hardly"
+        " distinguishable from a constant force; log both directions"
     )
 
 
@@ -119,8 +122,8 @@ def _said_of_coasting(found: _Moved) -> str:
     slower = speed[-few:].mean() < KEPT_SPEED * speed[:few].mean()
     how = "coasts" if slower else "coasts or is carried on at one speed"
     return (
-        f"the body {how}: the {found.name} goes with neither its speed nor the change of it, so"
-        " what force moves it is not told; log a run that is driven"
+        f"the body {how}: the {found.name} correlates with neither its speed nor its acceleration,"
+        " so the driving force is not identifiable; log a run that is driven"
     )
 
 

@@ -78,7 +78,7 @@ def identify(
     """The model of one machine from its runs, and the fit it comes from.
 
     keep_going: whether it is to go on, else the best so far is the model.
-    Raises NotIdentifiable where nothing can be told, BadLog where a signal is missing.
+    Raises NotIdentifiable where nothing can be identified, BadLog where a signal is missing.
     """
     options = options or Options()
     logs = [source.log for source in sources]
@@ -171,7 +171,7 @@ def speed_of(log: Log) -> float:
 def _nine(fit: KarnoppFit, rig: Rig) -> Mapping[str, Estimate]:
     """All nine; those that the fit held have their assumed value."""
     units = friction_units(rig.motion)
-    held = "held at a value that does not matter for these logs"
+    held = "fixed at a value that does not matter for these logs"
     return {
         name: fit.estimates.get(name)
         or Estimate(None, units[name], reason=held, assumed=getattr(fit.friction, name))
@@ -332,8 +332,8 @@ def common_period(logs: Sequence[Log], period: float | None) -> tuple[float, tup
 
 
 def check_period(period: float | None, name: str, duration: float) -> None:
-    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they tell
-    nothing."""
+    """Raises BadModel where so few periods [s] go into a log of that duration [s] that they
+    identify nothing."""
     if period is not None and FEWEST * period > duration:
         raise BadModel(
             f"design period {period:g} s, {name} lasts {duration:.4g} s: fewer than {FEWEST}"

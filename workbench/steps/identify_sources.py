@@ -25,13 +25,13 @@ if TYPE_CHECKING:
 
 __all__ = ["Identified", "Options", "identify_sources"]
 
-BROKEN = 2.0  # times what a log promised before the fit, above which an interval is told to be so
+BROKEN = 2.0  # times what a log promised before the fit, above which an interval is reported
 
 
 @dataclass(frozen=True)
 class Identified:
-    """A model, the fit it comes from, the runs it was fitted on, and the walk around the fit that
-    was asked for with the posterior."""
+    """A model, the fit it comes from, the runs it was fitted on, and the posterior sampled around
+    the fit that was asked for with the posterior."""
 
     model: Model
     fit: KarnoppFit
@@ -52,7 +52,7 @@ def identify_sources(
     """The model of the machine that the sources are of.
 
     keep_going: whether it is to go on, else the best so far is the model.
-    Raises NotIdentifiable where the logs tell nothing, BadLog where a signal is missing.
+    Raises NotIdentifiable where nothing is identifiable, BadLog where a signal is missing.
     """
     options = options or Options()
     logs = [source.log for source in sources.runs]

@@ -71,7 +71,7 @@ def _cache(wrong: list[str]) -> dict[str, object]:
     writable = all(os.access(_nearest_there(place), os.W_OK) for place in places)
     if not writable:
         wrong.append(
-            f"compiled kernels cannot be kept in {', '.join(map(str, places))}: every command"
+            f"compiled kernels cannot be cached in {', '.join(map(str, places))}: every command"
             " compiles anew, or numba uses your own cache folder; set NUMBA_CACHE_DIR to a folder"
             " that you may write"
         )

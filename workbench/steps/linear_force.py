@@ -53,7 +53,7 @@ class Freed:
         """The log with its force without friction: where the body rests or is slow friction is
         whatever holds it, and the force is what the motion needs of a linear body."""
         resting = body(self.v, self.a, self.plain.h)
-        if np.any(self.slides):  # a motion tells a spring's force but for a constant
+        if np.any(self.slides):  # a motion identifies a spring's force up to a constant
             resting = resting + np.mean((self.left - resting)[self.slides])
         return replace(self.plain, linear=np.where(self.slides, self.left, resting))
 

@@ -22,7 +22,7 @@ IN_FORCE_SAMPLES = 5  # of the force loop in one of the position loop; it has th
 LONGEST_PERIOD = 20e-3  # s, of a position loop that nobody asked for
 WHOLE_SAMPLE = 1e-3  # of a sample, up to which a delay counts as whole
 MULTIPLES = (1, 2, 5, 10, 20)  # of the drive's period, tried in turn
-SWING_UNSURE = 0.02  # of a resonance, that it may lie beside what is told of it, at least
+SWING_UNSURE = 0.02  # of a resonance, that it may lie beside its estimate, at least
 
 
 def command_of(model: Model, force: ForceLoop | None) -> Command:
@@ -82,7 +82,7 @@ def force_period(model: Model) -> float:
 
 
 def _why_physical(model: Model, force: ForceLoop | None) -> str:
-    """Why the physical plant, and which of its parameters the logs do not tell."""
+    """Why the physical plant, and which of its parameters the logs do not identify."""
     known = "mass and viscous friction are identified"
     if names := unknown_viscous(model):
         known = f"the mass is identified, {' and '.join(names)} assumed"
@@ -96,7 +96,7 @@ def _why_physical(model: Model, force: ForceLoop | None) -> str:
 
 
 def unknown_viscous(model: Model) -> list[str]:
-    """Names of the viscous coefficients that no log told."""
+    """Names of the viscous coefficients that no log identifies."""
     return [name for name in ("F_vp", "F_vn") if not model.friction[name].known]
 
 
@@ -208,8 +208,8 @@ def _arx(model: Model, period: float | None, known: bool) -> Linear:
     why_not = model.friction["m"].reason or "mass identified"
     if model.imposed:
         raise NotIdentifiable(
-            "no plant to design on: the logged motion was imposed on the body; log a run in which"
-            " the drive moves it freely"
+            "no plant to design on: the logged motion was prescribed; log a run in which the drive"
+            " moves the body freely"
         )
     if found is None:
         raise NotIdentifiable(f"no ARX plant to design on ({model.plant_reason}); m: {why_not}")
@@ -253,7 +253,7 @@ def _corner_bodies(model: Model) -> list[tuple[float, float, tuple[Swing, ...]]]
 
 
 def _swings_told(model: Model) -> Iterator[tuple[Swing, ...]]:
-    """The elastic parts at both ends of what is told of their frequency."""
+    """The elastic parts at both ends of the interval of their frequency."""
     two = model.resonance
     if two is None:
         yield ()

@@ -37,7 +37,7 @@ WEAK = 0.2  # modulus margin below which the loop, not stiction, makes a limit c
 STANDSTILL_SECONDS = 2.0  # s at rest over which the noise in the command is taken
 COMPENSATED = " + compensator"  # behind a controller's name
 PRESENT = "present"  # the controller that the machine has now
-ALMOST = 0.9  # of a limit, from which it is told that a loop comes near it
+ALMOST = 0.9  # of a limit, from which a loop is reported to come near it
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ def _reversals(y: Array, least: float) -> list[int]:
     return turns
 
 
-JUDGED_SHARE = 0.5  # part of a dwell that is judged
+JUDGED_SHARE = 0.5  # part of a dwell that is tested
 SETTLING_BAND = 0.05  # of a step, in which a settled position stays
 ESCAPED = 10.0  # times the step
 

@@ -17,7 +17,7 @@ from workbench.cards.readable import length
 from workbench.documents.model import Model
 from workbench.steps.predict import predict
 
-COMPARED_EVERY = 0.01  # s, which is enough to tell a kind by and takes a second or two
+COMPARED_EVERY = 0.01  # s, which is enough to decide a kind by and takes a second or two
 MOST_COMPARED = 60_000  # samples, beyond which another kind of rig is not tried
 
 

@@ -178,8 +178,8 @@ def _rms_of_runs(found: Sequence[Prediction], name: str) -> float | None:
 def why_no_run(model: Model, drive: Drive) -> str | None:
     """Why a free run by this drive would say nothing of the machine, None where it would.
 
-    It needs the mass, the friction of sliding, and by command the actuator: told by the logs.
-    """
+    It needs the mass, the friction of sliding, and by command the actuator: identified from the
+    logs."""
     needed = {name: model.friction[name] for name in RUN_NEEDS}
     if drive == "command":
         needed |= model.actuator or {}
@@ -189,7 +189,7 @@ def why_no_run(model: Model, drive: Drive) -> str | None:
     name, first = next(iter(untold.items()))
     by = "the command" if drive == "command" else "the force"
     return (
-        f"no free run: the model does not tell {', '.join(untold)}, which a run by {by} needs"
+        f"no free run: {', '.join(untold)} not identified, which a run by {by} needs"
         f" ({name}: {first.reason})"
     )
 
@@ -209,12 +209,13 @@ def _run(
 
 
 def _assumed(model: Model, ran: bool) -> tuple[str, ...]:
-    """A line where the numbers rest on values that no log told."""
+    """A line where the numbers rest on values that no log identifies."""
     names = [*model.assumed]
     for key, found in model.effects.items():
         names += [f"{key}.{name}" for name, one in found.items() if not one.known]
     what = "force and run" if ran else "force"
-    return (f"{what} by assumed values of what no log told: {', '.join(names)}",) if names else ()
+    said = f"{what} by assumed values of what is not identifiable: {', '.join(names)}"
+    return (said,) if names else ()
 
 
 def _sliding(log: Log, model: Model, how: Smoothing) -> NDArray[np.bool_]:

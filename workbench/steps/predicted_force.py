@@ -24,8 +24,8 @@ REVERSALS = 2  # substitutions by which a transducer's reading is inverted
 
 
 def seen_moving(model: Model, log: Log) -> Plant:
-    """The plant for a motion that was measured: a stick band that no log told is no wider than the
-    speed from which the body surely moves, since a body seen to slide is not stuck."""
+    """The plant for a motion that was measured: a stick band that no log identifies is no wider
+    than the speed from which the body surely moves, since a body seen to slide is not stuck."""
     plant = model.simulated
     if not {"dv_p", "dv_n"} & set(model.assumed):
         return plant

@@ -84,9 +84,10 @@ def reasons(name: str, compensator: bool, figures: Mapping[str, LoopFigures], un
     others = [other for other in every if other in figures and other != taken]
     one = figures[taken]
     said = (
-        f"{_called(taken)}: {_rest(one, units)} of the step off at standstill, settled in"
-        f" {settled(one)}, {percent(one.smooth_relative)} off along the smooth reference, peak"
-        f" force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
+        f"{_called(taken)}: static error {_rest(one, units)} of the step, settling"
+        f" time {settled(one)}, tracking error {percent(one.smooth_relative)} on the smooth"
+        " reference,"
+        f" peak force {_force(one, units)}, modulus margin {_modulus(one):.2f}"
     )
     beside = [
         f"{_called(other)}: {_rest(it, units)}, {settled(it)}, {percent(it.smooth_relative)},"
@@ -210,7 +211,7 @@ def in_thousandths(length: float, units: Shown) -> tuple[float, str]:
 
 
 def percent(share: float) -> str:
-    """A share with two digits; a hundredth of a percent is the least that is told."""
+    """A share with two digits; a hundredth of a percent is the least that is printed."""
     return f"{100 * share:.2g} %" if share >= 1e-4 else "< 0.01 %"
 
 

@@ -128,7 +128,7 @@ def identified_or_not(
     try:
         found = identify_sources(sources, seed=seed, on_progress=on_progress, keep_going=keep_going)
     except NotIdentifiable as error:
-        return None, f"the logs do not tell it ({error})"
+        return None, f"not identifiable from the logs ({error})"
     return found.model, None
 
 
@@ -224,7 +224,7 @@ def _remarks(
 
 
 def ranges(f: Array, where: BoolArray) -> list[tuple[float, float]]:
-    """Stretches of frequencies [Hz] where it holds, gaps of a few points left aside."""
+    """Stretches of frequencies [Hz] where it holds, gaps of a few points left out."""
     at = np.flatnonzero(where)
     if not len(at):
         return []

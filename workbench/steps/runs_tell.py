@@ -1,7 +1,7 @@
-"""The gate before a fit: what runs can tell of each parameter.
+"""The gate before a fit: what runs can identify of each parameter.
 
-The rule is the estimator's own: doctor has a first look at its fit, and what that tells is said to
-be told; `identify` says the same of its whole fit.
+The rule is the estimator's own: doctor runs the first part of its fit, and what that identifies is
+called identifiable; `identify` says the same of its whole fit.
 """
 
 from collections.abc import Mapping, Sequence
@@ -29,7 +29,7 @@ from workbench.steps.told_by_log import Ways, told_by, ways_of
 
 @dataclass(frozen=True, eq=False)
 class RunsTell:
-    """What the motion of the runs tells, or the reason why nothing.
+    """What the motion of the runs identifies, or the reason why nothing.
 
     motion: of the longest run; effects: by how many deviations of the noise each effect would show
     at a size that matters, None where that was not asked.
@@ -48,7 +48,7 @@ def runs_tell(
     runs: Sequence[Log], rig: Rig, drive: Drive | None = None, *, effects: bool = False,
     fit: KarnoppFit | None = None,
 ) -> RunsTell:  # fmt: skip
-    """Motion, directions and what they tell of each parameter, of at least one run.
+    """Motion, directions and what they identify of each parameter, of at least one run.
 
     drive: what the fit is asked to be driven by; effects: also which effects the runs could show;
     fit: that of the runs, where there is one already.

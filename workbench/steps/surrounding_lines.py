@@ -27,7 +27,8 @@ def surrounding_lines(around: Surroundings, rig: Rig) -> tuple[str, ...]:
         lines.append(
             f"constant force: {number(around.force.value)} {unit} ({_interval(around.force)}) acts"
             " beside the applied one and is larger than friction (a weight, a tilt, a sensor's"
-            " offset, a wrong area or supply pressure): F_cp and F_cn are told beside it, as equal"
+            " offset, a wrong area or supply pressure): F_cp and F_cn are estimated with it, as"
+            " equal"
         )
     if around.lag.value:
         lag, behind = around.lag, around.lag.value > 0.0

@@ -1,4 +1,4 @@
-"""What the motion in a log can tell of each parameter: its events, and the estimator's word."""
+"""What the motion in a log can identify of each parameter: its events, and the estimator's word."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -105,7 +105,8 @@ def _reversals(d: Array) -> int:
 def told_by(
     recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, *, open_run: bool = False
 ) -> tuple[Told, ...]:
-    """Whether each of the nine, and of the actuator's parameters, is told by a fit of the logs.
+    """Whether each of the nine, and of the actuator's parameters, is identified by a fit of the
+    logs.
 
     fit: the fit itself, or a first look at it; open_run: whether its run may be followed or not.
     """
@@ -115,7 +116,7 @@ def told_by(
     for name in NAMES:
         found = fit.estimates.get(name)
         if found is None:
-            out.append(Told(name, False, "held at a value that does not matter for this log"))
+            out.append(Told(name, False, "fixed at a value that does not matter for this log"))
         elif open_run and name not in FIVE:
             out.append(_if_followed(name, recorded, ways, fit, found))
         elif found.value is not None:
@@ -139,7 +140,7 @@ def told_by(
 def _told(
     name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None, *, led: bool
 ) -> Told:
-    """By what a parameter is told, and within what share of it."""
+    """By what a parameter is identified, and within what share of it."""
     half = _half(found)
     if fit.imposed:
         which = "the force equation" if led else "the equation of motion alone"
@@ -174,7 +175,7 @@ def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:
 def _if_followed(
     name: str, recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, found: Estimate
 ) -> Told:
-    """What only a run tells that may be followed: no promise, where the log has the events."""
+    """What only a run identifies that may be followed: no promise, where the log has the events."""
     lacks = silent_reason(name, ways.events, recorded.name)
     if lacks is not None:
         return _not_told(name, found, recorded.name, lacks)
@@ -182,9 +183,9 @@ def _if_followed(
 
 
 def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
-    """Why a parameter is not told, and what run would tell it; lacks: what the measured motion has
-    too little of, which says more than how a fit came out."""
-    said = (lacks or found.reason or "the log does not tell it").removeprefix(f"{log}: ")
+    """Why a parameter is not identified, and what run would identify it; lacks: what the measured
+    motion has too little of, which says more than how a fit came out."""
+    said = (lacks or found.reason or "not identifiable from this log").removeprefix(f"{log}: ")
     if said == WHY_NOT["stick"]:
         said = f"{NO_RUN_FOLLOWED}; {MEND_OF_RUN}"
     why, _, add = said.partition("; ")

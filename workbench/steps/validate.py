@@ -38,7 +38,7 @@ class Validation:
     """Every controller on every plant (by names like "rst", then "model", "plant").
 
     The loop that decides is without the compensator; "rst + compensator" is the same with it,
-    "present" the controller that the machine has now. why: what speaks for the judged one. design:
+    "present" the controller that the machine has now. why: what speaks for the tested one. design:
     digest of the design.
     """
 
@@ -64,7 +64,7 @@ def validate(
 ) -> tuple[Validation, Mapping[tuple[str, str], Traces]]:
     """The design on the model it was made for and on `plant`, with the noise of the logs.
 
-    The recommended controller is judged, on every plant. Raises BadModel where the design does
+    The recommended controller is tested, on every plant. Raises BadModel where the design does
     not fit the plant (a force loop without an actuator).
     """
     limits = limits or Limits()
@@ -141,7 +141,7 @@ def _remarks(
     ]
     if found.recommended == "none":
         why = f" ({found.recommendation.why})" if found.recommendation else ""
-        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is judged")
+        out.insert(0, f"the design recommends no controller{why}; its {judged.upper()} is shown")
     out += dict.fromkeys(
         said for machine in machines if machine and (said := effects_left_out(machine))
     )
@@ -164,7 +164,7 @@ def _remarks(
 def _seen(one: LoopFigures, units: Shown, *, missed: bool) -> Iterator[str]:
     """A limit cycle, and limits that a loop hits or comes near, in words.
 
-    missed: what a loop misses is told elsewhere, a command at its limit among it.
+    missed: what a loop misses is reported elsewhere, a command at its limit among it.
     """
     if one.limit_cycle:
         weak = one.margins is None or one.margins.modulus < WEAK

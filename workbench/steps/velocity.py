@@ -45,7 +45,7 @@ def logs_of_runs(sources: Sources) -> list[Log]:
 
 
 def identify_velocity(sources: Sources, *, keep_going: KeepGoing = without_end) -> VelocityModel:
-    """The model of the rig from its runs; raises NotIdentifiable where they tell no gain."""
+    """The model of the rig from its runs; raises NotIdentifiable where no gain is identifiable."""
     record = recorded(logs_of_runs(sources))
     found = fit(record, keep_going=keep_going)
     numbers = told(record, found, _units(sources))

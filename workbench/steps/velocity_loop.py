@@ -42,13 +42,13 @@ def design_velocity(
 
     They are kept at the slow ends of the model's intervals too. limits: of them modulus [-], delay
     [periods] and overshoot; period: of the loop [s], by default the logs'.
-    Raises NotIdentifiable where gains or dead zones are not told, BadSpecification where no gain
-    keeps the margins.
+    Raises NotIdentifiable where gains or dead zones are not identified, BadSpecification where no
+    gain keeps the margins.
     """
     for name in DESIGN_NEEDS:
         if not model.valve[name].known:
             raise NotIdentifiable(
-                f"{name} is not told, without which there is no dead zone to compensate:"
+                f"{name} is not identified, without which there is no dead zone to compensate:"
                 f" {model.valve[name].reason}"
             )
     valve, narrow = model.simulated, model.end(low=True)

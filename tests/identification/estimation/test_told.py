@@ -99,7 +99,7 @@ def test_what_no_log_moves_from_its_default_is_given_with_the_law() -> None:
 @pytest.mark.parametrize(
     ("value", "sd", "said"),
     [
-        (1e-9, 2.35, "at its bound: the logs cannot tell it from 0"),
+        (1e-9, 2.35, "at its bound: not significantly different from 0"),
         (50.0, 1.0, "at its bound 50: the logs only say that it lies there or beyond"),
         (2.5, 9.9, "the interval -17 to 22 is wider than the value"),
         (2.5, 0.0, "no interval: nothing that these logs show changes with it"),

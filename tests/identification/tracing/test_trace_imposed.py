@@ -77,7 +77,7 @@ def test_slow_strokes_count_as_fast_ones_do() -> None:
     assert before is not None and after is not None
     assert before == pytest.approx(float(np.std(level)), rel=0.2)
     assert after < 0.1 * before
-    assert any("too alike" in remark and "stribeck" in remark for remark in found.remarks)
+    assert any("too similar" in remark and "stribeck" in remark for remark in found.remarks)
 
 
 @pytest.mark.method
@@ -89,7 +89,7 @@ def test_strokes_of_many_speeds_tell_friction_that_falls_with_speed() -> None:
     found = traced([one], [other])
     assert [e.effect.key for e in found.effects] == ["stribeck"]
     assert found.effects[0].params["v_s"].value == pytest.approx(6e-3, rel=0.1)
-    assert not any("too alike" in remark for remark in found.remarks)
+    assert not any("too similar" in remark for remark in found.remarks)
 
 
 @pytest.mark.method

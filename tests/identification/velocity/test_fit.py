@@ -110,7 +110,7 @@ def test_so_many_passages_tell_a_dead_zone(passages: int, known: bool) -> None:
         (made(53, duration=8.0), "lasts 7.99 s, at least 9 s needed"),
         (made(53, u=np.full(2500, 2.0)), "the command stays at 2"),
         (made(53, h=0.25), "sampled every 0.25 s, at most 0.2 s needed"),
-        (made(53, u=0.1 * U), "does not tell how the velocity follows"),
+        (made(53, u=0.1 * U), "how the velocity follows the command is not identifiable"),
     ],
 )
 def test_what_tells_nothing_is_refused(log: Log, said: str) -> None:

@@ -66,7 +66,7 @@ def unit_of(table: str, name: str, unit: str) -> Callable[[Document], None]:
 @pytest.mark.parametrize(
     ("name", "unit", "why"),
     [
-        ("m", "g", "the noise of its logs tells no mass better than to"),
+        ("m", "g", "but with the noise of its logs it is at least"),
         ("m", "Gg", "could not bring it to their speed"),
         ("F_cp", "kN", "F_cn is"),
         ("F_cn", "mN", "F_cp is"),

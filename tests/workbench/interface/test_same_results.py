@@ -180,7 +180,7 @@ def test_experiment(bench: Bench, model: Any, tmp_path: Path) -> None:
     for name in ("reference.csv", "experiment.json", "report.html"):
         assert (out / name).read_text("utf-8") == (folder / name).read_text("utf-8"), name
     assert found.frame["r"].to_numpy() == pytest.approx(found.found.r)
-    shown_well(found, "parameters told by a run of")
+    shown_well(found, "parameters identifiable from a run of")
 
 
 def test_predict(bench: Bench, model: Any, tmp_path: Path) -> None:
@@ -204,7 +204,7 @@ def test_axis_test(bench: Bench, tmp_path: Path) -> None:
     found = wb.axis_test(log, card)
     assert found.to_json() + "\n" == (folder / "axis_test.json").read_text("utf-8")
     assert found.report() == (folder / "report.html").read_text("utf-8")
-    assert found.light == "yellow" and "no limits to judge by" in found.reasons[0]
+    assert found.light == "yellow" and "no limits to test against" in found.reasons[0]
     shown_well(found, "YELLOW")
 
 
@@ -217,7 +217,7 @@ def test_response(bench: Bench, model: Any, tmp_path: Path) -> None:
     found = wb.response(logs, bench.path("card.toml"), model=bench.path("model/model.json"))
     the_same(found, folder, tmp_path)
     assert list(found.frame) == (folder / "response.csv").read_text().split("\n")[0].split(",")
-    shown_well(found, "The plant is seen from")
+    shown_well(found, "The plant is identified from")
 
 
 @pytest.mark.slow

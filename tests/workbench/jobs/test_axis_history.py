@@ -74,7 +74,7 @@ def test_a_machine_that_is_not_there_is_refused(registry: Registry) -> None:
         earlier_of(registry, "other", sources())
     registry.add("new", Candidate({"m": 1.0}), reason="first", by="t", now=NOW)
     found = earlier_of(registry, "new", sources())
-    assert found.version is None and "0 judged logs" in found.said
+    assert found.version is None and "0 tested logs" in found.said
 
 
 def test_readings_of_the_drift_test_by_quantity() -> None:
@@ -108,7 +108,7 @@ def test_a_model_with_further_effects_tells_this_log_by_its_fit(tmp_path: Path) 
         found.add("m", Candidate(document), reason="f", by="t", now=NOW)  # type: ignore[arg-type]
         found.promote("m", 1, reason="f", by="t", now=NOW)
         earlier = earlier_of(found, "m", of)
-    assert earlier.remarks == ("by the fit of version 1, in force, which has stribeck",)
+    assert earlier.remarks == ("by the fit of the active version 1, which has stribeck",)
     assert earlier.estimates is not None
     assert earlier.estimates["F_cp"].value == pytest.approx(12.0, rel=0.01)
     assert earlier.estimates["F_sn"].value == pytest.approx(23.0, rel=0.01)

@@ -63,7 +63,7 @@ def test_a_model_that_follows_no_better_is_refused() -> None:
 def test_a_model_that_follows_worse_is_refused() -> None:
     found = contest(contender(NEW), contender(OLD))
     assert not found.won
-    assert "worse than the one in force" in found.reason
+    assert "worse than the active one" in found.reason
 
 
 def test_the_margin_counts() -> None:

@@ -216,7 +216,7 @@ def test_the_log_that_made_the_model_does_not_judge_it(shop: Path, first: Judgem
     found = Chain(says("drift"))(replace(one, log=replace(one.log, sha256=digest)))
     assert (found.verdict, found.reason) == (
         "none",
-        "the model in force was fitted on this log",
+        "the active model was fitted on this log",
     )
 
 
@@ -227,7 +227,7 @@ def test_what_cannot_be_judged_says_why(shop: Path, first: Judgement, tmp_path: 
         Chain()(replace(one, path=tmp_path / "bad.csv"))
     with pytest.raises(BadCard, match="no such card"):
         Chain()(replace(one, card=tmp_path / "card.toml"))
-    with pytest.raises(BadModel, match=r"a: in force: model\.json: "):
+    with pytest.raises(BadModel, match=r"a: active version: model\.json: "):
         Chain()(replace(one, model={"schema": "model/1"}))
 
 

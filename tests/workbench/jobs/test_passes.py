@@ -263,7 +263,7 @@ def test_a_log_copied_late_puts_nothing_in_force(run: Run, registry: Registry, r
 
     (outcome,) = run(judging).outcomes
     assert (outcome.verdict, seen) == ("refused", [None])
-    assert "not put in force: log0.csv is older than log5.csv" in outcome.reason
+    assert "not made active: log0.csv is older than log5.csv" in outcome.reason
     current = registry.in_force("a")
     assert current is not None and current.number == 2
     machine(root, "a", {"log6.csv": "drift 6"})

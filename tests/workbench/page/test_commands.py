@@ -26,9 +26,9 @@ def test_tokens_are_made_listed_and_revoked(
         "root",
     )
     assert main(["token", "add", "bob", *where]) == 0
-    assert "it is shown this once" in capsys.readouterr().out
+    assert "it is shown only now" in capsys.readouterr().out
     assert main(["token", "add", "anna", *where]) == 2
-    assert "is there already" in capsys.readouterr().err
+    assert "exists already" in capsys.readouterr().err
     assert main(["token", "revoke", "anna", *where]) == 0
     assert main(["token", "list", *where]) == 0
     shown = capsys.readouterr().out

@@ -157,7 +157,7 @@ def test_a_machine_shows_the_lights_of_its_newest_log(page: Page) -> None:
     fresh, same, worn = (
         page.client.get(f"/machine/{name}").text for name in ("fresh", "same", "worn")
     )
-    assert "No log has told its parameters yet" in fresh
+    assert "No log has given its parameters yet" in fresh
     assert "run7.csv, within the mean" in same and 'class="state done">green' in same
     assert 'class="state failed">red' not in same
     assert "run8.csv, within the mean" in worn and 'class="state failed">red' in worn

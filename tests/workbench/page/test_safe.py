@@ -31,7 +31,7 @@ def test_a_token_is_kept_as_its_hash_and_told_once(where: str) -> None:
         with registry.database.reading() as session:
             kept = [tuple(map(str, vars(row).values())) for row in session.query(AccessTokenRow)]
         assert secret not in str(kept) and hashed(secret) in str(kept)
-        with pytest.raises(BadRegistry, match="is there already"):
+        with pytest.raises(BadRegistry, match="exists already"):
             access.add("anna", "read", by="root", now=NOW)
         with pytest.raises(BadRegistry, match="letters, digits"):
             access.add("an na", "read", by="root", now=NOW)

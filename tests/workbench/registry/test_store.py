@@ -64,7 +64,7 @@ def test_rollback_goes_back_one_by_one(registry: Registry) -> None:
     state = registry.machine("a")
     assert state.in_force is not None and state.in_force.number == 1
     assert state.since == made
-    with pytest.raises(BadRegistry, match="one version has been in force"):
+    with pytest.raises(BadRegistry, match="one version has been active"):
         registry.rollback("a", now=NOW, **WHO)
     registry.promote("a", 3, now=NOW, **WHO)
     assert registry.rollback("a", now=NOW, **WHO).number == 1
@@ -78,10 +78,10 @@ def test_what_is_not_there_is_refused(registry: Registry) -> None:
         registry.promote("bench-b", 1, now=NOW, **WHO)
     with pytest.raises(BadRegistry, match="no version 2; it has 1 to 1"):
         registry.promote("bench-a", 2, now=NOW, **WHO)
-    with pytest.raises(BadRegistry, match="no version has been in force"):
+    with pytest.raises(BadRegistry, match="no version has been active"):
         registry.rollback("bench-a", now=NOW, **WHO)
     registry.promote("bench-a", 1, now=NOW, **WHO)
-    with pytest.raises(BadRegistry, match="version 1 is in force already"):
+    with pytest.raises(BadRegistry, match="version 1 is active already"):
         registry.promote("bench-a", 1, now=NOW, **WHO)
     assert len(registry.decisions()) == 2
 

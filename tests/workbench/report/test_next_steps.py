@@ -173,8 +173,8 @@ def test_no_alarm_asks_for_nothing() -> None:
 @pytest.mark.parametrize(
     ("verdict", "out", "words"),
     [
-        ("nothing", None, "doctor a.csv --card c/card.toml --out look"),
-        ("nothing", Path("look"), "doctor a.csv --card c/card.toml"),
+        ("nothing", None, "doctor a.csv --card c/card.toml --out check"),
+        ("nothing", Path("check"), "doctor a.csv --card c/card.toml"),
         ("refused", None, "init a.csv --out c/card-new.toml"),
     ],
 )

@@ -78,7 +78,7 @@ def test_where_the_log_is_not_sure_it_is_yellow() -> None:
     untold = Estimate(None, "m", reason="no play seen; trace it")
     assert judged("backlash", untold, None).light == ""
     one = judged("backlash", untold, Allowed(0.0, 1e-4, "card"))
-    assert one.light == "yellow" and "is not told, and the card has limits" in one.why
+    assert one.light == "yellow" and "is not identifiable, and the card has limits" in one.why
 
 
 def test_the_machines_own_logs_give_its_limits() -> None:
@@ -118,8 +118,8 @@ def test_a_past_of_other_friction_is_red_and_the_card_goes_first() -> None:
 def test_without_limits_it_is_yellow_and_says_what_to_give() -> None:
     test = axis_test(sources())
     assert test.light == "yellow" and "give --registry, or the card [limits]" in test.reasons[0]
-    few = Earlier("short", {"F_cp": [(0.0, 12.0)]}, 1, None, "short has 1 judged logs")
-    assert "short has 1 judged logs" in axis_test(sources(), few).reasons[0]
+    few = Earlier("short", {"F_cp": [(0.0, 12.0)]}, 1, None, "short has 1 tested logs")
+    assert "short has 1 tested logs" in axis_test(sources(), few).reasons[0]
 
 
 def test_what_is_larger_than_friction_is_said_and_no_number_is_told() -> None:

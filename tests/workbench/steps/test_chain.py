@@ -180,7 +180,7 @@ def test_a_model_that_carries_no_design_is_refused() -> None:
     with pytest.raises(NotIdentifiable, match="leaves 90 % of the motion"):
         designed(replace(model, plant=wild))
     imposed = replace(model.log[0], position_rms=None)
-    with pytest.raises(NotIdentifiable, match="imposed"):
+    with pytest.raises(NotIdentifiable, match="prescribed"):
         designed(replace(model, log=(imposed,), actuator=None))
 
 
@@ -260,11 +260,11 @@ def test_without_what_a_run_needs_the_force_alone_is_predicted(name: str) -> Non
     blank = Estimate(None, one.unit, reason="too slow", assumed=one.value)
     found = predict(replace(model, friction={**model.friction, name: blank}), log)
     assert found.refused is not None
-    assert f"does not tell {name}, which a run by the command needs" in found.refused
+    assert f"{name} not identified, which a run by the command needs" in found.refused
     assert f"({name}: too slow)" in found.refused
     assert found.position_rms is None and found.force_simulated_rms is None
     assert found.force_predicted_rms == predict(model, log).force_predicted_rms
-    assert found.remarks == (f"force by assumed values of what no log told: {name}",)
+    assert found.remarks == (f"force by assumed values of what is not identifiable: {name}",)
     assert prediction_csv([found]).splitlines()[1].endswith(",")
 
 
@@ -282,7 +282,7 @@ def test_without_an_actuator_that_is_told_the_force_drives() -> None:
     found = predict(vague, log)
     assert found.drive == "force" and found.refused is None
     assert found.force_simulated_rms is None
-    assert "force, simulated: no free run: the model does not tell k1" in found.remarks[0]
+    assert "force, simulated: no free run: k1 not identified" in found.remarks[0]
     refused = predict(vague, log, drive="command").refused
     assert refused is not None and "k1: no linear actuator" in refused
 
@@ -436,15 +436,16 @@ def test_force_error_of_a_prediction_is_that_of_sliding() -> None:
 
 def test_a_run_by_force_says_what_held_it() -> None:
     model = identified().model
-    assert not any("held to" in line for line in fit_lines(model))
+    assert not any("corrected to" in line for line in fit_lines(model))
     by_force = replace(model, fit=replace(model.fit, drive="force", stiffness=123.0))
     said = (
-        "held to the measured position by 123 N/m and restarted from the measured state every 2 s"
+        "corrected to the measured position by 123 N/m and restarted from the measured state"
+        " every 2 s"
     )
     assert any(said in line for line in fit_lines(by_force))
     alone = replace(model, fit=replace(model.fit, drive="force", stiffness=0.0))
     assert any("restarted from" in line for line in fit_lines(alone))
-    assert not any("held to" in line for line in fit_lines(alone))
+    assert not any("corrected to" in line for line in fit_lines(alone))
 
 
 def test_what_an_equation_leaves_is_told_as_it_was_fitted() -> None:

@@ -75,8 +75,8 @@ def test_what_could_not_have_been_seen_is_status_0_and_loud(
     capsys.readouterr()
     assert run(shop, tmp_path / "d", "b", "--variation", "5", "--verbose") == 0
     shown = " ".join(capsys.readouterr().out.split())
-    assert shown.startswith("NOT JUDGED, which is no all-clear: b.csv: no alarm, but a change of")
-    assert "could have seen: nothing; not judged: m (" in shown
+    assert shown.startswith("INCONCLUSIVE, which is no all-clear: b.csv: no alarm, but a change of")
+    assert "minimum detectable change: none; inconclusive: m (" in shown
     found = json.loads((tmp_path / "d/drift.json").read_text(encoding="utf-8"))
     assert found["verdict"] == found["log"][0]["verdict"] == "not_judged"
     assert found["settings"]["to_be_seen"] == 0.05

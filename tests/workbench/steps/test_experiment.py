@@ -129,7 +129,7 @@ def test_a_controller_that_hardly_moves_the_machine_is_told() -> None:
     assert model.controller is not None
     law = model.controller.law
     weak = replace(law, R=tuple(0.01 * x for x in law.R), T=tuple(0.01 * x for x in law.T))
-    with pytest.raises(NotIdentifiable, match="tells any parameter"):
+    with pytest.raises(NotIdentifiable, match="no parameter is identifiable from a run"):
         experiment(
             replace(model, controller=replace(model.controller, law=weak)), WANTED, None, quiet,
             after(1),

@@ -32,10 +32,10 @@ ONWARDS: Array = np.cumsum(0.5 + 0.2 * np.sin(4.4 * T)) * 2e-3
     [
         ("hardly anything moves", FORCE, T, noise(1e-5), noise(0.1)),
         ("slower than 50 Hz", FORCE, 15.0 * T, SWING, np.gradient(SWING, T)),
-        ("motion one way", FORCE, T, ONWARDS + noise(1e-5), np.cos(4.4 * T)),
+        ("motion in one direction", FORCE, T, ONWARDS + noise(1e-5), np.cos(4.4 * T)),
         ("coasts:", MOTOR, T, np.cumsum(np.maximum(9.0 - 0.8 * T, 0.4)) * 2e-3, noise(0.02)),
         ("at one speed", MOTOR, T, 50.0 * T + 0.01 * np.sin(300.0 * T), 0.1 + noise(0.04)),
-        ("by hand it seems", FORCE, T, SWING + noise(1e-5), 2.5 * np.sin(SWING) + noise(0.01)),
+        ("perhaps by hand", FORCE, T, SWING + noise(1e-5), 2.5 * np.sin(SWING) + noise(0.01)),
         ("hardly any work", FORCE, T, SWING + noise(1e-5), 0.9 + noise(0.01)),
         ('kind = "velocity"', MOTOR, T, SWING + noise(1e-5), 3.0 * np.gradient(SWING, T)),
     ],

@@ -68,7 +68,7 @@ def test_the_better_loop_is_taken_and_said_with_numbers(monkeypatch: pytest.Monk
     worse = replace(one, standstill_relative=0.011)
     name, compensator, why = choose(monkeypatch, pid=better, rst=worse, present=worse)
     assert (name, compensator) == ("pid", False)
-    assert why.startswith("PID: 0.2 % of the step off at standstill")
+    assert why.startswith("PID: static error 0.2 % of the step")
     assert "RST: 1.1 %" in why and "the present controller: 1.1 %" in why
     assert f"of {one.force_limit:.3g} N" in why and "better by" in why
 
@@ -128,7 +128,7 @@ def test_a_design_that_recommends_nothing_is_told_as_such() -> None:
     none = with_choice(model, found, Recommendation("none", False, "staircase of 3 mm"))
     told, _ = validate(model, none, np.random.default_rng(0))
     assert told.remarks[0] == (
-        "the design recommends no controller (staircase of 3 mm); its RST is judged"
+        "the design recommends no controller (staircase of 3 mm); its RST is shown"
     )
 
 

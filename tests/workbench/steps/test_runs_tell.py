@@ -90,7 +90,7 @@ def test_runs_to_add_are_those_of_what_is_not_told(tmp_path: Path) -> None:
     found = identified(tmp_path, {"t": log["t"], "y": np.cumsum(np.maximum(step, 0.0)), "u": u})
     runs = runs_to_add(found.model)
     assert any("that way" in one for one in runs), runs
-    assert any(line.startswith("to tell the rest: ") for line in fit_lines(found.model))
+    assert any(line.startswith("to identify the rest: ") for line in fit_lines(found.model))
     told = {
         name: replace(one, value=one.assumed, reason=None) if one.value is None else one
         for name, one in found.model.friction.items()

@@ -173,7 +173,7 @@ def test_logs_that_are_not_named_are_the_cards() -> None:
         ("drift", (), "Drift: between training and test logs the machine changed in F_cp from 12 "),
         ("unknown", (), "what is left depends on y (which accounts for 40 % of it)"),
         ("unknown", ("stribeck",), "Found in part: stribeck – friction falls"),
-        ("inseparable", ("stribeck",), "They do not tell it from spring."),
+        ("inseparable", ("stribeck",), "It is not distinguishable from spring."),
     ],
 )
 def test_the_verdict_is_a_plain_sentence(

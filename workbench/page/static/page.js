@@ -46,6 +46,6 @@ document.addEventListener("htmx:load", () => servoCharts.draw());
   window.addEventListener("pageshow", () => {
     const button = zone.querySelector("button");
     button.disabled = false;
-    button.textContent = "Look at it";
+    button.textContent = "Check it";
   });
 })();

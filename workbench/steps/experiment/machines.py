@@ -1,4 +1,4 @@
-"""A model's machine in its loop as an experiment sees it: what it does, logs, and tells."""
+"""A model's machine in its loop as an experiment sees it: what it does, logs, and identifies."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -93,7 +93,7 @@ class Bench:
         return log_errors(self.fitted(plant), self.recorded(log.with_signals(**noisy)))
 
     def machine(self, plant: Plant, rivals: tuple[Acting, ...] = ()) -> Machine:
-        """The plant as the search takes it, and what a run tells of it and of these rivals."""
+        """The plant as the search takes it, and what a run identifies of it and of these rivals."""
         own = self.fitted(plant)
 
         def told(run: LoopRun) -> Information:
@@ -113,7 +113,7 @@ def bench_of(model: Model, found: Design | None) -> Bench:
     """
     if model.imposed:
         raise BadModel(
-            "the model's logs are of a motion that a rig imposed; no controller moves this machine"
+            "the model's logs are of a prescribed motion; no controller moves this machine"
         )
     if found is not None:
         name = found.recommended if found.recommended in found.controllers else ""

@@ -48,7 +48,7 @@ SHOWN_PLANTS = 12  # drawn plants in the picture
 def experiment(
     model: Model, wanted: Wanted, design: Design | None, report: Progress, keep_going: KeepGoing
 ) -> Experiment:
-    """The run that tells most of the parameters asked for, within the limits.
+    """The run that is most informative of the parameters asked for, within the limits.
 
     design: whose recommended controller moves the machine; None: its present one. Raises BadModel
     where nothing would follow a reference, NotIdentifiable where no run within the limits tells
@@ -72,8 +72,9 @@ def experiment(
     promises = promised(bench, plants[: 1 + PROMISED_PLANTS], r, promise, report)
     if all(one.after is None for one in promises):
         raise NotIdentifiable(
-            f"{model.card}: no run within the limits tells any parameter ({bench.controller} hardly"
-            " moves the machine within them); widen the limits, or give another --design"
+            f"{model.card}: no parameter is identifiable from a run within the limits"
+            f" ({bench.controller} hardly moves the machine within them); widen the limits, or"
+            " give another --design"
         )
     seen = looked_at(machines[:1], r)
     per = len(asked) if not rivals else 1
@@ -124,7 +125,7 @@ def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[P
 
 
 def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
-    """How far the run tells each pair apart, the hardest first."""
+    """How far the run discriminates each pair, the hardest first."""
     found = [
         Separation(*pair.names, float(np.sqrt(told_apart(told.matrix, pair.one, pair.others))))
         for pair in pairs_of(told, keys)
@@ -156,7 +157,7 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
         out.append(left_out)
     if model.assumed:
         names = ", ".join(model.assumed)
-        out.append(f"no log tells {names}: values within a third of the assumed ones were tried")
+        out.append(f"{names}: not identifiable; tried within a third of the assumed values")
     if not model.fit.adequate:
         out.append(
             "the model leaves more than noise of its logs: what is promised holds for a machine"

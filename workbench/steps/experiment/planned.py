@@ -22,8 +22,9 @@ USUAL_SECONDS = 20.0
 
 @dataclass(frozen=True)
 class Wanted:
-    """What is asked: parameters to be told (none: all), limits where they are not those of card and
-    logs, seed. rivals: keys of effects of which one is at work, which the run is to tell apart."""
+    """What is asked: parameters to be identified (none: all), limits where they are not those of
+    card and logs, seed. rivals: keys of effects of which one is at work, which the run is to
+    discriminate."""
 
     parameters: tuple[str, ...] = ()
     stroke: tuple[float, float] | None = None
@@ -37,8 +38,8 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Promised:
-    """A parameter: half its 95 % interval now (None: no log tells it) and after the run, its unit,
-    and how often of the simulated runs it is told."""
+    """A parameter: half its 95 % interval now (None: no log identifies it) and after the run, its
+    unit, and how often of the simulated runs it is identified."""
 
     name: str
     unit: str
@@ -50,7 +51,8 @@ class Promised:
 
 @dataclass(frozen=True)
 class Separation:
-    """Two plants that the run is to tell apart, and by how many deviations of the noise it does."""
+    """Two plants that the run is to discriminate, and by how many deviations of the noise it
+    does."""
 
     one: str
     other: str
@@ -86,8 +88,8 @@ class Experiment:
     """The run to make next.
 
     h [s]: period of the reference r [m], (n,); criterion: "D" (surest parameters) or "T" (rivals
-    told apart); efficiency: of the best shares of the time, a parameter, that the run's whole
-    pieces reach as their sum; loose: share of the run that hangs on luck.
+    discriminated); efficiency: of the best shares of the time, a parameter, that the run's whole
+    pieces reach as their sum; loose: share of the run that is sensitive to chance.
     """
 
     card: str

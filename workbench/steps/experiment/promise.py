@@ -25,7 +25,7 @@ def promised(
 ) -> tuple[Promised, ...]:
     """Half the 95 % intervals that a fit of the run is to give, the median over these plants.
 
-    Each plant runs with the sensors' noise, and the fit settles at it as it would on a log.
+    Each plant runs with the sensors' noise, and the fit converges to it as it would on a log.
     """
     found: list[Mapping[str, Estimate]] = []
     for i, plant in enumerate(plants):

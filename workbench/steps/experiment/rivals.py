@@ -1,4 +1,4 @@
-"""Which effects a run is to tell apart: those that a trace could not."""
+"""Which effects a run is to discriminate: those that a trace could not."""
 
 import json
 import re
@@ -27,8 +27,8 @@ def read_rivals(path: Path, model: Model, library: Library) -> tuple[str, ...]:
         raise BadModel(f"{path}: no schema 'trace/1'; give the trace.json of 'workbench trace'")
     if found.get("verdict") not in ("inseparable", "unknown"):
         raise BadModel(
-            f"{path}: its verdict is {found.get('verdict')!r}; there are rivals to tell apart where"
-            " it is 'inseparable' or 'unknown'"
+            f"{path}: its verdict is {found.get('verdict')!r}; there are rivals to discriminate"
+            " where it is 'inseparable' or 'unknown'"
         )
     return rivals_of(found, model, library)
 

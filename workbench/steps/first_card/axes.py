@@ -39,7 +39,7 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
 
 
 def _may_be_a_name(word: str) -> bool:
-    """Whether a word may tell an axis: it says nothing else, or is itself a position's name."""
+    """Whether a word may name an axis: it says nothing else, or is itself a position's name."""
     means = meaning(word)
     return not tells_purpose(word) and (not means or "position" in means or len(word) == 1)
 

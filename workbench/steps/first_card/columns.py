@@ -213,7 +213,7 @@ def _rises(one: Column) -> bool:
 
 
 def _clock(path: Path, columns: Sequence[Column], texts: Sequence[Column]) -> Column:
-    """The column that tells the time; texts: columns that hold no numbers.
+    """The column that holds the time; texts: columns that hold no numbers.
 
     Raises BadLog where there is none.
     """
@@ -297,7 +297,7 @@ def _coarseness(one: Column) -> int:
 
 
 def _said(one: Column) -> float:
-    """How much a header tells: a sensor's own volts and counts less than the signal's unit."""
+    """How much a header says: a sensor's own volts and counts less than the signal's unit."""
     unit = one.header.unit
     raw = unit is not None and unit.quantity in ("command", "count")
     known = 0.0 if unit is None or raw else 4.0

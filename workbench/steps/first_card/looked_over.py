@@ -1,4 +1,5 @@
-"""A proposal after its log was read by it: why that fails, and what the log will hardly tell."""
+"""A proposal after its log was read by it: why that fails, and what is hardly identifiable from the
+log."""
 
 import tomllib
 from dataclasses import replace
@@ -16,7 +17,7 @@ CARD_NAME = Path("the card")
 
 
 def looked_over(of: Proposal) -> Proposal:
-    """The proposal with what doctor will say of it first: `refused`, and `hardly` told."""
+    """The proposal with what doctor will say of it first: `refused`, and `hardly` identifiable."""
     try:
         card = card_from(tomllib.loads(written(of)), CARD_NAME)
         found = read_runs(of.path, card)

@@ -1,4 +1,4 @@
-"""Whether a machine turns or slides, and what a position's own values tell of its unit."""
+"""Whether a machine turns or slides, and what a position's own values say of its unit."""
 
 from typing import NamedTuple
 
@@ -94,7 +94,7 @@ def is_current(u: Column) -> bool:
 
 
 def unit_by_turn(y: Column) -> tuple[str, str] | None:
-    """Unit of an angle and what tells it: its steps are a turn over a power of two, or it leaps
+    """Unit of an angle and its evidence: its steps are a turn over a power of two, or it leaps
     by a turn; None where neither is so."""
     leap = float(np.max(np.abs(np.diff(y.numbers)), initial=0.0))
     for unit, turn in TURN_IN.items():

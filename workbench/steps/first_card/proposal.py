@@ -87,8 +87,8 @@ class Proposal:
     card, what else was measured (name: column), and what it should say of a rig of the next likely
     kind.
 
-    hardly: what the log will hardly tell; refused: why it cannot be read by the card; both empty
-    until it was tried (`looked_over`)."""
+    hardly: what is hardly identifiable from the log; refused: why it cannot be read by the card;
+    both empty until it was tried (`looked_over`)."""
 
     path: Path
     name: str
@@ -147,7 +147,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     if roles is None:
         there = ", ".join(one.shown for one in columns.signals) or "none"
         raise BadLog(
-            f"{path}: no column moves as a body that another one drives (looked at: {there}); a"
+            f"{path}: no column moves as a body that another one drives (tried: {there}); a"
             " position is needed that goes both ways, and beside it a force, two pressures or a"
             " motor's command; or write the card by hand (manual: The card, key by key)"
         )
@@ -287,7 +287,7 @@ def _pressure_beside_force(columns: Columns, roles: Roles) -> tuple[Roles, str |
         pair = {"p_n" if balance > 0.0 else "p_p": found[0]}
     else:
         return roles, None
-    why = dict.fromkeys(pair, "the header says pressure; the force's sign tells the chamber")
+    why = dict.fromkeys(pair, "the header says pressure; the chamber by the force's sign")
     added = replace(
         roles,
         columns={**roles.columns, **pair},
@@ -304,7 +304,7 @@ def _area_of(name: str, roles: Roles, units: Mapping[str, UnitGuess]) -> RigGues
     mean = float(np.mean(roles.columns[name].x)) * factor(units[name].unit)
     area = abs(roles.law.balance) * factor(units["F"].unit) / mean
     key = "area_p_m2" if name == "p_p" else "area_n_m2"
-    why = "with it friction is alike in both directions; the bore tells it better"
+    why = "with it friction is equal in both directions; better: measure the bore"
     return RigGuess(key, float(f"{area:.3g}"), "m^2", False, why)
 
 
@@ -334,17 +334,17 @@ def _motion_guess(found: MotionGuess) -> RigGuess:
 
 
 def _rig(columns: Columns, roles: Roles, motion: Motion) -> list[RigGuess]:
-    """The numbers of the rig that a log can tell, and those that it needs beside the log."""
+    """The numbers of the rig that a log can identify, and those that it needs beside the log."""
     out = []
     if roles.kind == "electro-pneumatic":
         even = abs(roles.area_ratio - 1.0) < 1e-9
-        why = "no log tells it, measure bore and rod; the motion goes best with "
+        why = "not in any log: measure bore and rod; the motion fits best with "
         why += "equal areas" if even else f"an area_n {roles.area_ratio:.2g} times area_p"
         out.append(RigGuess("area_p_m2", 1e-3, "m^2", False, why))
         out.append(RigGuess("area_n_m2", float(f"{1e-3 * roles.area_ratio:.3g}"), "m^2", False,
                             "as area_p_m2: measure bore and rod"))  # fmt: skip
         out.append(RigGuess("supply_pressure_pa", 6e5, "Pa", False,
-                            "no log tells it; it matters where the areas differ"))  # fmt: skip
+                            "not in any log; it matters where the areas differ"))  # fmt: skip
     if roles.kind == "motor":
         force = "N m" if motion == "rotary" else "N"
         out.append(_motor_constant(columns, force))
@@ -361,7 +361,7 @@ def _motor_constant(columns: Columns, force: str) -> RigGuess:
             why = f"the file's {one.raw.header!r}; check that it is {force} for one unit of u"
             return RigGuess("force_per_command", float(one.values[0]), f"{force}/u", False, why)
     why = (
-        "no log tells it: the motor's constant times the amplifier's gain; identify needs it"
+        "not in any log: the motor's constant times the amplifier's gain; identify needs it"
         " (1: forces in units of the command)"
     )
     return RigGuess("force_per_command", None, f"{force}/u", False, why)

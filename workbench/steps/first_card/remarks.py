@@ -61,7 +61,7 @@ def _of_names(columns: Columns, roles: Roles) -> Iterator[str]:
     raw = [one.raw for one in columns.read if one.raw.header and isinstance(one.raw.key, int)]
     for name in (name for name, many in Counter(one.header for one in raw).items() if many > 1):
         places = [str(one.number) for one in raw if one.header == name]
-        yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: told by number"
+        yield f"columns {' and '.join(places)} (from 0) are all named {name!r}: taken by number"
 
 
 def _contradiction(roles: Roles, units: Mapping[str, UnitGuess], ratio: float) -> str:

@@ -47,7 +47,7 @@ FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is no
 FRICTION_TELLS_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
 MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
 WORK_TELLS_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
-COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is told
+COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
@@ -331,7 +331,7 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
 
 
 def _tells_sign(law: ForceLaw) -> bool:
-    """Whether a law tells the sign of a force or command: by its work, or by friction in it."""
+    """Whether a law gives the sign of a force or command: by its work, or by friction in it."""
     if abs(law.work) > TELLS_SIGN:
         return law.share > COMMAND_TELLS_SIGN or abs(law.work) > WORK_TELLS_SIGN
     onwards = law.friction is None  # one way: along it

@@ -58,7 +58,7 @@ def by_reference(
     if unit == "V":
         number = _sensible(float(np.ptp(y.x)) / (1.0 if motion == "rotary" else 100.0))
         rival = ""
-    why = "nothing in the log tells it: the sensor's data sheet does"
+    why = "not in the log: see the sensor's data sheet"
     return UnitGuess(unit, f"{number:.9g} {unit}/{per}", False, why, rival)
 
 
@@ -115,7 +115,7 @@ def counts_samples(clock: Column) -> bool:
 
 def by_sample_number(columns: Columns, roles: Roles, given: Mapping[str, UnitGuess]) -> UnitGuess:
     """The rate of a log that counts its samples: by a velocity of known unit, else a usual one."""
-    rate, why = 1000.0, "a usual one: sample numbers tell no time, and nothing else here does"
+    rate, why = 1000.0, "a usual one: nothing in the log gives the time of a sample"
     if {"y", "v"} <= set(given) and "v" in roles.columns:
         motion = roles.columns["y"].motion
         assert motion is not None

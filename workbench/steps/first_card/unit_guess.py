@@ -2,8 +2,8 @@
 another's.
 
 A weight is a log-probability: how usual a unit is, and how near to the middle of what machines have
-the value then lies. What the log itself tells goes first: a velocity whose unit is known tells the
-clock's, a reference in millimetres tells the counts of an encoder. Sizes alone make nothing sure.
+the value then lies. What the log itself shows goes first: a velocity whose unit is known gives the
+clock's, a reference in millimetres gives the counts of an encoder. Sizes alone make nothing sure.
 """
 
 from collections.abc import Mapping

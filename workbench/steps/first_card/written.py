@@ -10,7 +10,7 @@ from workbench.logs.runs import read_runs
 from workbench.steps.first_card.proposal import Proposal, RigGuess, SignalGuess
 
 LEGEND = (
-    '"sure" and "guess" say how far the log itself tells a line; look at each guess before you use',
+    '"sure" and "guess" say how well a line follows from the log; check each guess before you use',
     "the card. Every key is explained in the manual: The card, key by key.",
 )
 

@@ -1,1 +1,1 @@
-"""Designs that hold for the machine there is: judged over machines drawn from what is not sure."""
+"""Designs that hold for the machine there is: tested over machines drawn from what is not sure."""

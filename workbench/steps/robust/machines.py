@@ -84,10 +84,10 @@ def drawn_machines(
 
 
 def drift_seen(models: Sequence[Mapping[str, Estimate]]) -> dict[str, float]:
-    """By how much each of the nine has changed from one model in force to the next: the relative
+    """By how much each of the nine has changed from one active model to the next: the relative
     deviation of a step, what the models themselves are unsure of taken off; only those that have.
 
-    models: their friction, in the order in which they were in force.
+    models: their friction, in the order in which they were active.
     """
     out = {}
     for name in NAMES:

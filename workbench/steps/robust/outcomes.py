@@ -21,14 +21,14 @@ from workbench.steps.loop_motion import loop_motion
 from workbench.steps.robust.machines import DrawnMachines
 
 SLOW_SHARE = 0.5  # of the narrowest stick band, at which a slow ramp moves
-SLOW_SECONDS = 10.0  # s that it lasts, the last half of which is judged
+SLOW_SECONDS = 10.0  # s that it lasts, the last half of which is tested
 BARELY = 1.0 - 1e-9  # of a limit of the command, at which it is reached
 
 Kind = Literal["share", "samples", "length", "time", "number"]
 
 
 class Measure(NamedTuple):
-    """What is judged of a loop: name, in words, what kind of number it is; floor: at least the
+    """What is tested of a loop: name, in words, what kind of number it is; floor: at least the
     limit is kept, else at most."""
 
     name: str

@@ -215,7 +215,7 @@ def _chosen(
     called = one.name.upper() + (" with the compensator" if one.compensator else "")
     least = min((m.kept for m in promise.measures.values() if m.kept is not None), default=1.0)
     said = (
-        f"{called}: of {wanted.draws} machines drawn each limit is kept by at least"
+        f"{called}: of {wanted.draws} machines drawn each limit is met by at least"
         f" {100 * least:.0f} %, all of them by {100 * promise.every:.0f} %; the best of"
         f" {found.tried} loops tried"
     )
@@ -228,7 +228,7 @@ def _remarks(model: Model, wanted: RobustAsked) -> list[str]:
     out = []
     if model.assumed:
         names = ", ".join(model.assumed)
-        out.append(f"no log tells {names}: values within a third of the assumed ones were drawn")
+        out.append(f"{names}: not identifiable; drawn within a third of the assumed values")
     if wanted.drift:
         widest = max(wanted.drift, key=lambda name: (wanted.drift or {})[name])
         out.append(

@@ -1,7 +1,7 @@
 """The specification that does best over the machines drawn: poles, integrator, compensator.
 
 Loops are placed so that their margins hold on so many of the machines; then their motion with
-friction decides. A few machines sort the candidates, all of them judge the best few, and what is
+friction decides. A few machines sort the candidates, all of them test the best few, and what is
 promised at last is counted on machines drawn anew, so that the choice has no part in it.
 """
 
@@ -29,7 +29,7 @@ WHOLE_TRIED = ((1.0, 1.0), (0.3, 0.3), (0.1, 0.3))
 EXCESS_TRIED = (5.0, 20.0)
 EXCESS_N_C = 1.05
 FEW = 6  # machines that sort the candidates
-FINALISTS = 2  # candidates that all machines judge
+FINALISTS = 2  # candidates that all machines test
 # Errors below which less is no better: of step and amplitude; a staircase, in the sensor's noise.
 ERROR_FLOOR, STAIR_FLOOR = 1e-3, 5.0
 WEIGHED = ("standstill", "tracking", "settling", "staircase")

@@ -174,4 +174,4 @@ def test_what_no_log_told_is_named() -> None:
     model = uncertain()
     model = replace(model, friction={**model.friction, "F_sp": untold})
     one = robust_design(model, replace(WANTED, draws=4), POLES)
-    assert any(line.startswith("no log tells F_sp: ") for line in one.remarks)
+    assert any(line.startswith("F_sp: not identifiable; ") for line in one.remarks)

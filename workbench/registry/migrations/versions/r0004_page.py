@@ -1,4 +1,4 @@
-"""The page: tokens, uploads, its background work, the audit, and the fleet at a glance."""
+"""The page: tokens, uploads, its background work, the audit, and the fleet in summary."""
 
 import json
 
