@@ -3,8 +3,9 @@
     mean F = m second y + F_cp share up - F_cn share down + F_vp mean v+ + F_vn mean v-   (N)
 
 in weak form (`signals/weak_form`). Wide windows average noise away, narrow ones keep up with quick
-motion: taken is the narrowest that leaves hardly more of the force than the best one does. A window
-may hold reversals, since its columns hold how long the body went each way.
+motion: taken is the narrowest that leaves hardly more of the force than the best one does, and in
+which the position's noise costs the mass next to nothing. A window may hold reversals, since its
+columns hold how long the body went each way.
 """
 
 from collections.abc import Sequence
@@ -24,7 +25,7 @@ from identification.model.karnopp import Karnopp
 from identification.signals.weak_form import WeakWindows, all_windows, noise_gain, weights
 
 OF_EQUATION = 4e-3  # of a value, by which the equation's smoothing errs where the log shows nothing
-HALF_WIDTHS = (8, 16, 32, 64)  # samples, half of a window
+HALF_WIDTHS = (5, 8, 16, 32, 64)  # samples, half of a window
 FINEST_WINDOW = 4  # samples, of the window that shows direction and speed
 FINER_WINDOW = 4  # times narrower than the rows' windows it is
 SHORTEST_LOGS = 20  # half-widths, that the shortest log is long at least
@@ -74,6 +75,7 @@ def rows_and_windows(logs: Sequence[MotionLog], theta: Array) -> list[MotionRows
     found = [made for made in tried if sum(len(one.rows.b) for one in made) >= FEWEST_IN_MOTION]
     if not found:
         return tried[0]
+    found = [made for made in found if _bent_by_noise(made, logs) < OF_EQUATION] or found
     left = [_share_left([one.rows for one in made]) for made in found]
     enough = max(NEARLY_LEAST * min(left), min(left) + AS_WELL_LEFT)
     return next(made for made, share in zip(found, left, strict=True) if share <= enough)
@@ -105,6 +107,23 @@ def rows_of_width(one: MotionLog, half: int, theta: Array) -> MotionRows:
     sd = np.maximum(np.sqrt(variance), OF_FORCE * float(np.std(one.log["F"])))
     block = (w.middle * BLOCKS // n).astype(np.int64)
     return MotionRows(Rows(b, X, sd, block, np.abs(over), FIVE), w, v)
+
+
+def _bent_by_noise(made: Sequence[MotionRows], logs: Sequence[MotionLog]) -> float:
+    """Share of the force by which least squares err since the position's noise is in its
+    accelerations, too: they lose as much of the mass as of these is noise.
+
+    Source: attenuation by errors in a regressor, Fuller, Measurement Error Models (1987), 1.1.1.
+    """
+    square = noise = 0.0
+    for one, log in zip(made, logs, strict=True):
+        second = weights(one.windows.length, log.log.h)[2]
+        square += float(np.sum(one.rows.X[:, 0] ** 2))
+        noise += len(one.rows.b) * log.noise_y**2 * noise_gain(second)
+    every = stacked([one.rows for one in made])
+    mass = float(solve_rows(every).theta[0])
+    inertia = abs(mass) * square**0.5 / max(float(np.linalg.norm(every.b)), 1e-300)
+    return inertia * noise / max(square, 1e-300)
 
 
 def _share_left(rows: Sequence[Rows]) -> float:
