@@ -36,7 +36,7 @@ from benchmarks.drift_machines import STAGE_RIG, TURNED_RIG, stage, turned
 from identification.drift.drift_result import DriftTest
 from identification.drift.drift_test import drift_test
 from identification.drift.own_logs import with_own_logs
-from identification.drift.reference_model import COULOMB, InForce, in_force
+from identification.drift.reference_model import COULOMB, ReferenceModel, in_force
 from identification.effects._base import Acting
 from identification.effects._library import built_in
 from identification.errors import BadModel, UserError
@@ -81,7 +81,7 @@ class Outcome:
     seen: float = np.inf  # smallest change of both Coulomb levels that could have been seen
 
 
-def put_in_force(one: Machine, seed: int) -> InForce:
+def put_in_force(one: Machine, seed: int) -> ReferenceModel:
     """The model of one log of the machine as it is."""
     log = simulated(one, (), seed, "model", MODEL).log
     fit = fit_plant([log], np.random.default_rng(seed), rig=one.rig)
@@ -103,7 +103,7 @@ def scaled(nine: Karnopp, names: Sequence[str], factor: float) -> Karnopp:
 
 
 def tested(
-    model: InForce,
+    model: ReferenceModel,
     one: str,
     log: Log,
     seed: int,

@@ -20,7 +20,7 @@ from identification.errors import UserError
 from identification.estimation.fit import fit_plant
 from identification.log import Log, Rig
 from identification.model.karnopp import NAMES
-from workbench.steps.runs_tell import runs_tell
+from workbench.steps.identifiability_of_runs import identifiability_of_runs
 
 RICH = 15.0  # s
 TWICE = 2.0
@@ -28,7 +28,7 @@ TWICE = 2.0
 
 def judged(log: Log, rig: Rig, seed: int, count: Counter[str]) -> str:
     """Counts of one log's parameters; the wrong ones in words."""
-    said = runs_tell([log], rig).told
+    said = identifiability_of_runs([log], rig).told
     fit = fit_plant([log], np.random.default_rng(seed), rig=rig)
     wrong = []
     for one in said:

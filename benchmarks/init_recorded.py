@@ -21,7 +21,7 @@ from pathlib import Path
 from identification.errors import UserError
 from workbench.logs.fetch import DATA_VARIABLE
 from workbench.steps.first_card.answers import THE_OTHER, BadAnswer, with_rig, with_signal
-from workbench.steps.first_card.looked_over import looked_over
+from workbench.steps.first_card.checked_proposal import checked_proposal
 from workbench.steps.first_card.proposal import Proposal, proposed
 
 Signal = tuple[str | int, str]  # column, and unit ("": in no log)
@@ -185,7 +185,7 @@ def _judged(path: Path, wanted: Right) -> tuple[str, bool, bool, int, int]:
     import re
 
     try:
-        found = looked_over(proposed(path))
+        found = checked_proposal(proposed(path))
     except UserError as error:
         fits = bool(wanted.refused and re.search(wanted.refused, str(error)))
         return f"refused: {error}", fits, fits, 0, 0

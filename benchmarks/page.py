@@ -36,7 +36,7 @@ from workbench.registry.store import Registry
 QUERIES = 15
 WARMING = 3.0  # s
 WARMING_PLOTS = 2  # until every server has its helper
-LOOKED_AT = 30_000  # samples
+LAST_LOGS_READ = 30_000  # samples
 PATHS = ("/", "/?order=moved&down=1", "/?state=drifting", "/?page=150", "/?text=99",
          "/machine/axis-00042")  # fmt: skip
 
@@ -146,7 +146,7 @@ def _plots(address: str, where: str, folder: Path, samples: int) -> None:
             said = f"{samples} samples, {path.suffix[1:]} ({size:.0f} MB)"
             print(f"first plot of {said}: {statistics.median(taken):.2f} s")
         print(
-            f"doctor's picture of {LOOKED_AT} samples after 'Save the card':"
+            f"doctor's picture of {LAST_LOGS_READ} samples after 'Save the card':"
             f" {_doctor(person, folder):.2f} s"
         )
     finally:
@@ -167,7 +167,7 @@ def _plot(person: Person, path: Path) -> float:
 
 def _doctor(person: Person, folder: Path) -> float:
     """Median time from a corrected card to the doctor's picture."""
-    (path, _), taken = _logs(folder, LOOKED_AT), list[float]()
+    (path, _), taken = _logs(folder, LAST_LOGS_READ), list[float]()
     _plot(person, path)
     person.until(lambda: person.inked("#picture"), "no picture")
     for _ in range(3):

@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 from workbench.registry.page_tables import MachineNowRow, MachineTrendRow
 from workbench.registry.store import Registry
 from workbench.registry.tables import (
+    ActiveVersionRow,
     DecisionRow,
-    InForceRow,
     LogRow,
     MachineRow,
     OutcomeRow,
@@ -42,8 +42,8 @@ def fill(where: str, count: int, seed: int = 0) -> None:
 
 def _block(session: Session, numbers: range, rng: np.random.Generator, now: datetime) -> None:
     rows: dict[Any, list[dict[str, Any]]] = {
-        table: [] for table in (MachineRow, RecordRow, VersionRow, DecisionRow, InForceRow, LogRow,
-                                OutcomeRow, MachineNowRow, MachineTrendRow)
+        table: [] for table in (MachineRow, RecordRow, VersionRow, DecisionRow, ActiveVersionRow,
+                                LogRow, OutcomeRow, MachineNowRow, MachineTrendRow)
     }  # fmt: skip
     for k in numbers:
         name, state = f"axis-{k:05d}", STATES[int(rng.integers(len(STATES)))]
@@ -61,7 +61,7 @@ def _block(session: Session, numbers: range, rng: np.random.Generator, now: date
         rows[DecisionRow].append({"id": k + 1, "machine": name, "kind": "promoted", "at": now,
                                   "version_id": k + 1, "reason": "first model", "evidence": "{}",
                                   "made_by": "benchmark"})  # fmt: skip
-        rows[InForceRow].append({"machine": name, "version_id": k + 1, "decision_id": k + 1})
+        rows[ActiveVersionRow].append({"machine": name, "version_id": k + 1, "decision_id": k + 1})
         for n in range(LOGS_EACH):
             key = k * LOGS_EACH + n + 1
             when = heard - timedelta(hours=LOGS_EACH - n)

@@ -29,13 +29,13 @@ from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.tracing.result import Trace
 from workbench.cards.card import Card
-from workbench.documents.model import Model, Told
+from workbench.documents.model import Identifiable, Model
 from workbench.logs.runs import read_signals, with_force
 from workbench.logs.sources import Sources, sources_of
 from workbench.steps.doctor import Examined, examine
 from workbench.steps.first_card.proposal import proposed
+from workbench.steps.identifiability_of_runs import identifiability_of_runs
 from workbench.steps.identify_sources import Identified, identify_sources
-from workbench.steps.runs_tell import runs_tell
 from workbench.steps.trace import trace_sources
 
 SEED = 0
@@ -115,7 +115,7 @@ def doctor_answer(found: Examined) -> dict[str, Any]:
     }
 
 
-def said_answer(told: Sequence[Told], refused: str) -> dict[str, Any]:
+def said_answer(told: Sequence[Identifiable], refused: str) -> dict[str, Any]:
     """What is said of each parameter before a fit."""
     said = {one.name: {"can": one.can, "why": one.why, "only_if": one.only_if} for one in told}
     return {"refused": refused, "told": said}
@@ -178,7 +178,7 @@ def promise(answers: Answers, ready: Prepared, card: Card, part: str) -> None:
 
     def said_of_all() -> dict[str, Any]:
         read = sources_of(every, card)
-        found = runs_tell([one.log for one in read.runs], read.rig)
+        found = identifiability_of_runs([one.log for one in read.runs], read.rig)
         return said_answer(found.told, found.reason)
 
     def kept(asked: Sequence[str]) -> dict[str, Any]:

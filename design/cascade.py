@@ -35,10 +35,10 @@ ABOVE = (2.5, 3.0, 4.0, 6.0)  # k_p/(m k_v) tried
 SMOOTHINGS = (0.05, 0.12, 0.25, 0.5)  # eps k_p/m tried
 FINER_CASCADE = (1.0, 0.93, 0.87, 1.07, 1.15)  # times the best of these, tried after it
 HALF_POWER_S = 1.0 / math.sqrt(2.0)
-LOWEST_LOOKED_AT = 1e-4  # of half the sampling rate
+LOWEST_EVALUATED = 1e-4  # of half the sampling rate
 POINTS_EVERYWHERE, POINTS_AT_A_SWING = 260, 60
 AROUND_A_SWING = 0.15  # of its frequency
-LOOKED_AT_EXACTLY = 40  # of the best by the grid of frequencies
+EVALUATED_EXACTLY = 40  # of the best by the grid of frequencies
 RESET_COUNTS = 0.1  # logarithm of 1/T_n beside that of the bandwidth
 
 
@@ -73,7 +73,7 @@ class TunedCascade:
 
 
 @dataclass(frozen=True, eq=False)
-class _Seen:
+class _Evaluated:
     """Plants over the frequencies f (k,): responses (plants, k), 1 - z^-1 and z^-1 (k,)."""
 
     plants: Plants
@@ -94,7 +94,7 @@ def in_series(controller: RST, series: Filter) -> RST:
 
 def bandwidth_of(A: Array, B: Array, controller: RST) -> float:
     """The frequency [Hz] below which |S_yp| is under -3 dB; half the sampling rate if it stays."""
-    f = 0.5 / controller.h * np.geomspace(LOWEST_LOOKED_AT, 1.0, 4000)
+    f = 0.5 / controller.h * np.geomspace(LOWEST_EVALUATED, 1.0, 4000)
     z = np.exp(2j * np.pi * f * controller.h)
     back = evaluate(A, z) * evaluate(controller.S, z)
     S = np.abs(back / (back + evaluate(B, z) * evaluate(controller.R, z)))
@@ -122,7 +122,7 @@ def tune_cascade(
     best = _first_kept(seen, goals, found)
     if best is None:
         raise BadSpecification(
-            "no P-PI cascade keeps these plants stable with the margins asked for; ask for less"
+            "no P-PI cascade stabilizes these plants with the margins asked for; ask for less"
         )
     again = [
         (score, gains, best.series)
@@ -135,19 +135,19 @@ def tune_cascade(
     return best
 
 
-def _seen(plants: Plants, h: float, swings: Sequence[float]) -> _Seen:
+def _seen(plants: Plants, h: float, swings: Sequence[float]) -> _Evaluated:
     half = 0.5 / h
     near = np.linspace(1.0 - AROUND_A_SWING, 1.0 + AROUND_A_SWING, POINTS_AT_A_SWING)
-    f = [half * np.geomspace(LOWEST_LOOKED_AT, 1.0, POINTS_EVERYWHERE), *(s * near for s in swings)]
+    f = [half * np.geomspace(LOWEST_EVALUATED, 1.0, POINTS_EVERYWHERE), *(s * near for s in swings)]
     every = np.unique(np.concatenate(f))
     every = every[every <= half]
     z = np.exp(2j * np.pi * every * h)
     P = np.array([evaluate(B, z) / evaluate(A, z) for A, B in plants], dtype=np.complex128)
-    return _Seen(plants, h, every, P, np.asarray(1.0 / z, dtype=np.complex128))
+    return _Evaluated(plants, h, every, P, np.asarray(1.0 / z, dtype=np.complex128))
 
 
 def _tried(
-    seen: _Seen, m: float, goals: Goals, series: SeriesFilter | None, v_ff: float,
+    seen: _Evaluated, m: float, goals: Goals, series: SeriesFilter | None, v_ff: float,
     near: CascadeGains | None = None,
 ) -> list[tuple[float, CascadeGains]]:  # fmt: skip
     """Cascades that keep modulus margin and effort on the grid of frequencies, with their scores.
@@ -213,7 +213,7 @@ def _points(
 
 
 def _first_kept(
-    seen: _Seen, goals: Goals, found: Sequence[tuple[float, CascadeGains, SeriesFilter | None]]
+    seen: _Evaluated, goals: Goals, found: Sequence[tuple[float, CascadeGains, SeriesFilter | None]]
 ) -> TunedCascade | None:
     """The first that is stable on all plants and meets the goals, as they are given exactly.
 
@@ -230,7 +230,7 @@ def _first_kept(
         if not one.missed:
             return one
         spare = spare or one
-        if looked_at >= LOOKED_AT_EXACTLY:
+        if looked_at >= EVALUATED_EXACTLY:
             break
     return spare
 
@@ -241,7 +241,7 @@ def _stable(A: Array, B: Array, rst: RST) -> bool:
 
 
 def _exactly(
-    seen: _Seen, goals: Goals, gains: CascadeGains, series: SeriesFilter | None, rst: RST
+    seen: _Evaluated, goals: Goals, gains: CascadeGains, series: SeriesFilter | None, rst: RST
 ) -> TunedCascade:
     A, B = seen.plants[0]
     found = margins(A, B, rst)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import tf2ss
 
-from design.linear import ForceGains, force_loop, held_step, transfer
+from design.linear import ForceGains, force_loop, transfer, zoh_step
 from design.polynomial import check_period
 from identification.arrays import Array
 from identification.errors import BadSpecification
@@ -66,13 +66,13 @@ def elastic_plant(
     A, b, c = _body(m, f, fast, swings)
     n = len(b)
     if actuator is None:
-        step, entry = held_step(A, b, 1.0)
+        step, entry = zoh_step(A, b, 1.0)
         return _seen(step, entry, c)
     # dF/dt = k1 u - k2 v, in periods.
     driven = np.zeros((n + 1, n + 1))
     driven[:n, :n], driven[:n, n] = A, b
     driven[n, :n] = -actuator.k2 * (c @ A)
-    step, entry = held_step(driven, np.append(np.zeros(n), actuator.k1 * fast), 1.0)
+    step, entry = zoh_step(driven, np.append(np.zeros(n), actuator.k1 * fast), 1.0)
     if force is None:
         return _seen(step, entry, np.append(c, 0.0))
     return _seen(*force_loop(step, entry, fast, force, ratio), np.append(c, (0.0, 0.0)))

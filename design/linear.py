@@ -52,10 +52,10 @@ def linear_plant(
         raise BadSpecification(f"m = {m:g} kg, f = {f:g} N s/m: need m > 0 and f >= 0")
     if actuator is None or force is None:
         body = np.array([[0.0, 1.0], [0.0, -f / m]])
-        step, entry = held_step(body, np.array([0.0, 1.0 / m]), h)
+        step, entry = zoh_step(body, np.array([0.0, 1.0 / m]), h)
         return transfer(step, entry)
     fast = h / ratio
-    step, entry = held_step(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), fast)
+    step, entry = zoh_step(_driven_body(m, f, actuator), np.array([0.0, 0.0, actuator.k1]), fast)
     return transfer(*force_loop(step, entry, fast, force, ratio))
 
 
@@ -68,7 +68,7 @@ def commanded_plant(m: float, f: float, h: float, actuator: Actuator) -> tuple[A
     if not (m > 0 and f >= 0):
         raise BadSpecification(f"m = {m:g} kg, f = {f:g} N s/m: need m > 0 and f >= 0")
     entry = np.array([0.0, 0.0, actuator.k1])
-    return transfer(*held_step(_driven_body(m, f, actuator), entry, h))
+    return transfer(*zoh_step(_driven_body(m, f, actuator), entry, h))
 
 
 def _driven_body(m: float, f: float, actuator: Actuator) -> Array:
@@ -105,7 +105,7 @@ def force_loop(
     return loop, drive
 
 
-def held_step(a: Array, b: Array, h: float) -> tuple[Array, Array]:
+def zoh_step(a: Array, b: Array, h: float) -> tuple[Array, Array]:
     """Step of x' = a x + b u over h with u held."""
     n = len(b)
     block = np.zeros((n + 1, n + 1))

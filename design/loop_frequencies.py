@@ -11,7 +11,7 @@ from design.rst import RST
 from design.specification import normalised_plant
 from identification.arrays import Array
 
-POINTS_LOOKED_AT = 4000  # of the frequencies looked at
+POINTS_EVALUATED = 4000  # of the frequencies looked at
 LOWEST_SHARE = 1e-5  # of half the sampling rate, from which on
 HALF_POWER = 1.0 / np.sqrt(2.0)  # -3 dB
 
@@ -27,7 +27,7 @@ class LoopFrequencies:
 
 def loop_frequencies(A: ArrayLike, B: ArrayLike, controller: RST) -> LoopFrequencies:
     """Crossover and bandwidth of the plant (A, B), ascending in z^-1, under a controller."""
-    f = 0.5 / controller.h * np.geomspace(LOWEST_SHARE, 1.0, POINTS_LOOKED_AT)
+    f = 0.5 / controller.h * np.geomspace(LOWEST_SHARE, 1.0, POINTS_EVALUATED)
     closed = np.abs(sensitivities(A, B, controller, 2.0 * np.pi * f).S_yr)
     through = _falls(f, np.abs(open_loop_response(A, B, controller, f)), 1.0)
     below = _falls(f, closed, HALF_POWER * float(closed[0]))

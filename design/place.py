@@ -63,7 +63,7 @@ def solve_diophantine(
         return solve_diophantine(A, B, P, H_R=_later(H_R), H_S=H_S, h=h)
     r, s, sound = solve_sylvester(a, b, P)
     if not sound:
-        r, s = _second_look(A, B, H_R, H_S, P, h)
+        r, s = _second_check(A, B, H_R, H_S, P, h)
     R, S = np.convolve(H_R, r), np.convolve(H_S, s)
     if b[0] != 0.0 and abs(S[0]) <= 1e-12 * np.abs(S).max():
         return solve_diophantine(A, B, P, H_R=_later(H_R), H_S=H_S, h=h)
@@ -127,7 +127,7 @@ def _holds(a: Array, b: Array, r: Array, s: Array, P: Array) -> bool:
     return worst <= LOST_DIGITS * float(np.abs(P).max())
 
 
-def _second_look(
+def _second_check(
     A: Array, B: Array, H_R: Array, H_S: Array, P: Array, h: float | None
 ) -> tuple[Array, Array]:
     """R', S' where the equation is (nearly) singular, or the refusal that says why."""

@@ -276,7 +276,7 @@ def _best(
                     slow, inside,
                     search=asked.auxiliary is None,
                 )  # fmt: skip
-                modulus, far_off = _quick_look(plants[0], controller, goals)
+                modulus, far_off = _quick_check(plants[0], controller, goals)
                 if far_off:
                     hopeless.append((modulus, judge))
                 else:
@@ -298,7 +298,7 @@ def _best(
     return replace(taken, worst=worst_modulus(plants, taken.rst))
 
 
-def _quick_look(plant: tuple[Array, Array], controller: RST, goals: Goals) -> tuple[float, bool]:
+def _quick_check(plant: tuple[Array, Array], controller: RST, goals: Goals) -> tuple[float, bool]:
     """A loop's modulus margin, and whether it misses a goal by too much to look any closer."""
     A, B = plant
     quick = loop_margins(A[np.newaxis], B[np.newaxis], controller)

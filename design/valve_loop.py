@@ -117,7 +117,7 @@ def tuned(
     low, high = 1e-3 / (valve.delay + valve.lag + h), 2.0 / h
     if not keeps(low):
         raise BadSpecification(
-            f"no gain keeps a modulus margin of {modulus:g} and a delay margin of"
+            f"no gain gives a modulus margin of {modulus:g} and a delay margin of"
             f" {delay_samples:g} periods of {h:g} s behind a delay of {valve.delay:.3g} s and a lag"
             f" of {valve.lag:.3g} s; ask for less, by --modulus or --delay"
         )

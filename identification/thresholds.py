@@ -14,7 +14,7 @@ ADEQUATE = 1.5  # hardly more than noise: a fit is adequate, a structure found i
 FOLLOWED = 2.0  # a stop lost here or there: the structure still follows the log
 ASTRAY = 3.0  # something is missing, or a measured force's noise has drifted as far
 NEARLY_FOLLOWED = 8.0  # not followed, but near
-LUCKY_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
+CHANCE_WINDOWS = 0.15  # of a free motor's windows, that chance may have spoilt
 FORGIVEN_FROM = 4  # windows, of which chance may have spoilt one
 NO_RUN = 50.0  # a run by the measured force is not the body's own motion
 LIKE = 4.0  # times the misfit of the active model, where that leaves more than noise
@@ -34,7 +34,7 @@ LEAST_SHARE = 0.25  # of what is missing, that an effect explains; less is anoth
 MOSTLY_EXPLAINED = 0.55  # the same, where much is left in the end
 CARRIES = 0.95  # of the error on stretches left out, that an effect leaves at most there
 ELASTIC = 0.3  # of the motion seen at rest, that a bristle leaves at most
-LUCK_IN_GAIN = 10.0  # criterion by which two effects that explain equally may differ
+CHANCE_IN_GAIN = 10.0  # criterion by which two effects that explain equally may differ
 
 # Which effects the free run confirms: shares of a misfit beyond 1 (blind.py: single, removed).
 HELPS = 0.75  # left at most by effects that leave more than noise, or they are useless
@@ -52,7 +52,9 @@ ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noi
 IMPOSED_LEFT = 0.3  # the same, with prescribed motion
 # (the next three by what they mean; no bench has chosen them yet)
 SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
-HEADLINE = 0.5  # share left at most of what was missing there, by effects that are reported first
+MAIN_EFFECTS_LEAVE = (
+    0.5  # share left at most of what was missing there, by effects that are reported first
+)
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
 HIDES = 0.1  # of the force, left where it is more than friction too: nothing can be said of either
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure
@@ -106,7 +108,7 @@ HARDLY_MORE = 1.02  # times the least force left unseen, that fewer terms of fri
 SPEEDS_APART = 4.0  # times the slow strokes the quick ones, to identify friction of speed alone
 GATE_MARGIN = 3.0  # times the information's deviation, by which a parameter is called identifiable
 LINEAR_ACTUATOR = 0.97  # share of dF/dt that a linear actuator leaves at most
-SURE_OF_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
+SURE_OF_RANDOM_WALK = 20.0  # criterion that a walk of the force off its logged command has to gain
 SURE_OF_SHARE = 6.0  # deviations from 0 of a command's change between the samples of a slow log
 SHARE_GAINS = 0.01  # of the square that the equation leaves, what that change has to explain
 SHARE_BEYOND = 2.0  # deviations by which that change may be larger than of any faster loop
@@ -120,7 +122,7 @@ SPIKE_FROM = 9.0  # distance of 1 to 3 samples from their neighbours, that is a 
 RUN_JUMP_FROM = 3.5  # the same as JUMP_FROM, in what a run that follows the log leaves
 RUN_SPIKE_FROM = 6.0  # the same as SPIKE_FROM there
 REPLACED_GAINS = 15.0  # cost that a run gains without one sample of its drive, that is bad
-RESIDUAL_WALKS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
+RESIDUAL_DRIFTS = 4.0  # deviations of its sums beyond noise, from which what a run leaves walks
 FROZEN_RUN = 8  # samples of one value in a signal that repeats none elsewhere
-PLACES_SET_ASIDE = 5  # of a log, by the word of a run that follows it but for these
-SHARE_SET_ASIDE = 1e-3  # of its samples, the same
+PLACES_EXCLUDED = 5  # of a log, by the word of a run that follows it but for these
+SHARE_EXCLUDED = 1e-3  # of its samples, the same

@@ -33,7 +33,7 @@ def merged(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:
     return [Merged(_together(group, logs), tuple(group)) for group in groups.values()]
 
 
-def told_once(remarks: Iterable[str], logs: Collection[str] = ()) -> list[str]:
+def printed_once(remarks: Iterable[str], logs: Collection[str] = ()) -> list[str]:
     """The lines of `merged`."""
     return [one.text for one in merged(remarks, logs)]
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from design.experiment.allocation import d_optimal
 from design.experiment.limits import Peaks, peaks
-from design.experiment.search import Criterion, Joint, Seen
+from design.experiment.search import Criterion, Evaluated, Joint
 from design.loop import LoopRun
 from identification.arrays import Array, IntArray
 from identification.errors import UserError
@@ -19,10 +19,10 @@ NO_IDEA = 1e3  # relative deviation of what a run says nothing of
 UNKNOWN_RIDGE = 1e-12  # of the information's scale, granted where a run says nothing
 # Share of a run that may be sensitive to chance: by the command of an actuator a fit follows it as
 # a whole, and loses its way there; where a force drives it, in windows, of which some may be lost.
-LOOSE_WHOLE, LOOSE_WINDOWS = 0.02, 0.3
+CHAOTIC_WHOLE, CHAOTIC_WINDOWS = 0.02, 0.3
 WANTED_EVENTS = 2 * EVENTS_NEEDED  # events of each kind, of which another machine may lose some
 PER_EVENT = 2.0  # log of a deviation, that each of them is worth
-PER_LOOSE = 300.0  # log of a deviation, that all of a run beyond it is taken to cost
+PER_CHAOTIC = 300.0  # log of a deviation, that all of a run beyond it is taken to cost
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,12 +34,14 @@ class Machine:
     told: Callable[[LoopRun], Information]
     whole: bool
 
-    def luck(self, told: Information) -> float:
+    def chance_penalty(self, told: Information) -> float:
         """What it costs that a part of a run is sensitive to chance."""
-        return PER_LOOSE * max(told.loose - (LOOSE_WHOLE if self.whole else LOOSE_WINDOWS), 0.0)
+        return PER_CHAOTIC * max(
+            told.loose - (CHAOTIC_WHOLE if self.whole else CHAOTIC_WINDOWS), 0.0
+        )
 
 
-def looked_at(
+def evaluated(
     machines: Sequence[Machine], r: Array
 ) -> tuple[Peaks, list[Information], list[Events]] | None:
     """Extremes over all machines along r [m], (n,), what each run identifies, and what happens in
@@ -64,20 +66,20 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
     machines for the shares of the time; and for a whole run `worth` on the machine that it
     identifies least of."""
 
-    def look(r: Array) -> Seen | None:
-        found = looked_at(machines, r)
+    def evaluate(r: Array) -> Evaluated | None:
+        found = evaluated(machines, r)
         if found is None:
             return None
         worst, told, events = found
         places = _places(told[0], asked)
         values = [
-            worth(own, places) - one.luck(own) - PER_EVENT * missing(happens, asked)
+            worth(own, places) - one.chance_penalty(own) - PER_EVENT * missing(happens, asked)
             for one, own, happens in zip(machines, told, events, strict=True)
         ]
-        return Seen(worst, min(values), told)
+        return Evaluated(worst, min(values), told)
 
-    def joint(seen: Sequence[Seen]) -> Joint:
-        told = told_by(seen)
+    def joint(seen: Sequence[Evaluated]) -> Joint:
+        told = information_by_segment(seen)
         places = _places(told[0][0], asked)
         matrices = stacked(told)
         first = [one[0] for one in told]
@@ -95,7 +97,7 @@ def precision(machines: Sequence[Machine], asked: Sequence[str]) -> Criterion:
             lambda seconds, room: d_optimal(matrices, places, seconds, room), measure, value
         )
 
-    return Criterion(look, joint)
+    return Criterion(evaluate, joint)
 
 
 def missing(happens: Events, asked: Sequence[str]) -> float:
@@ -110,7 +112,7 @@ def missing(happens: Events, asked: Sequence[str]) -> float:
     return out
 
 
-def told_by(seen: Sequence[Seen]) -> list[list[Information]]:
+def information_by_segment(seen: Sequence[Evaluated]) -> list[list[Information]]:
     """The information of each segment, a list a machine."""
     each: list[list[Information]] = [one.told for one in seen]  # type: ignore[misc]
     return [list(one) for one in zip(*each, strict=True)]

@@ -31,7 +31,7 @@ CHANGE_FACTORS = (0.6, 0.8, 0.9, 1.1, 1.25, 1.6)  # by which a change takes ampl
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class Evaluated:
     """What a reference does and its information: extremes over all plants, and a value the larger
     the better its information; told: whatever the criterion adds up over segments."""
 
@@ -40,7 +40,9 @@ class Seen:
     told: object = None
 
 
-Look = Callable[[Array], Seen | None]  # at r [m], (n,); None where the run cannot be followed
+Evaluate = Callable[
+    [Array], Evaluated | None
+]  # at r [m], (n,); None where the run cannot be followed
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +59,8 @@ class Joint:
 class Criterion:
     """What a run is to identify. look: at a reference; joint: segments that were evaluated."""
 
-    look: Look
-    joint: Callable[[Sequence[Seen]], Joint]
+    evaluate: Evaluate
+    joint: Callable[[Sequence[Evaluated]], Joint]
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +71,7 @@ class Plan:
 
     segments: tuple[Segment, ...]
     r: Array
-    seen: Seen
+    seen: Evaluated
     bound: float
     joined: float
     tried: tuple[int, int]
@@ -85,7 +87,7 @@ def best_run(
     NotIdentifiable where no segment stays within the limits, or none identifies anything.
     """
     report("segments", 0.0)
-    parts, seen = _looked_at(criterion.look, limits, h, report, keep_going)
+    parts, seen = _evaluated(criterion.evaluate, limits, h, report, keep_going)
     report("sharing the time", 0.0)
     seconds = np.array([one.seconds(h) for one in parts])
     room = limits.seconds - SEGMENT_DWELL
@@ -102,20 +104,20 @@ def best_run(
     return Plan(segments, r, one, bound, joined, (len(parts), count))
 
 
-def _looked_at(
-    look: Look, limits: MotionLimits, h: float, report: Progress, keep_going: KeepGoing
-) -> tuple[list[Segment], list[Seen]]:
+def _evaluated(
+    evaluate: Evaluate, limits: MotionLimits, h: float, report: Progress, keep_going: KeepGoing
+) -> tuple[list[Segment], list[Evaluated]]:
     """The segments that stay within the limits on every plant, and their information."""
     every = [one for one in library(limits) if allowed(one, limits, h)]
     # Mixed, so that where the time is short some of each kind have been seen.
     every = [every[i] for i in np.random.default_rng(0).permutation(len(every))]
 
-    def seen_of(i: int) -> Seen | None:
+    def seen_of(i: int) -> Evaluated | None:
         if i >= FEWEST_SEGMENTS and not keep_going():
             return None
         one = every[i]
         r = np.concatenate([np.zeros(round(SEGMENT_DWELL / h)), one.signal(h)])
-        return look(limits.home + r)
+        return evaluate(limits.home + r)
 
     parts, seen = [], []
     with ThreadPoolExecutor(RUNS_AT_ONCE) as pool:
@@ -190,7 +192,7 @@ def _in_turn(times: Array) -> list[int]:
 
 
 def _repeated(
-    parts: Sequence[Segment], seen: Sequence[Seen], seconds: Array, room: float
+    parts: Sequence[Segment], seen: Sequence[Evaluated], seconds: Array, room: float
 ) -> list[tuple[Segment, ...]]:
     """Runs of one and the same segment, of each kind that is usual the most informative one."""
     out = []
@@ -206,27 +208,27 @@ def _exchanged(
     criterion: Criterion, begun: Sequence[tuple[Segment, ...]], parts: Sequence[Segment],
     limits: MotionLimits, h: float, rng: np.random.Generator, report: Progress,
     keep_going: KeepGoing,
-) -> tuple[tuple[tuple[Segment, ...], Seen], int]:  # fmt: skip
+) -> tuple[tuple[tuple[Segment, ...], Evaluated], int]:  # fmt: skip
     """The best run that changes of one piece at a time lead to from the best of those begun with,
     and how many were tried."""
 
-    def looked(segments: tuple[Segment, ...]) -> Seen | None:
-        found = criterion.look(reference(segments, limits, h))
+    def evaluated(segments: tuple[Segment, ...]) -> Evaluated | None:
+        found = criterion.evaluate(reference(segments, limits, h))
         return found if found is not None and found.peaks.share_of(limits) <= OF_A_LIMIT else None
 
-    looks = [(one, looked(one)) for one in begun if one]
+    looks = [(one, evaluated(one)) for one in begun if one]
     best = max(looks, key=lambda one: -np.inf if one[1] is None else one[1].value)
     count, stale, chosen = len(looks), 0, best[0]
     while best[1] is None and chosen:  # a run as a whole may go further than its pieces
         chosen = tuple(one.changed(0.9, 1.0) for one in chosen)
-        best = (chosen, looked(chosen))
+        best = (chosen, evaluated(chosen))
         count += 1
         if count > STALE_CHANGES:
             raise NotIdentifiable("no run within the limits was found; widen them")
     with ThreadPoolExecutor(RUNS_AT_ONCE) as pool:
         while stale < STALE_CHANGES and keep_going():
             trials = [_changed(best[0], parts, limits, h, rng) for _ in range(RUNS_AT_ONCE)]
-            for segments, found in zip(trials, pool.map(looked, trials), strict=True):
+            for segments, found in zip(trials, pool.map(evaluated, trials), strict=True):
                 count += 1
                 better = found is not None and best[1] is not None
                 if better and found is not None and found.value > (best[1] or found).value:

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from design.experiment.allocation import t_optimal
-from design.experiment.precision import Machine, looked_at, stacked, told_by
-from design.experiment.search import Criterion, Joint, Seen
+from design.experiment.precision import Machine, evaluated, information_by_segment, stacked
+from design.experiment.search import Criterion, Evaluated, Joint
 from identification.arrays import Array
 from identification.experiment.information import Information
-from identification.experiment.structures import NO_EFFECT, told_apart
+from identification.experiment.structures import NO_EFFECT, discriminated
 
 NEGLIGIBLE_CHANGE = 1.0  # square in units of the noise, beside which a difference begins to count
 
@@ -40,23 +40,23 @@ def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
     """The criterion: the mean, over pairs and machines, of the log of what discriminates them."""
 
     def value_of(matrix: Array, pairs: Sequence[Pair]) -> float:
-        left = [told_apart(matrix, one.one, one.others) for one in pairs]
+        left = [discriminated(matrix, one.one, one.others) for one in pairs]
         return float(np.mean(np.log(np.array(left) + NEGLIGIBLE_CHANGE)))
 
-    def look(r: Array) -> Seen | None:
-        found = looked_at(machines, r)
+    def evaluate(r: Array) -> Evaluated | None:
+        found = evaluated(machines, r)
         if found is None:
             return None
         worst, told, _ = found
         pairs = pairs_of(told[0], keys)
         values = [
-            value_of(own.matrix, pairs) - one.luck(own)
+            value_of(own.matrix, pairs) - one.chance_penalty(own)
             for one, own in zip(machines, told, strict=True)
         ]
-        return Seen(worst, min(values), told)
+        return Evaluated(worst, min(values), told)
 
-    def joint(seen: Sequence[Seen]) -> Joint:
-        told = told_by(seen)
+    def joint(seen: Sequence[Evaluated]) -> Joint:
+        told = information_by_segment(seen)
         pairs, matrices = pairs_of(told[0][0], keys), stacked(told)
 
         def measure(times: Array) -> float:
@@ -69,4 +69,4 @@ def separation(machines: Sequence[Machine], keys: Sequence[str]) -> Criterion:
             lambda seconds, room: t_optimal(matrices[0], pairs, seconds, room), measure, value
         )
 
-    return Criterion(look, joint)
+    return Criterion(evaluate, joint)

@@ -31,9 +31,9 @@ from identification.drift.mewma import (
     variation,
 )
 from identification.drift.own_misfit import own_misfit
-from identification.drift.practical_margin import explained_change, moved, told_apart
-from identification.drift.reference_model import COULOMB, InForce
-from identification.drift.single_log import LogChange, seen_alone, seen_together
+from identification.drift.practical_margin import discriminated, explained_change, moved
+from identification.drift.reference_model import COULOMB, ReferenceModel
+from identification.drift.single_log import LogChange, detectable_alone, detectable_together
 from identification.errors import BadSpecification, NotIdentifiable
 from identification.log import Log
 from identification.model.karnopp import NAMES
@@ -78,7 +78,7 @@ class DriftSettings:
 
 
 def drift_test(
-    model: InForce,
+    model: ReferenceModel,
     log: Log,
     rng: np.random.Generator,
     *,
@@ -103,11 +103,11 @@ def drift_test(
             f" {found.chi_square:.3g}, at most {found.allowed:.3g} allowed); trace it"
         )
         return _silent(log.name, "structure", reason, {}, found, state)
-    return judged_estimate(model, found, log.name, state, settings)
+    return tested_estimate(model, found, log.name, state, settings)
 
 
-def judged_estimate(
-    model: InForce, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
+def tested_estimate(
+    model: ReferenceModel, found: LogEstimate, log: str, state: DriftState, settings: DriftSettings
 ) -> DriftTest:
     """The verdict on a log whose parameters have been estimated."""
     change, own, _ = relative_change(model, found)
@@ -123,7 +123,7 @@ def judged_estimate(
     in_force = misfit.of_model(model.covariance / np.outer(model.scales, model.scales))
     varied = variation(state, settings.variation)
     measured = own + in_force
-    reasons = _not_judged(model, found, log, (change, measured + np.diag(varied)), settings)
+    reasons = _inconclusive(model, found, log, (change, measured + np.diag(varied)), settings)
     told = np.array([name not in reasons for name in model.names])
     if not np.any(told):
         first = next(iter(reasons.values()), "")
@@ -183,15 +183,15 @@ class _Tests:
         here, over = self.here, self.over
         of_log = np.min(
             [
-                seen_alone(here, self.alone.threshold),
+                detectable_alone(here, self.alone.threshold),
                 np.maximum(
-                    seen_together(here.beyond_margin, self.single.threshold),
-                    seen_together(here.beyond_usual, self.single.threshold),
+                    detectable_together(here.beyond_margin, self.single.threshold),
+                    detectable_together(here.beyond_usual, self.single.threshold),
                 ),
             ],
             axis=0,
         )
-        lasting = dict(zip(over.at, seen_together(over, self.mean.threshold), strict=True))
+        lasting = dict(zip(over.at, detectable_together(over, self.mean.threshold), strict=True))
         return {
             names[i]: float(min(size, lasting.get(i, np.inf)))
             for i, size in zip(here.at, of_log, strict=True)
@@ -216,7 +216,9 @@ def at_bound(change: float) -> bool:
     return change <= -VANISHED
 
 
-def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: DriftSettings) -> str:
+def too_coarse(
+    model: ReferenceModel, seen: Mapping[str, float], log: str, settings: DriftSettings
+) -> str:
     """Why "none" cannot be said of a log without an alarm; "" where it can.
 
     Friction that changes shows in the Coulomb levels first: every one that the model identifies has
@@ -240,8 +242,8 @@ def too_coarse(model: InForce, seen: Mapping[str, float], log: str, settings: Dr
     )
 
 
-def _not_judged(
-    model: InForce, found: LogEstimate, log: str, seen: tuple[Array, Array],
+def _inconclusive(
+    model: ReferenceModel, found: LogEstimate, log: str, seen: tuple[Array, Array],
     settings: DriftSettings,
 ) -> dict[str, str]:  # fmt: skip
     """Parameters on which this log is inconclusive, with the reason; seen: the change (d,) and its
@@ -272,7 +274,7 @@ def _statistic(found: Mean, threshold: float) -> Statistic:
 
 
 def _moved(
-    model: InForce, found: Mean, log: LogChange
+    model: ReferenceModel, found: Mean, log: LogChange
 ) -> tuple[tuple[Shift, ...], tuple[str, ...]]:
     """Parameters that surely changed, largest first, by how much on this log; and the names of
     those that may have.
@@ -282,7 +284,7 @@ def _moved(
     """
     here = log.nearer
     chosen = moved(found.change, found.covariance, found.margin)
-    sure, unsure = told_apart(found.change, found.covariance, found.margin, chosen)
+    sure, unsure = discriminated(found.change, found.covariance, found.margin, chosen)
     names = {found.at[k] for k in sure}
     size_here = dict(zip(here.at, np.abs(here.change).tolist(), strict=True))
     size_mean = dict(zip(found.at, np.abs(found.change).tolist(), strict=True))
@@ -299,7 +301,7 @@ def _moved(
     return shifts, tuple(model.names[found.at[k]] for k in unsure)
 
 
-def _shifts(model: InForce, found: Mean) -> dict[str, Shift]:
+def _shifts(model: ReferenceModel, found: Mean) -> dict[str, Shift]:
     """Every tested parameter by itself."""
     sd = np.sqrt(np.diag(found.covariance))
     return {
@@ -308,7 +310,7 @@ def _shifts(model: InForce, found: Mean) -> dict[str, Shift]:
     }
 
 
-def _shift(model: InForce, i: int, change: float, sd: float) -> Shift:
+def _shift(model: ReferenceModel, i: int, change: float, sd: float) -> Shift:
     scale = float(model.scales[i])
     before = float(model.values[i])
     sign = -1.0 if before < 0 else 1.0

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.arrays import Array, BoolArray
-from identification.drift.reference_model import InForce
+from identification.drift.reference_model import ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.estimation.fit import fit_plant
 from identification.estimation.imposed_motion import fit_imposed
@@ -40,7 +40,7 @@ class LogEstimate:
         return self.chi_square <= self.allowed
 
 
-def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstimate:
+def estimate_log(model: ReferenceModel, log: Log, rng: np.random.Generator) -> LogEstimate:
     """The parameters of an active model, as this log alone identifies them.
 
     Raises NotIdentifiable where nothing moves, or where effects would have to show under a
@@ -61,7 +61,7 @@ def estimate_log(model: InForce, log: Log, rng: np.random.Generator) -> LogEstim
     return _of_fit(found, 0.0 if found.imposed else allowed_misfit(model.chi_square))
 
 
-def relative_change(model: InForce, found: LogEstimate) -> tuple[Array, Array, BoolArray]:
+def relative_change(model: ReferenceModel, found: LogEstimate) -> tuple[Array, Array, BoolArray]:
     """Change (d,) of the model's parameters in their scales, positive where the size grows, its
     covariance (d, d) without the model's own error, and which of them (d,) the log identifies."""
     sign = np.where(model.values < 0, -1.0, 1.0)

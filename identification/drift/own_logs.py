@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.drift.log_estimate import LogEstimate, estimate_log, relative_change
-from identification.drift.reference_model import InForce, OwnLogs
+from identification.drift.reference_model import OwnLogs, ReferenceModel
 from identification.errors import NotIdentifiable
 from identification.log import Log
 from identification.thresholds import COMPLETE
@@ -22,7 +22,9 @@ LOG_PARTS = 3  # stretches of a single log
 LEAST_STRETCH = 3.0  # s, of a stretch that is informative by itself
 
 
-def with_own_logs(model: InForce, logs: Sequence[Log], rng: np.random.Generator) -> InForce:
+def with_own_logs(
+    model: ReferenceModel, logs: Sequence[Log], rng: np.random.Generator
+) -> ReferenceModel:
     """The model with what its own logs say of it, each of them alone.
 
     logs: those that it was fitted on. A single one is cut into parts where more than noise is left
@@ -48,7 +50,9 @@ def _stretches(log: Log) -> list[Log]:
     return [log.part(int(a), int(b)) for a, b in pairwise(edges)]
 
 
-def own_logs_of(model: InForce, found: Sequence[LogEstimate], parts: bool = False) -> OwnLogs:
+def own_logs_of(
+    model: ReferenceModel, found: Sequence[LogEstimate], parts: bool = False
+) -> OwnLogs:
     """How far the estimates of a model's own logs, two at least, lie from it."""
     scale = np.outer(model.scales, model.scales)
     changes, apart = [], []

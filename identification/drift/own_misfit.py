@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from identification.arrays import Array
-from identification.drift.reference_model import InForce
+from identification.drift.reference_model import ReferenceModel
 from identification.thresholds import ADEQUATE, CHANCE_LEVEL, LIKE, LOST_FIT
 
 
@@ -48,7 +48,7 @@ def _at_least(covariance: Array, variance: Array) -> Array:
     return np.asarray(covariance + np.diag(np.maximum(variance - np.diag(covariance), 0.0)))
 
 
-def own_misfit(model: InForce) -> OwnMisfit:
+def own_misfit(model: ReferenceModel) -> OwnMisfit:
     """Of the model's own logs; nothing where it left noise alone, or they are not known.
 
     These logs were among those that the model was fitted on: a new one lies farther from it, as

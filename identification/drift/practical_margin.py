@@ -78,7 +78,7 @@ def moved(change: Array, covariance: Array, margin: Array) -> tuple[int, ...]:
     return tuple(chosen)
 
 
-def told_apart(
+def discriminated(
     change: Array, covariance: Array, margin: Array, chosen: tuple[int, ...]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """Those of `chosen` that surely moved, and the group of which others may have in their place.

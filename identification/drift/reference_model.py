@@ -23,9 +23,9 @@ class OwnLogs:
     """How far the logs of a model lie from it, each estimated alone as a new one is.
 
     names (d,): parameters; scatter (d,): root mean square over the logs of the change from the
-    model, relative to `InForce.scales`, None where no log identifies the parameter. apart (n,):
-    square distance of each log from the model in the covariance of both fits, over the number of
-    parameters; left (n,): misfit of its own fit. parts: they are stretches of one log. Raises
+    model, relative to `ReferenceModel.scales`, None where no log identifies the parameter. apart
+    (n,): square distance of each log from the model in the covariance of both fits, over the number
+    of parameters; left (n,): misfit of its own fit. parts: they are stretches of one log. Raises
     BadModel where sizes differ.
     """
 
@@ -51,7 +51,7 @@ class OwnLogs:
 
 
 @dataclass(frozen=True, eq=False)
-class InForce:
+class ReferenceModel:
     """A machine's model against which its new logs are tested, in SI.
 
     names (d,): parameters in the order of `values` (d,) and `covariance` (d, d), effects' as
@@ -122,14 +122,14 @@ class InForce:
         return found
 
 
-def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> InForce:
+def in_force(fit: KarnoppFit, rig: Rig, key: str = "", fastest: float = 0.0) -> ReferenceModel:
     """The model of a fit as the active one; fastest [m/s]: speed in its logs, 0 if unknown."""
     untold = {n: e.reason or "" for n, e in fit.estimates.items() if not e.known}
     friction = fit.friction
     every = {name: float(getattr(friction, name)) for name in fit.free if hasattr(friction, name)}
     if isinstance(fit.actuator, Actuator):
         every |= {"k1": fit.actuator.k1, "k2": fit.actuator.k2}
-    return InForce(
+    return ReferenceModel(
         plant=Plant(friction, fit.actuator, fit.effects),
         names=fit.free,
         values=np.array([every[name] for name in fit.free]),

@@ -69,7 +69,7 @@ class LogChange:
         return np.sqrt(np.diag(self.beyond_usual.covariance))
 
 
-def seen_alone(found: LogChange, square: float) -> Array:
+def detectable_alone(found: LogChange, square: float) -> Array:
     """Smallest change (k,) of each parameter that its own test sees, with a power of CHANCE_TO_SEE.
 
     square: threshold of the largest of `alone`, squared. The power is over the errors of the log
@@ -80,7 +80,7 @@ def seen_alone(found: LogChange, square: float) -> Array:
     return np.asarray(np.maximum(beyond, limit * found.sd + more * found.measured_sd))
 
 
-def seen_together(found: Mean, square: float) -> Array:
+def detectable_together(found: Mean, square: float) -> Array:
     """Smallest change (k,) of one parameter that the test of all together sees, or at most that.
 
     square: its threshold. By how far the change lies from the margin's box without errors: errors

@@ -72,7 +72,7 @@ def axis_equation(log: Log, *, held: bool) -> AxisEquation:
             f" least {FEWEST_SLIDING} of each needed; log strokes in both directions"
         )
     rows, theta = _settled(one)
-    used, theta, each = _told_apart(rows)
+    used, theta, each = _discriminated(rows)
     spread = np.hypot(spread_of_left_out(each), OF_EQUATION * np.abs(theta))
     names = [rows.names[k] for k in used]
     values = dict(zip(names, theta.tolist(), strict=True))
@@ -100,7 +100,7 @@ def _settled(one: MotionLog) -> tuple[Rows, Array]:
     return mechanical(one, np.maximum(theta, 0.0)), theta
 
 
-def _told_apart(rows: Rows) -> tuple[list[int], Array, Array]:
+def _discriminated(rows: Rows) -> tuple[list[int], Array, Array]:
     """The columns that the log tells apart, their parameters (k,), and these without each stretch
     of the log in turn (b, k): all, else without mass, else without viscous friction too.
 

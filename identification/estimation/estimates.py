@@ -2,7 +2,7 @@
 
 A number that the log does not support is not given: a parameter without the events that carry it,
 without an interval, with one wider than itself, or at a bound is reported as None with the reason.
-`told_estimate` is that rule, for every command and file: friction, actuator and effects alike.
+`reported_estimate` is that rule, for every command and file: friction, actuator and effects alike.
 """
 
 from collections.abc import Mapping, Sequence
@@ -64,7 +64,7 @@ def events_of(modes: Sequence[IntArray], speeds: Sequence[Array], force: float =
     return Events((s0, s1), (c0, c1), (n0, n1), (v0, v1), force)
 
 
-def told_estimate(
+def reported_estimate(
     value: float, unit: str, sd: float | None, *, interval: tuple[float, float] | None = None,
     bounds: tuple[float, float] = (-np.inf, np.inf), at_bound: float = AT_ZERO, beside: float = 0.0,
 ) -> Estimate:  # fmt: skip
@@ -138,7 +138,7 @@ def estimates(
         else:
             bounds = (-np.inf, 0.0) if name in NEGATIVE else (0.0, np.inf)
             beside = _beside(name, value_of, events)
-            found[name] = told_estimate(
+            found[name] = reported_estimate(
                 value, units[name], sd, interval=(low, high), bounds=bounds, beside=beside,
                 at_bound=max(AT_ZERO, NOTHING_OF * _scale(name, events)),
             )  # fmt: skip
@@ -216,7 +216,7 @@ def of_effect(p: Param, value: float, sd: float | None) -> Estimate:
     if p.held(value) and not sd:
         return Estimate(value, p.unit, reason=HELD)
     share = p.name == "asymmetry" or p.name in AT_REST  # of the effect itself
-    return told_estimate(
+    return reported_estimate(
         value, p.unit, sd, bounds=(p.low, p.high), at_bound=LEAST_SD * abs(p.typical or 1.0),
         beside=1.0 if share else 0.0,
     )  # fmt: skip

@@ -63,9 +63,9 @@ from identification.thresholds import (
     COMPLETE,
     CONTRADICTS_EQUATION,
     NO_RUN,
-    PLACES_SET_ASIDE,
+    PLACES_EXCLUDED,
     RUN_ASTRAY,
-    SHARE_SET_ASIDE,
+    SHARE_EXCLUDED,
     WORSE_THAN_EQUATION,
 )
 
@@ -253,8 +253,8 @@ def are_few(bad: Sequence[BadSamples], logs: Sequence[MotionLog]) -> bool:
         by_log.setdefault(one.log, []).append(one.samples)
     lengths = {one.log.name: len(one.log) for one in logs}
     return all(
-        len(found) <= PLACES_SET_ASIDE
-        and sum(found) <= max(PLACES_SET_ASIDE, SHARE_SET_ASIDE * lengths.get(name, 0))
+        len(found) <= PLACES_EXCLUDED
+        and sum(found) <= max(PLACES_EXCLUDED, SHARE_EXCLUDED * lengths.get(name, 0))
         for name, found in by_log.items()
     )
 

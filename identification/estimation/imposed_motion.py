@@ -17,7 +17,7 @@ from identification.estimation.estimates import (
     Events,
     estimates,
     normal_samples,
-    told_estimate,
+    reported_estimate,
 )
 from identification.estimation.recorded_logs import RecordedLogs
 from identification.estimation.regression.equation_rows import (
@@ -324,7 +324,7 @@ def _falling(fit: ForceFit, recorded: RecordedLogs) -> dict[str, Estimate]:
     units = units_of(recorded.rig.motion)
     found = zip(fit.used, fit.theta, np.sqrt(np.diag(fit.covariance)), strict=True)
     return {
-        FIVE[i]: told_estimate(float(slope), units[FIVE[i]], float(sd))
+        FIVE[i]: reported_estimate(float(slope), units[FIVE[i]], float(sd))
         for i, slope, sd in found
         if FIVE[i] in VISCOUS_NAMES and slope < 0.0
     }

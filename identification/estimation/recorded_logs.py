@@ -26,7 +26,7 @@ from identification.estimation.regression.weighted_rows import Fitted, solve_row
 from identification.log import Log, Rig
 from identification.model.estimates import Drive
 from identification.progress import Halt
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.signals.thin import at_needed_rate
 from identification.thresholds import LINEAR_ACTUATOR
@@ -120,7 +120,7 @@ def with_clocks(
 def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
     """A line on each log whose clock jitters so that it shows."""
     return tuple(
-        Aside(
+        MinorRemark(
             f"{one.log.name}: its clock jitters by {1e6 * one.jitter:.2g} us, so in motion the"
             " position is unsure by that times its speed"
         )
@@ -132,7 +132,7 @@ def clock_remarks(logs: Sequence[MotionLog]) -> tuple[str, ...]:
 def slower_remarks(logs: Sequence[Log], slower: Sequence[Log]) -> tuple[str, ...]:
     """A line on each log that was brought to a slower clock."""
     return tuple(
-        Aside(
+        MinorRemark(
             f"{log.name}: of its samples every {log.h:.4g} s a mean was taken every"
             f" {less.h:.4g} s: nothing but noise lies between"
         )
@@ -146,7 +146,7 @@ def with_share(recorded: RecordedLogs, share: float) -> RecordedLogs:
     if share == 0.0:
         return recorded
     means = [between_samples(one.log, share, recorded.held) for one in recorded.logs]
-    said = Aside(
+    said = MinorRemark(
         f"the command changes between the samples of {recorded.name}, as of a loop that is faster:"
         f" taken as its mean until the next sample ({share:.2g} of the step to it)"
     )

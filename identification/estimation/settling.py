@@ -49,7 +49,7 @@ from identification.model.estimates import Estimate, KarnoppFit, LogFit
 from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Plant, units_of
 from identification.progress import Progress
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun
 from identification.simulation.karnopp_step import K1, K2, kernel_parameters
@@ -222,11 +222,11 @@ def _why_windows(recorded: RecordedLogs) -> str:
     """What to say of a fit that follows its logs in windows."""
     walk = max(one.walk for one in recorded.logs)
     if walk == 0.0:
-        return Aside(
+        return MinorRemark(
             "the model follows the logs in windows of 2 s from measured states, but not the whole:"
             " a stop turns on less than the noise there"
         )
-    return Aside(
+    return MinorRemark(
         "the logged command has noise of its own: integrated, it takes the force"
         f" {walk / np.sqrt(recorded.logs[0].log.h):.2g} N away in 1 s (one sigma); the model's"
         " force is corrected by the measured one for it, in windows of 2 s"
@@ -314,13 +314,15 @@ def _remarks(spread: Spread, recorded: RecordedLogs) -> Sequence[str]:
     if not spread.adequate:
         # The summary of a model says it too.
         out.append(
-            Aside(
+            MinorRemark(
                 f"{_off(spread, recorded)}: an effect is missing, or the structure is wrong; run"
                 " 'workbench trace' to find it; intervals are widened for it"
             )
         )
     if recorded.drive == "force":
-        out.append(Aside("driven by the measured force, in windows of 2 s from measured states"))
+        out.append(
+            MinorRemark("driven by the measured force, in windows of 2 s from measured states")
+        )
     return out
 
 
@@ -330,7 +332,7 @@ def _off(spread: Spread, recorded: RecordedLogs) -> str:
     force = units_of(recorded.rig.motion)["F_cp"]
     y = [one.position_rms for one in spread.logs]
     F = [one.force_rms for one in spread.logs if one.force_rms is not None]
-    said = f"the run is off by {factor * max(y):.3g} {unit} rms in position"
+    said = f"the run has an error of {factor * max(y):.3g} {unit} rms in position"
     said += f" (sensor's noise {factor * spread.noise[0]:.2g} {unit})"
     if F:
         said += f" and {max(F):.3g} {force} in force (noise {spread.noise[1]:.2g} {force})"

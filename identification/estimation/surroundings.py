@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.arrays import Array, BoolArray
 from identification.errors import NotIdentifiable, UserError
-from identification.estimation.estimates import of_effect, told_estimate
+from identification.estimation.estimates import of_effect, reported_estimate
 from identification.estimation.recorded_logs import chosen_drive
 from identification.estimation.regression.equation_rows import (
     NOTHING_KNOWN,
@@ -36,6 +36,7 @@ from identification.estimation.regression.weighted_rows import (
 from identification.estimation.turn_orders import turn_orders
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
+from identification.model.karnopp import NAMES
 from identification.model.size import NOT_SHOWN, Size
 from identification.model.surroundings import (
     NO_SURROUNDINGS,
@@ -58,6 +59,7 @@ TURNS = 0.3  # rad of motion, from which gravity is no constant force
 PLAIN = (0, 1, 2, 3, 4)  # columns of the equation, in the order of FIVE
 SPRING = (*PLAIN, 5)  # with the angle itself
 GRAVITY = (*PLAIN, 6, 7)  # with its sine and cosine
+OF_TAKEN_OUT = 1e-3  # of a value, by which it errs where a force was taken out first
 WHOLE_NUMBER = "exact: a whole number of times in a turn"
 
 
@@ -196,29 +198,39 @@ def surrounding_estimates(around: Surroundings) -> dict[str, Estimate]:
 def widened_friction(
     friction: Mapping[str, Estimate], around: Surroundings, logs: Sequence[Log]
 ) -> dict[str, Estimate]:
-    """F_cp and F_cn, their intervals with what is unsure of a force that was taken out before them.
+    """The nine, their intervals with what is unsure of a force that was taken out before them.
 
-    A constant force moves both by all of its error, gravity by the mean that its sine and cosine
-    have in motion that way.
+    A constant force moves F_cp and F_cn by all of its error, gravity by the mean that its sine and
+    cosine have in motion that way; every one errs by a share of itself, since the force was put
+    right between its samples.
     """
     moves = [np.diff(np.asarray(log["y"])) for log in logs]
     angles = np.concatenate([np.asarray(log["y"])[1:] for log in logs])
     up = np.concatenate(moves) > 0.0
+    ways = {"F_cp": up, "F_cn": ~up}
     out: dict[str, Estimate] = {}
-    for name, way in (("F_cp", up), ("F_cn", ~up)):
-        one = friction[name]
-        if one.value is None or one.sd is None or one.low is None or one.high is None:
+    for name, one in friction.items():
+        if (
+            name not in NAMES
+            or one.value is None
+            or one.sd is None
+            or one.low is None
+            or one.high is None
+        ):
             continue
-        parts = [around.force.sd]
-        if np.any(way):
+        parts = [OF_TAKEN_OUT * one.value]
+        if name in ways:
+            parts.append(around.force.sd)
+        if name in ways and np.any(ways[name]):
             parts += [
-                size.sd * abs(float(np.mean(wave(angles[way]))))
+                size.sd * abs(float(np.mean(wave(angles[ways[name]]))))
                 for size, wave in ((around.sine, np.sin), (around.cosine, np.cos))
             ]
         more = float(np.linalg.norm(parts))
         wider = float(np.hypot(one.sd, more)) / one.sd
         low, high = (one.value + wider * (end - one.value) for end in (one.low, one.high))
-        out[name] = replace(one, sd=wider * one.sd, low=max(low, 0.0), high=high)
+        least = 0.0 if one.value > 0.0 else -np.inf
+        out[name] = replace(one, sd=wider * one.sd, low=max(low, least), high=high)
     return out
 
 
@@ -226,7 +238,7 @@ def lag_estimate(around: Surroundings) -> Estimate | None:
     """By how much the motion follows the column of the force [s]; None where it does not."""
     if not around.lag.value:
         return None
-    return told_estimate(around.lag.value, "s", around.lag.sd)
+    return reported_estimate(around.lag.value, "s", around.lag.sd)
 
 
 def lag_explains(logs: Sequence[Log], rig: Rig, around: Surroundings) -> tuple[float, float]:

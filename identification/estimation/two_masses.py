@@ -22,7 +22,7 @@ from scipy.signal import cont2discrete, lfilter
 
 from identification.arrays import Array
 from identification.errors import UserError
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.estimation.regression.equation_rows import motion_log
 from identification.estimation.regression.weighted_rows import spread_of_left_out
 from identification.log import Log, Rig
@@ -105,7 +105,7 @@ def of_two_masses(fit: KarnoppFit, found: Resonance) -> KarnoppFit:
     sizes["F_vn"] = found.F_vn
     values = {name: max(one.value, 0.0) for name, one in sizes.items()}
     told = {
-        name: told_estimate(one.value, fit.estimates[name].unit, one.sd, bounds=(0.0, np.inf))
+        name: reported_estimate(one.value, fit.estimates[name].unit, one.sd, bounds=(0.0, np.inf))
         for name, one in sizes.items()
     }
     return replace(
@@ -120,7 +120,7 @@ def resonance_estimates(found: Resonance, rig: Rig) -> dict[str, Estimate]:
         "frequency": (found.frequency, "Hz"), "anti_resonance": (found.anti_resonance, "Hz"),
         "damping": (found.damping, "1"), "m_1": (found.m_1, unit), "m_2": (found.m_2, unit),
     }  # fmt: skip
-    return {name: told_estimate(one.value, unit, one.sd) for name, (one, unit) in sizes.items()}
+    return {name: reported_estimate(one.value, unit, one.sd) for name, (one, unit) in sizes.items()}
 
 
 def _told(p: Array, cut: Sequence[_Window], h: float, damping: float) -> Resonance | None:

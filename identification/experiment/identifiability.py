@@ -18,7 +18,7 @@ from identification.estimation.regression.three_step import first_estimate
 from identification.estimation.windowed_run.run_errors import judge
 from identification.estimation.windowed_run.windows import RUN_WINDOW
 from identification.experiment.information import information
-from identification.experiment.structures import looked_for, structures, told_apart
+from identification.experiment.structures import discriminated, sought, structures
 from identification.model.estimates import NORMAL_95
 from identification.model.karnopp import NAMES, NEGATIVE, Karnopp
 from identification.model.plant import Actuator, Motor, Plant
@@ -30,7 +30,7 @@ from identification.thresholds import GATE_MARGIN, WIDEST_SD
 NO_SURER = {
     "m": 0.01, "F_c": 0.005, "F_v": 0.005, "dv_": 0.05, "F_s": 0.01, "k1": 0.002, "k2": 0.002,
 }  # fmt: skip
-NO_SURER_LOOSE = {"m": 0.1, "F_c": 0.03, "F_v": 0.04, "dv_": 0.12, "F_s": 0.01}
+NO_SURER_CHAOTIC = {"m": 0.1, "F_c": 0.03, "F_v": 0.04, "dv_": 0.12, "F_s": 0.01}
 LEAST_SHARE_OF_FIRST = 1e-9  # of a first estimate, or its run could not be changed by a share of it
 
 
@@ -60,7 +60,7 @@ def identifiability(recorded: RecordedLogs) -> dict[str, Tellable]:
     except UserError:
         return {}
     relative = np.sqrt(np.diag(told.covariance)) / told.unit
-    least = NO_SURER if recorded.by_command else NO_SURER_LOOSE
+    least = NO_SURER if recorded.by_command else NO_SURER_CHAOTIC
     return {
         name: Tellable(name, max(NORMAL_95 * GATE_MARGIN * float(sd), least[name[:3]]))
         for name, sd in zip(told.names, relative, strict=True)
@@ -92,7 +92,7 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
     plant = first_plant(recorded)
     y = np.concatenate([log["y"] for log in recorded.plain])
     stroke = (float(np.min(y)), float(np.max(y)))
-    rivals = [looked_for(one, plant, stroke) for one in library.values() if not one.signals]
+    rivals = [sought(one, plant, stroke) for one in library.values() if not one.signals]
     try:
         errors_of = judge(plant, recorded.logs, recorded.drive, RUN_WINDOW)
         told = structures(plant, rivals, errors_of, recorded.drive, lost=np.inf)
@@ -100,4 +100,4 @@ def tellable_effects(recorded: RecordedLogs, library: Library) -> dict[str, floa
         return {}
     own = range(len(told.names) - len(rivals))
     place = {one.key: len(own) + i for i, one in enumerate(rivals)}
-    return {key: float(np.sqrt(told_apart(told.matrix, at, own))) for key, at in place.items()}
+    return {key: float(np.sqrt(discriminated(told.matrix, at, own))) for key, at in place.items()}

@@ -36,7 +36,7 @@ LEAST_NOISE = 1e-12  # N or m, of a signal that is taken to be exact
 LASTING_STEP = 1e-3  # of a parameter, over which a sensitivity has to hold to be counted on
 LASTING_SHARE = 0.1  # of a sensitivity, by which it may differ to either side over that step
 # in units of the noise, difference of both sides from which a run is sensitive to chance
-BY_LUCK = 3.0
+BY_CHANCE = 3.0
 NOT_FOLLOWED = 6.0  # in units of the noise, error of the plant itself at which it is not followed
 
 
@@ -119,7 +119,7 @@ def lasting_jacobian(
     apart = np.abs(up - down)
     lasts = apart <= LASTING_SHARE * np.maximum(np.abs(up), np.abs(down))
     lasts &= (np.abs(here) < lost)[:, np.newaxis] & np.isfinite(apart)
-    luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_LUCK), axis=1)
+    luck = np.any(~lasts & ~(apart * LASTING_STEP < BY_CHANCE), axis=1)
     return np.where(lasts, 0.5 * (up + down), 0.0), float(np.mean(luck))
 
 

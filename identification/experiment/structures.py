@@ -24,13 +24,13 @@ from identification.model.estimates import Drive
 from identification.model.plant import Plant
 
 NO_EFFECT = "no effect"
-LOOKED_FOR_SIZE = 0.15  # of the Coulomb level, force of an effect that is looked for
+SOUGHT_SIZE = 0.15  # of the Coulomb level, force of an effect that is looked for
 END_PLACES = {"y_p": 0.6, "y_n": -0.6}  # of half the stroke, places at which its ends begin
 FAR_CHANGE = 10.0  # in units of the noise, from which what an effect changes counts less
 DIRECTION_RIDGE = 1e-9  # of the information's scale, below which a direction is rounding
 
 
-def looked_for(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Acting:
+def sought(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Acting:
     """The effect at a size that matters on this plant, at a place within the stroke [m]."""
     coulomb = 0.5 * (plant.friction.F_cp + plant.friction.F_cn)
     home, reach = 0.5 * (stroke[0] + stroke[1]), 0.5 * (stroke[1] - stroke[0])
@@ -39,7 +39,7 @@ def looked_for(effect: Effect, plant: Plant, stroke: tuple[float, float]) -> Act
     for p in effect.params:
         value = p.typical if p.default is None or p.linear else p.default
         if _is_force(p):
-            value *= LOOKED_FOR_SIZE * coulomb / largest
+            value *= SOUGHT_SIZE * coulomb / largest
         elif p.role == "place":
             value = home + 0.4 * reach
         elif p.role == "width":
@@ -81,7 +81,7 @@ def structures(
     )
 
 
-def told_apart(matrix: Array, one: int, others: Sequence[int]) -> float:
+def discriminated(matrix: Array, one: int, others: Sequence[int]) -> float:
     """Square of what effect `one` changes and the directions `others` do not make up for."""
     at = np.array(others, dtype=np.int64)
     M, b = matrix[np.ix_(at, at)], matrix[at, one]

@@ -32,7 +32,7 @@ from identification.frequency.stretches import INDEPENDENT, REACHES, Band, Compl
 COHERENCE_SEEN = 0.5  # coherence from which a response is drawn
 COHERENCE_SURE = 0.8  # coherence from which it is relied on
 FEWEST_AVERAGES = 4.0
-LUCKY_COHERENCE = 0.01  # that so much coherence is chance, at most
+CHANCE_COHERENCE = 0.01  # that so much coherence is chance, at most
 DEGREE = 2  # of a response over its neighbours
 RIDGE = 1e-12  # of the diagonal, that keeps what is all but singular from being so
 BINS_OF_ONE = 1.5  # bins that Hann's window makes one of
@@ -79,7 +79,7 @@ class Response:
     def seen(self) -> BoolArray:
         """Where the logs show it: enough averages, and more coherence than chance gives, (k,)."""
         free = np.maximum(self.averages - 1.0, 1e-9)
-        luck = 1.0 - LUCKY_COHERENCE ** (1.0 / free)
+        luck = 1.0 - CHANCE_COHERENCE ** (1.0 / free)
         enough = self.averages >= FEWEST_AVERAGES
         return np.asarray(enough & (self.coherence >= np.maximum(COHERENCE_SEEN, luck)))
 

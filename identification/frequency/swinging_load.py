@@ -38,13 +38,13 @@ from identification.frequency.stretches import (
 )
 from identification.model.resonance import load_acceleration
 
-HERTZ_LOOKED_AT = 20  # anti-resonances tried, on a scale of ratios
-DAMPING_LOOKED_WITH = 0.02
+HERTZ_TRIED = 20  # anti-resonances tried, on a scale of ratios
+DAMPING_TRIED = 0.02
 FINER, FINER_STEPS = (0.5, 0.25, 0.12), (-1.0, 1.0)  # of their distance, around the best
 DAMPINGS_TRIED = (0.005, 0.01, 0.04, 0.08)
 FROM_LOWEST = 4.0  # times the lowest frequency, from which on
-BANDS_LOOKED_AT = 2  # of the longest stretches
-SAMPLES_LOOKED_AT = 150_000  # of the longest runs, after which no further one is
+BANDS_TRIED = 2  # of the longest stretches
+SAMPLES_TRIED = 150_000  # of the longest runs, after which no further one is
 RESTS_AT_LEAST = 0.03  # of the samples, below which no load hides
 LEAVES_LESS = 0.25  # mean logarithm of what is left, by which a load has to leave less
 SHARE_BOUNDS = (0.02, 0.98)  # of the mass, that is a load
@@ -85,15 +85,15 @@ def swinging_load(runs: Sequence[Recording], rests: Sequence[Rests], mass: float
     runs = [one for one, _ in both]
     looked_at = [
         _Looked(band, names, [[coefficients_of(one, band, k) for k in names] for one in runs], both)
-        for band in cut(runs)[:BANDS_LOOKED_AT]
+        for band in cut(runs)[:BANDS_TRIED]
     ]
     first, last = looked_at[0].band.f, looked_at[-1].band.f
     low, high = FROM_LOWEST * float(first[first > 0.0][0]), float(last[-1]) / 2.0
     if not low < high:
         return None
     none = float(np.mean(np.log(np.concatenate([one.left() for one in looked_at]))))
-    every = np.geomspace(low, high, HERTZ_LOOKED_AT)
-    tried = [_tried(looked_at, f, DAMPING_LOOKED_WITH, mass) for f in every]
+    every = np.geomspace(low, high, HERTZ_TRIED)
+    tried = [_tried(looked_at, f, DAMPING_TRIED, mass) for f in every]
     best = min(tried, key=lambda one: one[0])
     step = float(np.log(every[1] / every[0]))
     for finer in FINER:
@@ -112,7 +112,7 @@ def _longest(both: list[tuple[Recording, Rests]]) -> list[tuple[Recording, Rests
     """The longest runs, up to so many samples together."""
     ordered = sorted(both, key=lambda one: -len(one[0].y))
     before = np.cumsum([0, *(len(one.y) for one, _ in ordered[:-1])])
-    return [one for one, n in zip(ordered, before, strict=True) if n < SAMPLES_LOOKED_AT]
+    return [one for one, n in zip(ordered, before, strict=True) if n < SAMPLES_TRIED]
 
 
 @dataclass(frozen=True, eq=False)

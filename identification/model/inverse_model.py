@@ -122,7 +122,7 @@ def regression(log: Log, how: Smoothing | None = None) -> Regression:
     h = _even_period(log)
     motion = differentiate(log["y"], h, how.cutoff, how.method)
     threshold = SURE_SLIDING * motion.v_noise if how.threshold is None else how.threshold
-    force = held_force(log["F"]) if how.held else np.array(log["F"])
+    force = zoh_force(log["F"]) if how.held else np.array(log["F"])
     up, down = motion.v > threshold, motion.v < -threshold
     columns = np.column_stack([motion.a, up, -1.0 * down, motion.v * up, motion.v * down])
     factor = max(1, round(1.0 / (motion.cutoff * h))) if how.factor is None else how.factor
@@ -185,7 +185,7 @@ def force_predicted(log: Log, p: Karnopp, how: Smoothing | None = None) -> Array
     return p.m * motion.a + friction(motion.v, log["F"], p)
 
 
-def held_force(F: Array) -> Array:
+def zoh_force(F: Array) -> Array:
     """Mean of each sample of a held force and the one before it: what a central difference sees."""
     out = np.array(F, dtype=np.float64)
     out[1:] = 0.5 * (F[1:] + F[:-1])

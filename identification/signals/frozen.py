@@ -20,7 +20,7 @@ DROP_LEAPS = 5.0  # times the median step, that a value that drops out leaps
 STEADY_SPEED = 1.5  # ratio of the speeds before and after
 SLOW_BLOCK = 24  # samples that give a signal's noise at their speed
 CLOCK_SHARE = 0.1  # of a sample, by which a clock may jitter
-TELLING_PART = 0.05  # of these blocks, that have to show the noise
+INFORMATIVE_PART = 0.05  # of these blocks, that have to show the noise
 SPEED_AROUND = 8  # samples to either side, whose speed is looked at
 
 
@@ -37,7 +37,7 @@ def noise_shows(x: Array, still: NDArray[np.bool_]) -> bool:
     ends = moves[: (len(noise) + 1) * SLOW_BLOCK : SLOW_BLOCK]
     step = np.abs(np.diff(ends, append=moves[-1])[: len(noise)]) / SLOW_BLOCK
     shown = noise > np.maximum(resolution(x), CLOCK_SHARE * step)
-    return float(np.mean(shown)) > TELLING_PART
+    return float(np.mean(shown)) > INFORMATIVE_PART
 
 
 def frozen(x: Array, *, at_limits: bool = False) -> NDArray[np.bool_]:

@@ -20,7 +20,7 @@ LEAST_SPEED = 0.02  # of the speeds that are seldom exceeded, the same
 FEWEST_MOVING, FEWEST_OF_A_WAY = 60, 6  # samples in all, and in each direction
 ALIKE_CHANGES = 0.7  # correlation of two signals' changes, from which these give the lead
 LONGEST_LEAD = 0.1  # of the log, that one signal may be ahead of another
-TELLS_SIGN = 0.1  # share of the exchanged work, from which its sign is that of the force
+GIVES_SIGN = 0.1  # share of the exchanged work, from which its sign is that of the force
 
 
 class Derivative(NamedTuple):
@@ -121,8 +121,8 @@ def _law(
     share: float, friction: float | None, theta: Array, work: float, onwards: float
 ) -> ForceLaw:
     """onwards: the mean of a signal along a motion that goes one way only, else 0."""
-    if abs(work) > TELLS_SIGN or onwards != 0.0:
-        way = float(np.sign(work if abs(work) > TELLS_SIGN else onwards))
+    if abs(work) > GIVES_SIGN or onwards != 0.0:
+        way = float(np.sign(work if abs(work) > GIVES_SIGN else onwards))
     else:
         way = float(np.sign(theta[2])) or float(np.sign(theta[1])) or 1.0
     balance, coulomb, m = float(theta[3]), float(theta[2]), float(theta[0])

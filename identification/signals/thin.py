@@ -11,7 +11,7 @@ from scipy.interpolate import make_interp_spline
 
 from identification.arrays import Array
 from identification.log import Log
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.differentiate import resolution
 
 LONGEST_UNTHINNED = 200_000
@@ -55,7 +55,7 @@ def thinned(log: Log) -> Thinned:
     remarks, step = list[str](), _step(log)
     if step > 1:
         remarks.append(
-            Aside(
+            MinorRemark(
                 f"{log.name}: {len(log)} samples every {log.h:.4g} s, taken every"
                 f" {step * log.h:.4g} s"
             )

@@ -8,7 +8,7 @@ import numpy as np
 from identification.estimation.regression.equation_rows import MECHANICAL, MotionLog
 from identification.estimation.structure_fit import FittedStructure
 from identification.log import Rig
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.thresholds import ADEQUATE, ASTRAY, COMPLETE, HIDES
 from identification.tracing.free_run.backward_elimination import equations_explained
 from identification.tracing.free_run.trial_structures import driven_only
@@ -209,4 +209,4 @@ def _remarks(
     if seen and not any(len(one.sliding.start) for one in seen):
         yield "the body does not slide in the test logs, so they say nothing of the force error"
     if not seen:
-        yield Aside("no test log: the test errors are those of stretches left out in turn")
+        yield MinorRemark("no test log: the test errors are those of stretches left out in turn")

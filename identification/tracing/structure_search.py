@@ -23,7 +23,7 @@ from identification.tracing.free_run.backward_elimination import (
     suffices,
 )
 from identification.tracing.free_run.forward_selection import at_once, judged_forward
-from identification.tracing.free_run.rivals import told_apart
+from identification.tracing.free_run.rivals import discriminated
 from identification.tracing.plain_model import PlainModel
 from identification.tracing.regression.stepwise import Choice, choose
 from identification.tracing.remaining_structure import before_pieces, in_pieces
@@ -127,7 +127,7 @@ def refinement(chosen: Selection, report: Progress) -> Refinement:
     choice, model = judged_forward(choice, model, setting, report)
     if not halt.reached() and useless(choice, plain, model):
         choice, model = without_effects(chosen.plain, choice), plain
-    return Refinement(told_apart(choice, model, setting), model)
+    return Refinement(discriminated(choice, model, setting), model)
 
 
 def _doubted(

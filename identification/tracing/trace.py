@@ -26,7 +26,7 @@ from identification.estimation.two_masses import two_masses
 from identification.log import Log, Rig
 from identification.model.estimates import Estimate
 from identification.progress import Halt, KeepGoing, Progress, quiet, without_end
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.check import check_driven
 from identification.thresholds import COMPLETE
 from identification.tracing.free_curve import free_curves
@@ -255,7 +255,7 @@ def _told(
 
 def _left_out(not_tried: tuple[str, ...]) -> list[str]:
     """What is to be said of a trace that was halted."""
-    said = Aside(f"the trace ended early; not tried: {'; '.join(not_tried)}")
+    said = MinorRemark(f"the trace ended early; not tried: {'; '.join(not_tried)}")
     return [said] if not_tried else []  # the verdict's sentence says it too
 
 

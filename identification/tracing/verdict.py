@@ -16,7 +16,7 @@ from identification.estimation.settling import structure_estimates
 from identification.estimation.structure_fit import FittedStructure
 from identification.estimation.windowed_run.windows import position_errors
 from identification.model.estimates import Drive, Estimate
-from identification.thresholds import HEADLINE, OTHER_LAW
+from identification.thresholds import MAIN_EFFECTS_LEAVE, OTHER_LAW
 from identification.tracing.free_run.rivals import equal_rivals
 from identification.tracing.model_errors import seen_by
 from identification.tracing.regression.candidates import EffectCandidate
@@ -72,7 +72,7 @@ def verdict_of(
 
 def is_headline(share: float) -> bool:
     """Whether effects that leave this share of what was missing are told first."""
-    return share <= HEADLINE
+    return share <= MAIN_EFFECTS_LEAVE
 
 
 def other_law(choice: Choice, left: Dependence, share: float) -> tuple[str, ...]:

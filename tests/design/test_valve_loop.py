@@ -65,7 +65,7 @@ def test_the_goals_are_kept(integrator: bool) -> None:
 
 
 def test_goals_that_no_gain_keeps_are_refused() -> None:
-    with pytest.raises(BadSpecification, match="no gain keeps a modulus margin"):
+    with pytest.raises(BadSpecification, match="no gain gives a modulus margin"):
         tuned(VALVE, H, modulus=1.5, delay_samples=2.0, overshoot=0.1, integrator=True)
 
 

@@ -274,7 +274,7 @@ def test_a_design_that_misses_its_goals_is_written_and_not_recommended(
     assert any("modulus margin" in line for line in found["rst"]["missed"])
     assert main(asked) == 1
     shown = capsys.readouterr().out
-    assert "No controller keeps every goal" in shown and "RST misses: modulus margin" in shown
+    assert "No controller meets every goal" in shown and "RST misses: modulus margin" in shown
     last = " ".join(shown.split())  # folded where the folder's name is long
     assert last.endswith(f"): workbench design {shop / 'id/model.json'}")
     strict = as_json(capsys, [*command, "--poles", "15,0.9", "--modulus", "0.99"], status=1)

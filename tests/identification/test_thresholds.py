@@ -19,8 +19,8 @@ from identification.drift.log_estimate import LogEstimate, allowed_misfit
 from identification.drift.mewma import Mean
 from identification.drift.own_misfit import OwnMisfit
 from identification.drift.practical_margin import moved
-from identification.drift.reference_model import InForce
-from identification.drift.single_log import seen_together
+from identification.drift.reference_model import ReferenceModel
+from identification.drift.single_log import detectable_together
 from identification.effects._base import Param
 from identification.effects._library import built_in
 from identification.estimation import contradicted
@@ -72,7 +72,7 @@ from identification.model.karnopp import Karnopp
 from identification.model.plant import Plant
 from identification.signals.bad_samples import BadSamples
 from identification.signals.clock_jitter import jitters
-from identification.signals.force_walk import shows
+from identification.signals.force_random_walk import shows
 from identification.signals.frozen import frozen
 from identification.signals.one_way import is_one_way
 from identification.signals.steps import (
@@ -530,7 +530,9 @@ def told(name: str, relative: float, events: int) -> bool:
 def says_none(size: float, settings: DriftSettings) -> bool:
     """Whether a log without an alarm is said to show no drift, that sees so much of F_cp."""
     nine = Karnopp(2.0, 10.0, 10.0, 100.0, 100.0, 0.01, -0.01, 15.0, -15.0)
-    known = InForce(Plant(nine), ("F_cp",), np.array([10.0]), np.eye(1), Rig("force"), "force")
+    known = ReferenceModel(
+        Plant(nine), ("F_cp",), np.array([10.0]), np.eye(1), Rig("force"), "force"
+    )
     return not too_coarse(known, {"F_cp": size}, "log", settings)
 
 
@@ -565,7 +567,7 @@ def test_vanished() -> None:
 
 def test_chance_to_see() -> None:
     """Of the smallest change that a test sees, nine in ten are found."""
-    size = float(seen_together(Mean((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
+    size = float(detectable_together(Mean((0,), np.zeros(1), np.eye(1), np.zeros(1)), 9.0)[0])
     assert norm.sf(3.0 - size) == pytest.approx(0.9, abs=0.005)
 
 

@@ -19,7 +19,7 @@ from identification.frequency.modes import Modes, Peak
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.size import Size
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.tracing.result import Change
 from tests.chain import designed, identified, short_recipe
 from tests.screens import one_screen, words_of
@@ -48,7 +48,7 @@ from workbench.steps.drift import Drifted
 from workbench.steps.drift import Tested as OneTested
 from workbench.steps.experiment.planned import Experiment, Promised, Safety
 from workbench.steps.first_card.proposal import proposed
-from workbench.steps.installation import look_over
+from workbench.steps.installation import check_installation
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures
 from workbench.steps.loop_motion import LimitCycle
 from workbench.steps.predict import Predicted
@@ -68,7 +68,7 @@ WHY = (
 REMARKS = (
     *(f"{log}: uneven clock, resampled every {n % 3 + 5:.3g} ms" for n, log in enumerate(LOGS)),
     *(f"{log}: isolated spikes of 'y' in {n} samples interpolated" for n, log in enumerate(LOGS)),
-    *(Aside(f"{log}: its clock jitters by {n} us") for n, log in enumerate(LOGS)),
+    *(MinorRemark(f"{log}: its clock jitters by {n} us") for n, log in enumerate(LOGS)),
     *(f"signals.{n}: its unit is of no machine's size; check the unit in the card" for n in LOGS),
 )
 
@@ -242,7 +242,7 @@ def fleet() -> Iterator[Screen]:
 
 def doctor() -> Iterator[Screen]:
     """Alone; of a log: tests/workbench/steps/test_doctor.py."""
-    yield installation_view(look_over(), {"where": "x" * 150, "answers": False}, LOGS)
+    yield installation_view(check_installation(), {"where": "x" * 150, "answers": False}, LOGS)
 
 
 def axis_test() -> Iterator[Screen]:
@@ -313,7 +313,7 @@ def test_parameters_not_told_for_one_reason_are_told_together() -> None:
 
 def test_the_demo_sets_the_controllers_side_by_side() -> None:
     text = words_of(next(demo()).text())
-    assert "Recommended: RST with the friction compensator, which keeps all limits" in text
+    assert "Recommended: RST with the friction compensator, which meets all limits" in text
     assert "before: present" in text and "after: RST+comp" in text
     assert "stribeck F_s 3.50 N 3.43 to 3.57 3.5 " in text
     assert "workbench init LOG" in text and "report.html" in text

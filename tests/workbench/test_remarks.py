@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.remarks import Aside
-from workbench.remarks import merged, told_once
+from identification.remarks import MinorRemark
+from workbench.remarks import merged, printed_once
 from workbench.report.notes import notes, report_notes
 
 LOGS = tuple(f"run{n}.csv" for n in range(40))
@@ -46,14 +46,14 @@ def test_the_counts_are_those_of_logs_and_remarks(remarks: list[str]) -> None:
 
 @given(OF_A_LOG | st.text(min_size=1))
 def test_one_alone_is_unchanged(remark: str) -> None:
-    assert told_once([remark], LOGS) == [remark]
-    assert told_once([remark, "another"], LOGS) == [remark, "another"]
+    assert printed_once([remark], LOGS) == [remark]
+    assert printed_once([remark, "another"], LOGS) == [remark, "another"]
 
 
 @given(st.lists(NUMBERS, min_size=2, max_size=30))
 def test_a_number_that_differs_is_a_range_that_holds_all(numbers: list[float]) -> None:
     remarks = [f"run{n}.csv: {x} of it is lost" for n, x in enumerate(numbers)]
-    (said,) = told_once(remarks, LOGS)
+    (said,) = printed_once(remarks, LOGS)
     found = re.fullmatch(r"\d+ logs: (\S+)(?: to (\S+))? of it is lost", said)
     assert found is not None
     assert float(found[1]) == min(numbers) and float(found[2] or found[1]) == max(numbers)
@@ -61,17 +61,17 @@ def test_a_number_that_differs_is_a_range_that_holds_all(numbers: list[float]) -
 
 def test_thirteen_logs_in_one_line() -> None:
     remarks = [f"run{n}.csv: uneven clock, resampled every 6.67 ms" for n in range(13)]
-    assert told_once(remarks, LOGS) == ["13 logs: uneven clock, resampled every 6.67 ms"]
+    assert printed_once(remarks, LOGS) == ["13 logs: uneven clock, resampled every 6.67 ms"]
 
 
 def test_where_in_its_log_something_is_falls_away_where_it_differs() -> None:
     said = "{}: isolated spikes of 'y' in {} samples interpolated, first in row {}"
     alike = [said.format("run1.csv", 3, 12), said.format("run2.csv", 5, 480)]
-    assert told_once(alike, LOGS) == [
+    assert printed_once(alike, LOGS) == [
         "2 logs: isolated spikes of 'y' in 3 to 5 samples interpolated"
     ]
     stretches = [f"run1.csv: the command is at its limit in 4 samples, t = {t} s" for t in (1, 2)]
-    assert told_once(stretches, LOGS) == [
+    assert printed_once(stretches, LOGS) == [
         "run1.csv, 2 times: the command is at its limit in 4 samples"
     ]
 
@@ -80,16 +80,16 @@ def test_where_in_its_log_something_is_falls_away_where_it_differs() -> None:
     "pair", [("RST: slow", "PID: slow"), ("signals.y: 3 m", "signals.r: 3 m"), ("3 m", "4 m")]
 )
 def test_what_is_of_no_log_is_never_counted(pair: tuple[str, str]) -> None:
-    assert told_once(pair, LOGS) == list(pair)
+    assert printed_once(pair, LOGS) == list(pair)
 
 
 def test_the_longer_name_is_the_log() -> None:
     names = ("a.csv", "old: a.csv")
-    assert told_once(["old: a.csv: 3 lost", "a.csv: 4 lost"], names) == ["2 logs: 3 to 4 lost"]
+    assert printed_once(["old: a.csv: 3 lost", "a.csv: 4 lost"], names) == ["2 logs: 3 to 4 lost"]
 
 
 def test_asides_are_for_verbose_and_reports() -> None:
-    remarks = (Aside("run1.csv: jitters by 4 us"), "run1.csv: gaps", "run2.csv: gaps")
+    remarks = (MinorRemark("run1.csv: jitters by 4 us"), "run1.csv: gaps", "run2.csv: gaps")
     part = notes(remarks, LOGS)
     assert part.entries == ("note: 2 logs: gaps",)
     assert part.whole == tuple(f"note: {one}" for one in remarks)

@@ -272,7 +272,7 @@ def words_of(name: str) -> list[str]:
     return [one for one in re.split(r"[\W_]+", small) if one]
 
 
-def tells_purpose(word: str) -> bool:
+def says_purpose(word: str) -> bool:
     """Whether a word tells what a signal is for (soll, actual, cmd), not what it is."""
     parts = any(one in word for one in (*_REFERENCE, *_MEASURED, *_MODEL))
     return parts or word in (*_REFERENCE_SHORT, *_MEASURED_SHORT, *_MODEL_SHORT, "command")

@@ -43,7 +43,7 @@ def command(
     """
     from workbench.logs.sources import read_sources
     from workbench.report.axis_test import axis_view
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import check_of_refused
     from workbench.report.view import show
     from workbench.steps.axis_test import axis_test
 
@@ -58,7 +58,7 @@ def command(
             earlier = earlier_of(registry, name, sources, seed)
     elif machine is not None:
         raise click.UsageError("--machine is a name in a registry; give --registry too.")
-    with results("axis-test", out, looked_over([log], card)) as folder:
+    with results("axis-test", out, check_of_refused([log], card)) as folder:
         test = axis_test(sources, earlier, name)
         view = axis_view(test)
         view.write(folder)
@@ -72,7 +72,7 @@ def after_axis_test(test: "AxisTest", log: str, card: str, where: str | None) ->
         return None
     if test.of("explained").light in ("yellow", "red") or test.of("explained").light == "":
         return step("what else acts", "trace", log, "--card", card)
-    if test.unjudged and where is None:
+    if test.untested and where is None:
         return step("limits of its own logs", "axis-test", log, "--card", card,
                     "--registry", "registry.db")  # fmt: skip
     if where is None:

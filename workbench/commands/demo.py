@@ -18,7 +18,7 @@ DEMO_STAGES["designing"] = (0.85, 1.0)
 
 @click.command(
     cls=StatusCommand,
-    refusal="the effect is not found, or the recommended controller does not keep the limits",
+    refusal="the effect is not found, or the recommended controller does not meet the limits",
     epilog="Example: workbench demo --out demo",
 )
 @by_signature

@@ -75,9 +75,7 @@ class DesignOptions:
     )
     modulus: float = MODULUS_OPTION
     delay: float = DELAY_OPTION
-    robust: bool = option(
-        "Choose by the loops of machines drawn from what the model is not sure of."
-    )
+    robust: bool = option("Choose by the loops of machines drawn from the model's uncertainty.")
     draws: int = option(
         "Machines drawn, with --robust.", type=click.IntRange(20, 10_000), default=200
     )
@@ -109,7 +107,7 @@ class DesignOptions:
 
 @click.command(
     cls=StatusCommand,
-    refusal="the model carries no design, or no controller keeps the goals (design.json then says"
+    refusal="the model carries no design, or no controller meets the goals (design.json then says"
     " what each misses, and recommends none)",
     epilog="Example: workbench design runs/.../model.json --poles 20,0.9",
 )
@@ -232,13 +230,13 @@ def _drift(where: str | None, machine: str) -> dict[str, float]:
     from identification.model.estimates import Estimate
     from workbench.registry.database import location
     from workbench.registry.store import MOVES, Registry
-    from workbench.steps.robust.machines import drift_seen
+    from workbench.steps.robust.machines import drift_found
 
     with Registry(location(where), create=False) as store:
         numbers = [one.number for one in store.decisions(machine) if one.kind in MOVES]
         models = [store.document(store.version(machine, n), "model") for n in numbers]
     friction = TypeAdapter(dict[str, Estimate])
-    return drift_seen([friction.validate_python(model["friction"]) for model in models])
+    return drift_found([friction.validate_python(model["friction"]) for model in models])
 
 
 def _kept(given: DesignOptions) -> tuple[str, ...]:

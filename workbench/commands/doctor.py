@@ -80,9 +80,9 @@ def _installation(where: str | None, as_json: bool) -> int:
     from workbench.addresses import shown
     from workbench.registry.database import REGISTRY_VARIABLE
     from workbench.report.installation import installation_view
-    from workbench.steps.installation import look_over
+    from workbench.steps.installation import check_installation
 
-    found = look_over()
+    found = check_installation()
     named = where or os.environ.get(REGISTRY_VARIABLE)
     registry = _registry(named) if named else None
     wrong = [*found.wrong]

@@ -59,7 +59,7 @@ def command(
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
     from workbench.report.drift import drift_view
-    from workbench.report.next_steps import after_drift, looked_over
+    from workbench.report.next_steps import after_drift, check_of_refused
     from workbench.report.view import show
     from workbench.steps.drift import drift_of, model_key, read_stream, write_stream
 
@@ -67,7 +67,7 @@ def command(
     model = read_model(model_file, library(effects))
     stream = read_stream(state_file) if state_file else None
     sources = read_sources(logs, card)
-    with results("drift", out, looked_over(logs, card)) as folder:
+    with results("drift", out, check_of_refused(logs, card)) as folder:
         with progress("testing", as_json=as_json):
             found = drift_of(
                 model, model_key(model), sources, stream=stream, settings=settings, seed=seed

@@ -65,7 +65,7 @@ class ExperimentOptions:
 
 @click.command(
     cls=StatusCommand,
-    refusal="a simulated machine, drawn from what is not sure of the model, exceeds a limit",
+    refusal="a simulated machine, drawn from the model's uncertainty, exceeds a limit",
     epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20",
 )
 @by_fields(ExperimentOptions)

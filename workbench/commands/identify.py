@@ -54,7 +54,7 @@ def command(
     begun = time.monotonic()
     from workbench.logs.sources import card_of_velocity, read_sources
     from workbench.options import parse_orders
-    from workbench.report.next_steps import after_identify, looked_over
+    from workbench.report.next_steps import after_identify, check_of_refused
     from workbench.report.reports import identified_view
     from workbench.report.view import show
     from workbench.steps.identify_sources import Options, identify_sources
@@ -63,7 +63,7 @@ def command(
         _velocity(logs, card, budget, as_json, out)
         return
     options = Options(drive=drive, orders=parse_orders(orders), design_period=design_period)
-    with results("identify", out, looked_over(logs, card)) as folder:
+    with results("identify", out, check_of_refused(logs, card)) as folder:
         with progress("identifying", 1.0, as_json=as_json) as bar:
             sources = read_sources(logs, card)
             if drive == "force" and sources.rig.kind == "motor":
@@ -95,12 +95,12 @@ def _velocity(
     begun = time.monotonic()
     refuse_for_velocity("drive", "orders", "design_period", "posterior", "seed")
     from workbench.logs.sources import read_sources
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import check_of_refused
     from workbench.report.velocity import after_velocity, velocity_model_view
     from workbench.report.view import show
     from workbench.steps.velocity import identify_velocity
 
-    with results("identify", out, looked_over(logs, card)) as folder:
+    with results("identify", out, check_of_refused(logs, card)) as folder:
         with progress("identifying", as_json=as_json):
             sources = read_sources(logs, card, velocity=True)
             model = identify_velocity(sources, keep_going=lambda: time.monotonic() - begun < budget)

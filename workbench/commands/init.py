@@ -43,7 +43,7 @@ def command(
     there is replaced only with --force or your yes.
     """
     from workbench.report.first_card import proposal_view
-    from workbench.steps.first_card.looked_over import looked_over
+    from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
     from workbench.steps.first_card.written import written
 
@@ -57,7 +57,7 @@ def command(
     if asking:
         found = _asked(found)
     with progress("reading", as_json=as_json):
-        found = looked_over(found)
+        found = checked_proposal(found)
     write_whole(card, written(found, asked=asking), "--out")
     emit({**found.as_json(), "out": card}, as_json, lambda: proposal_view(found, card))
 

@@ -35,10 +35,10 @@ def command(
     logs: tuple[str, ...] = LOGS_ARGUMENT,
     card: str = CARD_OPTION,
     model_file: Path | None = option(
-        "model.json whose friction is taken off the force.  [default: identified from the logs]",
+        "model.json whose friction is subtracted.  [default: identified from the logs]",
         "--model", metavar="MODEL",
     ),
-    friction_left_in: bool = option("Take nothing off the force."),
+    friction_left_in: bool = option("Subtract nothing from the force."),
     lowest: float | None = option(
         "Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",
         type=POSITIVE, metavar="HZ",
@@ -60,14 +60,14 @@ def command(
     from workbench.cards.own_effects import library
     from workbench.documents.model_file import read_model
     from workbench.logs.sources import read_sources
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import check_of_refused
     from workbench.report.response import response_view
     from workbench.report.view import show
     from workbench.steps.response import respond
 
     known = None if model_file is None else read_model(model_file, library(effects))
     left_in = "asked for" if friction_left_in else None
-    with results("response", out, looked_over(logs, card)) as folder:
+    with results("response", out, check_of_refused(logs, card)) as folder:
         sources = read_sources(logs, card)
         if known is None and left_in is None:
             left = budget - (time.monotonic() - begun)

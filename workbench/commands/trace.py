@@ -50,7 +50,7 @@ def command(
     begun = time.monotonic()
     from workbench.cards.own_effects import library
     from workbench.logs.sources import card_of_velocity, read_sources
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import check_of_refused
     from workbench.report.trace import traced_view
     from workbench.report.view import show
     from workbench.steps.trace import named_logs, trace_sources
@@ -60,7 +60,7 @@ def command(
         _velocity((logs, tests), card, budget, as_json, out)
         return
     known = library(effects)
-    with results("trace", out, looked_over([*logs, *tests], card)) as folder:
+    with results("trace", out, check_of_refused([*logs, *tests], card)) as folder:
         with progress("trace", 1.0, as_json=as_json) as bar:
             names, held_out = named_logs(logs, tests, card)
             train = read_sources(names, card)
@@ -83,13 +83,13 @@ def _velocity(
     """The same of a rig whose velocity follows the command; given: logs, held-out logs."""
     begun = time.monotonic()
     from workbench.logs.sources import read_sources
-    from workbench.report.next_steps import looked_over
+    from workbench.report.next_steps import check_of_refused
     from workbench.report.velocity import velocity_trace_view
     from workbench.report.view import show
     from workbench.steps.trace import named_logs
     from workbench.steps.velocity import trace_velocity
 
-    with results("trace", out, looked_over([*given[0], *given[1]], card)) as folder:
+    with results("trace", out, check_of_refused([*given[0], *given[1]], card)) as folder:
         with progress("trace", as_json=as_json):
             names, held_out = named_logs(*given, card)
             train = read_sources(names, card, velocity=True)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 @click.command(
     cls=StatusCommand,
-    refusal="the recommended controller does not keep the limits on every plant",
+    refusal="the recommended controller does not meet the limits on every plant",
     epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
 )
 @by_signature

@@ -140,7 +140,7 @@ class ParameterCorrelation:
 
 
 @dataclass(frozen=True)
-class Told:
+class Identifiable:
     """Whether the logs can identify a parameter, why (not), and what run to add where they cannot.
 
     within: half its 95 % interval over its value, which a fit should not exceed; None: not known.
@@ -175,7 +175,7 @@ class ModelFile:
     own_logs: OwnLogs | None = None
     bad_samples: tuple[BadSamples, ...] = ()
     controller: PresentFile | None = None
-    identifiability: tuple[Told, ...] = ()
+    identifiability: tuple[Identifiable, ...] = ()
     lag: Estimate | None = None
     resonance: Mapping[str, Estimate] | None = None
     falling: Mapping[str, Estimate] = field(default_factory=dict)

@@ -148,4 +148,4 @@ def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:
 
 def _untold(what: Compensation) -> tuple[str, ...]:
     """Lines on what of the cogging no log identifies."""
-    return tuple(line for line in what.untold_places if line.startswith("cogging"))
+    return tuple(line for line in what.unidentified_places if line.startswith("cogging"))

@@ -26,7 +26,7 @@ from workbench.export.exported import identifier
 Control = Literal["twincat", "codesys", "linuxcnc", "sinumerik"]
 Table = Literal["friction-table", "cogging-table", "backlash", "feed-forward"]
 Encoder = Literal["motor", "load"]
-TOLD_BY_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
+IDENTIFIED_BY_SLIDING = ("F_cp", "F_cn", "F_vp", "F_vn")
 MOST_OF_IT = 0.5  # of the asymmetry, from which a constant force is worth saying
 PLACES_ALONG = 400  # of the travel, at which a force of place is looked at
 NO_TABLE_HOLDS = "what it adds depends on what was before, so no table holds it"
@@ -107,7 +107,7 @@ class Compensation:
     @cached_property
     def friction(self) -> SlidingFriction:
         """Friction while sliding; raises BadModel where a number of it is not identified."""
-        self.need("a friction table", TOLD_BY_SLIDING)
+        self.need("a friction table", IDENTIFIED_BY_SLIDING)
         for one in filter(is_of_speed, self.model.acting):
             for name, found in self.model.effects[one.key].items():
                 if not found.known:
@@ -175,11 +175,11 @@ class Compensation:
     @cached_property
     def places(self) -> tuple[Acting, ...]:
         """Position-dependent forces among the effects, with the sizes that the logs identify;
-        `untold_places` has the others, which are 0 here."""
+        `unidentified_places` has the others, which are 0 here."""
         return tuple(one for one, _ in self._places if one is not None)
 
     @property
-    def untold_places(self) -> tuple[str, ...]:
+    def unidentified_places(self) -> tuple[str, ...]:
         """A line for each number of a position-dependent force that no log identifies."""
         return tuple(line for _, lines in self._places for line in lines)
 

@@ -11,7 +11,7 @@ from identification.effects._base import Acting
 from identification.errors import BadModel
 from identification.model.plant import Motor
 from workbench.export.compensation import (
-    TOLD_BY_SLIDING,
+    IDENTIFIED_BY_SLIDING,
     Compensation,
     Cost,
     TableFile,
@@ -59,7 +59,7 @@ def place_force(acting: tuple[Acting, ...]) -> PlaceForce:
     return PlaceForce(constant, k, k_3, tuple(one for one in waves if one.amplitude > 0))
 
 
-def is_held(one: Acting) -> bool:
+def is_included(one: Acting) -> bool:
     """Whether the feed-forward has this force of place."""
     return is_cogging(one) or one.key in ("constant_force", "spring", "gravity")
 
@@ -90,12 +90,12 @@ def _file(what: Compensation, name: str, text: str, where: str) -> TableFile:
 
 
 def _remarks_of(what: Compensation) -> tuple[str, ...]:
-    return (*what.small((*TOLD_BY_SLIDING, "m")), *what.untold_places, *what.beyond)
+    return (*what.small((*IDENTIFIED_BY_SLIDING, "m")), *what.unidentified_places, *what.beyond)
 
 
 def _costs(what: Compensation) -> tuple[Cost, ...]:
     """As of a friction table, but for the position-dependent forces that it has."""
-    held = {one.key.replace("_", " ") for one in what.model.acting if is_held(one)}
+    held = {one.key.replace("_", " ") for one in what.model.acting if is_included(one)}
     return tuple(
         one for one in friction_costs(what, signed=True) if one.what.partition(":")[0] not in held
     )
@@ -106,7 +106,7 @@ def _values(what: Compensation, language: str) -> dict[str, Any]:
     what.need("a feed-forward", ("m",))
     model = what.model
     v, F, _ = both_ways(what, FEED_FORWARD_POINTS)
-    held = place_force(tuple(one for one in what.places if is_held(one)))
+    held = place_force(tuple(one for one in what.places if is_included(one)))
     drive = model.simulated.actuator
     if isinstance(drive, Motor) and not drive.k_a:
         raise BadModel(f"{model.card}: its motor constant k_a is 0; run 'workbench identify' again")

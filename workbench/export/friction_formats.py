@@ -10,7 +10,7 @@ from identification.arrays import Array
 from identification.errors import BadModel
 from workbench.cards.readable import number
 from workbench.export.compensation import (
-    TOLD_BY_SLIDING,
+    IDENTIFIED_BY_SLIDING,
     Compensation,
     Cost,
     TableFile,
@@ -195,7 +195,7 @@ FRICTION: dict[str, tuple[Callable[[Compensation], TableFile], ...]] = {
 
 
 def _remarks(what: Compensation) -> tuple[str, ...]:
-    return (*what.small(TOLD_BY_SLIDING), *what.beyond)
+    return (*what.small(IDENTIFIED_BY_SLIDING), *what.beyond)
 
 
 def _lead(what: Compensation, costs: tuple[Cost, ...]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from workbench.registry.store import Registry
 from workbench.steps.axis_limits import FEWEST_EARLIER, MEANING_OF
 from workbench.steps.axis_test import Earlier
 
-LOOKED_AT = 120  # of a machine's last logs, among which those are that identify its parameters
+LAST_LOGS_READ = 120  # of a machine's last logs, among which those are that identify its parameters
 # Effects that the equation of motion takes out, and those that it does not see
 HELD_BY_EQUATION = ("constant_force", "gravity", "input_delay", "cogging", "backlash")
 
@@ -29,7 +29,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
     """
     state = registry.machine(machine)
     own = {source.sha256 for source in sources.runs}
-    logs = [one for one in last_logs(registry.database, machine, LOOKED_AT)
+    logs = [one for one in last_logs(registry.database, machine, LAST_LOGS_READ)
             if one.sha256 not in own and one.parameters]  # fmt: skip
     values = history(list(reversed(logs[:LAST_ON_PAGE])))
     said = ""

@@ -18,7 +18,7 @@ from identification.model.estimates import Drive
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import loop_period, run_loop
-from workbench.steps.loop_figures import common_reference, judged_of
+from workbench.steps.loop_figures import common_reference, tested_of
 from workbench.steps.predict import default_drive, predict
 from workbench.steps.validate import validate
 
@@ -103,7 +103,7 @@ def challenge(
         return Contest(False, False, lost, errors, loop)
     lost = _lost_loop(old, new, terms)
     keeps = old is not None and old.rms is not None and not old.missed
-    said = _won(errors, loop) if not lost else f"{_held_out_said(errors)}; {lost}"
+    said = _won(errors, loop) if not lost else f"{_held_out_words(errors)}; {lost}"
     return Contest(not lost, bool(lost) and keeps, said, errors, loop)
 
 
@@ -184,7 +184,7 @@ def _lost_loop(old: Tracking | None, new: Tracking | None, terms: Terms) -> str:
 
 
 def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
-    text = _held_out_said(errors)
+    text = _held_out_words(errors)
     new, old = loop["challenger"], loop["champion"]
     if new is None or new.rms is None:
         return text
@@ -196,7 +196,7 @@ def _won(errors: dict[str, HeldOut], loop: dict[str, Tracking | None]) -> str:
     return f"{text} against {old.rms:.4g}"
 
 
-def _held_out_said(errors: dict[str, HeldOut]) -> str:
+def _held_out_words(errors: dict[str, HeldOut]) -> str:
     return f"held out: {_figures(errors['challenger'])} against {_figures(errors['champion'])}"
 
 
@@ -226,7 +226,7 @@ def tracking(
     """A design on a machine: what validation says of it, and its error on the common reference."""
     if found.recommended == "none":
         return Tracking(None, ("no controller keeps its goals",))
-    name = judged_of(found)
+    name = tested_of(found)
     try:
         checked, _ = validate(machine, found, rng)
         reference = common_reference(machine, designs, loop_period(found))

@@ -18,7 +18,7 @@ from workbench.jobs.drift_verdict import Drift, Moved, Reading
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
 from workbench.report.drift_tables import reason_sentence
-from workbench.steps.drift import Drifted, Stream, drift_of, model_key, seen_sizes
+from workbench.steps.drift import Drifted, Stream, detectable_sizes, drift_of, model_key
 
 
 def drift_by_chart(
@@ -40,7 +40,7 @@ def drift_by_chart(
         p_value=min((one.p_value for one in statistics), default=None),
         state=_plain(found),
         unsure=worst.unsure,
-        could_have_seen=seen_sizes(worst),
+        could_have_seen=detectable_sizes(worst),
         parameters=tuple(_reading(one) for one in worst.shifts.values()),
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from workbench.documents.model import Model
 from workbench.logs.sources import Sources
 
-JudgedDrift = Literal["none", "drift", "structure", "not_judged"]
+TestedDrift = Literal["none", "drift", "structure", "not_judged"]
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class Drift:
     next log; plain JSON. parameters: what the log gave of each, moved or not.
     """
 
-    verdict: JudgedDrift
+    verdict: TestedDrift
     reason: str
     moved: tuple[Moved, ...] = ()
     p_value: float | None = None

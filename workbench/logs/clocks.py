@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import BadLog
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.clean import LONGEST_GAP, at_times
 
 _SENSED = ("y", "F", "p_p", "p_n")
@@ -61,7 +61,7 @@ def on_one_clock(
             every[name] = _moved(name, times[known], signals[name][known], base, h)
         kept[kept] &= (base[kept] >= times[known][0]) & (base[kept] <= times[known][-1] + period)
         remarks.append(
-            Aside(
+            MinorRemark(
                 f"{where}: signals of group {group!r} (every {period:.4g} s) are brought to the"
                 f" clock of {own!r} (every {h:.4g} s)"
             )

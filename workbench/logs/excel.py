@@ -17,7 +17,7 @@ from workbench.logs.table import RawColumn, Table, refuse_long
 
 _BOOK_BYTES = 100_000_000
 _UNPACKED = 1_000_000_000  # of the sheets in it
-_LOOKED_AT = 200  # rows in which the header is looked for
+_ROWS_READ = 200  # rows in which the header is looked for
 
 
 def read_excel(path: Path, spec: FileSpec) -> Table:
@@ -29,7 +29,7 @@ def read_excel(path: Path, spec: FileSpec) -> Table:
     while rows and not _shown(rows[-1]):
         rows.pop()
     refuse_long(path, len(rows))
-    shown = [_shown(row) for row in rows[spec.skip_rows : spec.skip_rows + _LOOKED_AT]]
+    shown = [_shown(row) for row in rows[spec.skip_rows : spec.skip_rows + _ROWS_READ]]
     found = find_layout(shown) if spec.header is None else None
     if found is None:
         titles = tuple(shown[0]) if shown and spec.header is not False else ()

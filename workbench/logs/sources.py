@@ -88,7 +88,7 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
         bad.extend(prepared.bad)
         found.extend((whole, _source(one, path, run, prepared.period)) for run in prepared.runs)
     names_of = Counter(path.name for path in rigs)
-    runs = [_told_apart(run, path) if names_of[path.name] > 1 else run for path, run in found]
+    runs = [_discriminated(run, path) if names_of[path.name] > 1 else run for path, run in found]
     first = next(iter(rigs))
     for path, rig in rigs.items():
         if rig != rigs[first]:
@@ -111,7 +111,7 @@ def _source(log: str | Recorded, path: Path, run: Log, period: float | None) -> 
     return Source(run, shown_name(path), sha256_of(path), len(run), period)
 
 
-def _told_apart(source: Source, path: Path) -> Source:
+def _discriminated(source: Source, path: Path) -> Source:
     """The run named with its folder, as another file has the same name."""
     name = source.log.name.replace(path.name, f"{path.parent.name}/{path.name}", 1)
     return replace(source, log=replace(source.log, name=name))

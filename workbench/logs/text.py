@@ -28,7 +28,7 @@ _END = "EOF"  # the last line of some scopes'
 MANY = 10  # rows of a wrong length that make the header suspect instead
 TEXT_BYTES = 400_000_000  # bytes of a text file; three times that is needed to read it
 _LOOK = 262_144  # characters looked at to find the layout
-_LOOK_BYTES = 8 * _LOOK  # in which they are, whatever the letters
+_HEAD_BYTES = 8 * _LOOK  # in which they are, whatever the letters
 
 
 @dataclass(frozen=True)
@@ -149,8 +149,8 @@ def refuse_comma_as_both(path: Path, rows: Sequence[Sequence[str]]) -> None:
 def _head(path: Path, encoding: str) -> str:
     """More than `_LOOK` characters of the file, or all that it has."""
     with path.open("rb") as file:
-        content = file.read(_LOOK_BYTES)
-    if len(content) == _LOOK_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
+        content = file.read(_HEAD_BYTES)
+    if len(content) == _HEAD_BYTES and content[:2] not in (b"\xff\xfe", b"\xfe\xff"):
         whole = content[: content.rfind(b"\n") + 1]
         try:
             text = whole.decode(encoding).removeprefix("\ufeff")

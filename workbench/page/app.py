@@ -14,8 +14,8 @@ from starlette.routing import Mount
 from starlette.staticfiles import StaticFiles
 
 from identification.errors import UserError
-from workbench.page import deeds, drops, fleet, health, machine, sign_in, work
-from workbench.page.brief import Moment
+from workbench.page import actions, drops, fleet, health, machine, sign_in, work
+from workbench.page.answer_cache import Moment
 from workbench.page.guard import Guard
 from workbench.page.helpers import Helpers
 from workbench.page.pages import show
@@ -60,7 +60,7 @@ def application(settings: PageSettings, helpers: Helpers | None = None) -> Guard
 
     app = Starlette(
         routes=[
-            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *deeds.DEED_ROUTES,
+            *fleet.FLEET_ROUTES, *machine.MACHINE_ROUTES, *actions.ACTION_ROUTES,
             *drops.DROP_ROUTES, *work.WORK_ROUTES,
             *sign_in.SIGN_IN_ROUTES, *health.HEALTH_ROUTES,
             Mount("/static/assets", StaticFiles(directory=ASSETS)),

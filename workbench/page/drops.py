@@ -10,7 +10,7 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from identification.errors import BadCard, UserError
-from workbench.page import looks
+from workbench.page import log_views
 from workbench.page.card_form import (
     FORM_SIGNALS,
     KIND_WORDS,
@@ -60,7 +60,7 @@ def drop(request: Request, visitor: Visitor) -> Response:
     root = request.app.state.settings.root
     size, digest = keep(root, upload, name, given.file)
     try:
-        request.app.state.helpers(looks.refuse_no_log, log_of(root, upload))
+        request.app.state.helpers(log_views.refuse_no_log, log_of(root, upload))
     except UserError:
         drop_again(root, upload)
         raise
@@ -82,7 +82,7 @@ def columns(request: Request, visitor: Visitor) -> Response:
     """Every column over time, before anything is known of it; the card is looked for after it."""
     upload, path = _upload(request), _log(request)
     try:
-        html, rows = request.app.state.helpers(looks.columns_chart, path, upload.file)
+        html, rows = request.app.state.helpers(log_views.columns_chart, path, upload.file)
         response = show(request, visitor, "chart", html=html, said=f"{rows} rows")
     except UserError as error:
         response = show(request, visitor, "said", said=str(error), bad=True)
@@ -123,7 +123,7 @@ def picture(request: Request, visitor: Visitor) -> Response:
     if not place.exists():
         return show(request, visitor, "said", said="The card does not read the log yet.", bad=False)
     try:
-        html = request.app.state.helpers(looks.doctor_chart, path, place)
+        html = request.app.state.helpers(log_views.doctor_chart, path, place)
     except UserError as error:
         return show(request, visitor, "said", said=str(error), bad=True)
     return show(request, visitor, "chart", html=html, said="")
@@ -135,7 +135,7 @@ def words(request: Request, visitor: Visitor) -> Response:
     if not place.exists():
         return show(request, visitor, "said", said="", bad=False)
     try:
-        found = request.app.state.helpers.slowly(looks.doctor_words, path, place)
+        found = request.app.state.helpers.slowly(log_views.doctor_words, path, place)
     except UserError as error:
         return show(request, visitor, "said", said=str(error), bad=True)
     return show(request, visitor, "words", found=found)
@@ -164,9 +164,9 @@ def _proposed(request: Request) -> tuple[CardForm, str]:
     path, upload = _log(request), _upload(request)
     helpers = request.app.state.helpers
     try:
-        return form_of(helpers.slowly(looks.proposal, path), upload.file), ""
+        return form_of(helpers.slowly(log_views.proposal, path), upload.file), ""
     except UserError as error:
-        return empty_form(helpers(looks.headers, path), path.stem), str(error)
+        return empty_form(helpers(log_views.headers, path), path.stem), str(error)
 
 
 def _keep_card(request: Request, form: CardForm) -> str:
@@ -175,7 +175,7 @@ def _keep_card(request: Request, form: CardForm) -> str:
     part = place.with_name(f"new-{place.name}")
     try:
         part.write_text(form.text(path.name), encoding="utf-8")
-        refused: str = request.app.state.helpers(looks.card_refused, part, path)
+        refused: str = request.app.state.helpers(log_views.card_refused, part, path)
         if refused:
             return refused.replace(part.name, "the card")
         part.replace(place)

@@ -8,7 +8,7 @@ from starlette.requests import Request
 from starlette.responses import Response
 from starlette.routing import Route
 
-from workbench.page.brief import briefly
+from workbench.page.answer_cache import briefly
 from workbench.page.pages import STATE_WORDS, show
 from workbench.page.visitors import Visitor, reading
 from workbench.registry.overview import FLEET_ORDERS, FleetAsked, fleet_page

@@ -8,12 +8,12 @@ import anyio
 from anyio import to_process
 
 from identification.errors import UserError
-from workbench.page.looks import warm
+from workbench.page.log_views import warm
 
 Result = TypeVar("Result")
-QUICK_LOOKS, SLOW_LOOKS = 2, 1  # at once; a slow one never keeps a first picture waiting
-LONGEST_LOOK = 60.0  # s
-KEPT_WARM = 120.0  # s between two calls; after five minutes without one a process would end
+QUICK_CALLS, SLOW_CALLS = 2, 1  # at once; a slow one never keeps a first picture waiting
+LONGEST_CALL = 60.0  # s
+STAYS_WARM = 120.0  # s between two calls; after five minutes without one a process would end
 
 
 class TooLong(UserError):
@@ -29,8 +29,8 @@ class Helpers:
         self._held = AsyncExitStack()
 
     async def __aenter__(self) -> Self:
-        self._quick = anyio.CapacityLimiter(QUICK_LOOKS)
-        self._slow = anyio.CapacityLimiter(SLOW_LOOKS)
+        self._quick = anyio.CapacityLimiter(QUICK_CALLS)
+        self._slow = anyio.CapacityLimiter(SLOW_CALLS)
         group = await self._held.enter_async_context(anyio.create_task_group())
         group.start_soon(self._keep_warm)
         self._held.callback(group.cancel_scope.cancel)
@@ -51,11 +51,11 @@ class Helpers:
         self, limit: anyio.CapacityLimiter | None, look: Callable[..., Result], *arguments: Any
     ) -> Result:
         try:
-            with anyio.fail_after(LONGEST_LOOK):
+            with anyio.fail_after(LONGEST_CALL):
                 return await to_process.run_sync(look, *arguments, cancellable=True, limiter=limit)
         except TimeoutError:
             raise TooLong(
-                f"the log was not read within {LONGEST_LOOK:.0f} s; cut it, or use the commands"
+                f"the log was not read within {LONGEST_CALL:.0f} s; cut it, or use the commands"
             ) from None
         except anyio.BrokenWorkerProcess:
             raise TooLong("the log could not be read: its reader has died; cut it") from None
@@ -64,4 +64,4 @@ class Helpers:
         while True:
             with suppress(anyio.BrokenWorkerProcess):  # the next call starts another
                 await to_process.run_sync(warm, cancellable=True, limiter=self._quick)
-            await anyio.sleep(KEPT_WARM)
+            await anyio.sleep(STAYS_WARM)

@@ -11,16 +11,16 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from identification.errors import UserError
-from workbench.page import version_looks
-from workbench.page.brief import briefly
+from workbench.page import version_views
+from workbench.page.answer_cache import briefly
 from workbench.page.machine_charts import parameter_charts
 from workbench.page.pages import registry_of, show
-from workbench.page.version_looks import EXPORTS
+from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import Visitor, reading
 from workbench.page.work import report_response
 from workbench.registry.axis_past import newest_lights
 from workbench.registry.difference import difference
-from workbench.registry.results import JudgedLog, condition, last_logs, log_count
+from workbench.registry.results import TestedLog, condition, last_logs, log_count
 from workbench.registry.values import ALARMING, Kind
 from workbench.report.chart import chart_html
 
@@ -62,7 +62,7 @@ def compare(request: Request, visitor: Visitor) -> Response:
         if found["design"] is not None
     ]
     try:
-        loops = request.app.state.helpers(version_looks.loops, designs[: len(set(numbers))])
+        loops = request.app.state.helpers(version_views.loops, designs[: len(set(numbers))])
     except UserError as error:
         return show(request, visitor, "said", said=str(error), bad=True)
     lines = difference(before, after)
@@ -74,7 +74,7 @@ def report(request: Request, _visitor: Visitor) -> Response:
     registry = registry_of(request)
     version = registry.version(request.path_params["machine"], request.path_params["number"])
     design = json.dumps(registry.document(version, "design"))
-    return report_response(request.app.state.helpers(version_looks.design_page, design))
+    return report_response(request.app.state.helpers(version_views.design_page, design))
 
 
 def kept_report(request: Request, _visitor: Visitor) -> Response:
@@ -104,7 +104,7 @@ def changes(request: Request, visitor: Visitor) -> Response:
     return show(request, visitor, "changes", title="Changes", changes=found)
 
 
-def _charts(logs: Sequence[JudgedLog]) -> str:
+def _charts(logs: Sequence[TestedLog]) -> str:
     shown = list(reversed(logs[:LAST_LOGS]))
     return "".join(str(chart_html(one)) for one in parameter_charts(shown))
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from identification.arrays import Array
-from workbench.registry.results import JudgedLog
+from workbench.registry.results import TestedLog
 from workbench.report.chart import Area, Chart, Line, Panel
 
 MOST_PARAMETERS = 8
@@ -15,7 +15,7 @@ PARAMETER_HEIGHT = 190
 SPANS = ((86400.0, "days"), (3600.0, "hours"), (60.0, "minutes"), (1.0, "seconds"))
 
 
-def parameter_charts(logs: Sequence[JudgedLog]) -> list[Chart]:
+def parameter_charts(logs: Sequence[TestedLog]) -> list[Chart]:
     """The parameters that the logs identify, the one that moved most first; none of a single log.
 
     logs: the oldest first.

@@ -148,6 +148,6 @@ def _with_design(
         checked, _ = validate(model, made, np.random.default_rng(0))
     except BadModel as error:
         return documents, f"{made.recommended} recommended, not validated: {error}"
-    said = "keeps every limit in simulation" if checked.passed else "misses a limit in simulation"
+    said = "meets every limit in simulation" if checked.passed else "misses a limit in simulation"
     line = f"{made.recommended.upper()} recommended, which {said}"
     return {**documents, "validation": validation_document(checked)}, line

@@ -27,7 +27,7 @@ from workbench.registry.errors import LostClaim, RegistryAway
 from workbench.registry.store import Registry
 
 TASK_LEASE = timedelta(seconds=30)
-QUEUE_LOOK = 0.5  # s between two looks at the queue, and at whether the task is still ours
+QUEUE_POLL = 0.5  # s between two looks at the queue, and at whether the task is still ours
 STUBBORN = 10.0  # s after which a computation that does not end is ended with its process
 STUBBORN_STATUS = 75
 
@@ -60,14 +60,14 @@ def run_worker(settings: PageSettings, report: Report, *, once: bool = False) ->
                 claim = bench.claim(owner, lease=TASK_LEASE, now=datetime.now(UTC))
             except RegistryAway as error:
                 report("registry_away", reason=str(error))
-                time.sleep(10 * QUEUE_LOOK)
+                time.sleep(10 * QUEUE_POLL)
                 continue
             if claim is not None:
                 _one(bench, claim, settings, report)
             elif once:
                 return
             else:
-                time.sleep(QUEUE_LOOK)
+                time.sleep(QUEUE_POLL)
 
 
 def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report) -> None:
@@ -127,7 +127,7 @@ def _beating(
         if not over.wait(STUBBORN):
             os._exit(STUBBORN_STATUS)
 
-    with renewed(beat, QUEUE_LOOK, stop):
+    with renewed(beat, QUEUE_POLL, stop):
         yield advance, told
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from workbench.registry.results import JudgedLog
+from workbench.registry.results import TestedLog
 from workbench.steps.axis_limits import MEANING_OF, Allowed, Light, light_of, limits_of
 
 LAST_ON_PAGE = 30
@@ -22,7 +22,7 @@ class AxisLine(NamedTuple):
     light: Light
 
 
-def newest_lights(logs: Sequence[JudgedLog]) -> tuple[str, Sequence[AxisLine]]:
+def newest_lights(logs: Sequence[TestedLog]) -> tuple[str, Sequence[AxisLine]]:
     """The file of the newest log that identifies parameters, and its lines; none of them without
     one.
 
@@ -51,7 +51,7 @@ def newest_lights(logs: Sequence[JudgedLog]) -> tuple[str, Sequence[AxisLine]]:
     return newest.file, [found[name] for name in MEANING_OF if name in found]
 
 
-def history(logs: Sequence[JudgedLog]) -> dict[str, list[tuple[float, float]]]:
+def history(logs: Sequence[TestedLog]) -> dict[str, list[tuple[float, float]]]:
     """Values of the logs by quantity, each with the moment at which its log was recorded."""
     out: dict[str, list[tuple[float, float]]] = {}
     for one in logs:

@@ -9,10 +9,10 @@ from typing import Any, Literal, get_args
 from sqlalchemy import ColumnElement, SQLColumnExpression, and_, case, func, select
 from sqlalchemy.orm import Session
 
-from workbench.registry.at_a_glance import MachineCondition
 from workbench.registry.database import Database
+from workbench.registry.machine_summary import MachineCondition
 from workbench.registry.page_tables import MachineNowRow
-from workbench.registry.tables import DecisionRow, InForceRow, VersionRow
+from workbench.registry.tables import ActiveVersionRow, DecisionRow, VersionRow
 
 FleetOrder = Literal["machine", "state", "heard", "moved"]
 FLEET_ORDERS: tuple[FleetOrder, ...] = get_args(FleetOrder)
@@ -125,10 +125,10 @@ def _lines(
 def _beside(session: Session, machines: Sequence[str]) -> Mapping[str, tuple[int, datetime]]:
     """Active versions and since when, looked up for the page's machines alone."""
     query = (
-        select(InForceRow.machine, VersionRow.number, DecisionRow.at)
-        .join(VersionRow, VersionRow.id == InForceRow.version_id)
-        .join(DecisionRow, DecisionRow.id == InForceRow.decision_id)
-        .where(InForceRow.machine.in_(machines))
+        select(ActiveVersionRow.machine, VersionRow.number, DecisionRow.at)
+        .join(VersionRow, VersionRow.id == ActiveVersionRow.version_id)
+        .join(DecisionRow, DecisionRow.id == ActiveVersionRow.decision_id)
+        .where(ActiveVersionRow.machine.in_(machines))
     )
     return {machine: (number, at) for machine, number, at in session.execute(query)}
 

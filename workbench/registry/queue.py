@@ -17,11 +17,12 @@ from sqlalchemy import and_, delete, func, select
 from sqlalchemy.orm import Session
 
 from workbench.output import dumps
-from workbench.registry.at_a_glance import glance_heard, glance_judged
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
+from workbench.registry.machine_summary import glance_heard, glance_judged
 from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
+    active_version,
     add_version,
     decide,
     judged_now,
@@ -31,7 +32,6 @@ from workbench.registry.rows import (
     seen,
     storable_text,
     turn,
-    version_in_force,
 )
 from workbench.registry.tables import (
     AttemptRow,
@@ -187,7 +187,7 @@ class Queue:
             if done is not None and done.token == claim.token:
                 return _outcome(session, row, done)
             _hold(session, claim, now)
-            current = version_in_force(session, claim.machine)
+            current = active_version(session, claim.machine)
             newer = _newer(session, claim.machine, log, order)
             if newer is not None:
                 judgement = _of_older(judgement, log, newer)

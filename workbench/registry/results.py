@@ -17,7 +17,7 @@ Told = Literal["", "sent", "waiting", "given up"]
 
 
 @dataclass(frozen=True)
-class JudgedLog:
+class TestedLog:
     """A log of the machine, when it was recorded and tested; verdict None: it waits.
 
     parameters: what it gave of each; told: whether the webhook has been told.
@@ -34,7 +34,7 @@ class JudgedLog:
     told: Told
 
 
-def last_logs(database: Database, machine: str, last: int) -> Sequence[JudgedLog]:
+def last_logs(database: Database, machine: str, last: int) -> Sequence[TestedLog]:
     """The machine's last logs by the time of their files, the newest first."""
     sent = and_(NoticeRow.log_id == OutcomeRow.log_id, NoticeRow.turn == OutcomeRow.turn)
     queued = and_(OutboxRow.log_id == OutcomeRow.log_id, OutboxRow.turn == OutcomeRow.turn)
@@ -70,14 +70,14 @@ def log_count(database: Database, machine: str) -> int:
 def _judged(
     log: LogRow, done: OutcomeRow | None, number: int | None, sent: datetime | None,
     queued: OutboxRow | None,
-) -> JudgedLog:  # fmt: skip
+) -> TestedLog:  # fmt: skip
     recorded = log.mtime_ns / 1e9
     if done is None:
-        return JudgedLog(log.file, log.sha256, recorded, None, "", None, None, (), "")
+        return TestedLog(log.file, log.sha256, recorded, None, "", None, None, (), "")
     drift = json.loads(done.evidence).get("drift") or {}
     told: Told = "sent" if sent else ""
     if queued is not None:
         told = "waiting" if queued.given_up_at is None else "given up"
     parameters = tuple(drift.get("parameters") or ())
-    return JudgedLog(log.file, log.sha256, recorded, done.verdict, done.reason, number, done.at,
+    return TestedLog(log.file, log.sha256, recorded, done.verdict, done.reason, number, done.at,
                      parameters, told)  # fmt: skip

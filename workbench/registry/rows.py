@@ -11,11 +11,11 @@ from sqlalchemy.orm import Session, aliased
 
 from workbench.cards.nearest import nearest
 from workbench.output import dumps
-from workbench.registry.at_a_glance import begin_glance, glance_moved
 from workbench.registry.errors import BadRegistry
+from workbench.registry.machine_summary import begin_glance, glance_moved
 from workbench.registry.tables import (
+    ActiveVersionRow,
     DecisionRow,
-    InForceRow,
     LogRow,
     MachineRow,
     OutcomeRow,
@@ -133,10 +133,10 @@ def decide(
     session.add(row)
     session.flush()
     if kind in ("promoted", "rolled_back"):
-        pointer = session.get(InForceRow, version.machine)
+        pointer = session.get(ActiveVersionRow, version.machine)
         if pointer is None:
             session.add(
-                InForceRow(machine=version.machine, version_id=version.id, decision_id=row.id)
+                ActiveVersionRow(machine=version.machine, version_id=version.id, decision_id=row.id)
             )
         else:
             pointer.version_id, pointer.decision_id = version.id, row.id
@@ -176,9 +176,9 @@ def numbered(session: Session, machine: str, number: int) -> VersionRow:
     return found
 
 
-def version_in_force(session: Session, machine: str) -> VersionRow | None:
+def active_version(session: Session, machine: str) -> VersionRow | None:
     """The row of the active version."""
-    pointer = session.get(InForceRow, machine)
+    pointer = session.get(ActiveVersionRow, machine)
     return None if pointer is None else session.get_one(VersionRow, pointer.version_id)
 
 
@@ -193,7 +193,7 @@ def logs_behind(session: Session, machine: str) -> tuple[SeenLog, ...]:
         .where(DecisionRow.log_id.is_not(None))
     )
     fitted: list[str] = []
-    current = version_in_force(session, machine)
+    current = active_version(session, machine)
     if current is not None:
         model = json.loads(session.get_one(RecordRow, current.model_id).document)
         fitted = [str(entry.get("sha256")) for entry in model.get("log", ())]

@@ -12,6 +12,7 @@ from sqlalchemy.orm import InstrumentedAttribute, Session
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry
 from workbench.registry.rows import (
+    active_version,
     add_version,
     decide,
     decision_value,
@@ -20,13 +21,12 @@ from workbench.registry.rows import (
     lock_machine,
     need_machine,
     numbered,
-    version_in_force,
     version_value,
     version_values,
 )
 from workbench.registry.tables import (
+    ActiveVersionRow,
     DecisionRow,
-    InForceRow,
     LogRow,
     MachineRow,
     OutcomeRow,
@@ -84,7 +84,7 @@ class Registry:
         with self.database.writing() as session:
             need_machine(session, machine, lock=True)
             row = numbered(session, machine, number)
-            current = version_in_force(session, machine)
+            current = active_version(session, machine)
             if current is not None and current.id == row.id:
                 raise BadRegistry(f"{machine}: version {number} is active already")
             made = decide(session, "promoted", row, reason=reason, by=by, now=now)
@@ -119,7 +119,7 @@ class Registry:
     def in_force(self, machine: str) -> Version | None:
         """The active version; None where nothing has been promoted."""
         with self.database.reading() as session:
-            row = version_in_force(session, machine)
+            row = active_version(session, machine)
             return None if row is None else version_value(session, row)
 
     def version(self, machine: str, number: int) -> Version:
@@ -186,11 +186,13 @@ def _states(session: Session, name: str | None = None) -> tuple[MachineState, ..
     def only(column: InstrumentedAttribute[str]) -> tuple[ColumnElement[bool], ...]:
         return () if name is None else (column == name,)
 
-    pointers = session.scalars(select(InForceRow).where(*only(InForceRow.machine))).all()
+    pointers = session.scalars(
+        select(ActiveVersionRow).where(*only(ActiveVersionRow.machine))
+    ).all()
     forces = {row.machine: row for row in pointers}
-    current = select(InForceRow.version_id).where(*only(InForceRow.machine))
+    current = select(ActiveVersionRow.version_id).where(*only(ActiveVersionRow.machine))
     versions = version_values(session, VersionRow.id.in_(current))
-    behind = select(InForceRow.decision_id).where(*only(InForceRow.machine))
+    behind = select(ActiveVersionRow.decision_id).where(*only(ActiveVersionRow.machine))
     decisions = {d.id: d for d in decision_values(session, DecisionRow.id.in_(behind))}
     made = _counts(session, select(VersionRow.machine, func.count()), only(VersionRow.machine))
     logs = _counts(session, select(LogRow.machine, func.count()), only(LogRow.machine))

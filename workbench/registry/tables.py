@@ -142,7 +142,7 @@ class DecisionRow(Base):
     )
 
 
-class InForceRow(Base):
+class ActiveVersionRow(Base):
     """The one active version of a machine, and the decision that put it there."""
 
     __tablename__ = "in_force"

@@ -18,7 +18,7 @@ from identification.arrays import Array
 from workbench.report.templating import render, safe
 
 Colour = Literal["measured", "model", "reference", "other", "before", "band", "quiet"]
-Look = Literal["line", "bold", "dashed", "dotted", "dots"]
+LineStyle = Literal["line", "bold", "dashed", "dotted", "dots"]
 
 FIRST_VIEW = 4000  # points of a line at least: two on each pixel of a wide screen
 FINEST_POINTS = 40_000  # points of a line at most
@@ -39,7 +39,7 @@ class Line:
     x: Array
     y: Array
     colour: Colour = "model"
-    look: Look = "line"
+    look: LineStyle = "line"
 
 
 @dataclass(frozen=True, eq=False)

@@ -65,10 +65,10 @@ def controller_sentence(found: Demonstration) -> str:
     """The controller that is recommended, and whether it keeps its limits in simulation."""
     name = taken(found.design)
     if found.design.recommended == "none":
-        return "No controller keeps every goal; design.html says what each misses."
-    verdict = "keeps all limits in simulation" if found.validation.passed else "misses a limit"
+        return "No controller meets every goal; design.html says what each misses."
+    verdict = "meets all limits in simulation" if found.validation.passed else "misses a limit"
     return (
-        f"Recommended: {called(name)}, which {verdict}; % of the step, in motion of the amplitude:"
+        f"Recommended: {called(name)}, which {verdict}; errors in % of the step or the amplitude:"
     )
 
 

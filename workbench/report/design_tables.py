@@ -172,7 +172,7 @@ def set_point_lines(found: Design) -> list[str]:
 def design_sentence(found: Design) -> str:
     """Which controller, and what speaks for it, in one or two sentences."""
     if found.recommended == "none":
-        return "No controller keeps every goal; below is what each misses."
+        return "No controller meets every goal; below is what each misses."
     why = ""
     if found.recommendation:
         why = f". With friction in simulation: {own_figures(found.recommendation.why)}"

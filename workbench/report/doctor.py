@@ -6,18 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from workbench.cards.readable import number
-from workbench.documents.model import Told
-from workbench.remarks import told_once
+from workbench.documents.model import Identifiable
+from workbench.remarks import printed_once
 from workbench.report.chart import Chart
 from workbench.report.chart_figure import chart_figure
 from workbench.report.doctor_chart import doctor_charts, speed_unit, unit_of
 from workbench.screen import SCREEN_WIDTH, VERBOSE, Screen, instead, screen
 from workbench.steps.doctor import Clock, Delay, Examined, SensorState
-from workbench.steps.told_by_log import Way
+from workbench.steps.identifiable_by_log import Way
 
-LABEL_WIDTH = 17
+LABEL_WIDTH = 15
 SHOWS_FROM = 10.0  # deviations of the noise, from which an effect would show
 MOST_OF_A_KIND = 4  # lines on bad samples, notes and runs to add
 
@@ -37,28 +37,28 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     lines += _labelled("clock", [_clock(found.clock)])
     lines += _labelled("signal", [_sensor(found, one) for one in found.sensors], 8)
     bad = [one.line for one in found.bad]
-    told = bad if most is None else told_once(bad, [found.file])
+    told = bad if most is None else printed_once(bad, [found.file])
     lines += _labelled("samples", [_plain(found, one) for one in told])
     lines += _labelled("delay", [_delay(one) for one in found.delays])
     if found.ways is not None:
         ways = found.ways
-        lines += _labelled("way +", [_way(found, ways.positive)])
-        lines += _labelled("way -", [_way(found, ways.negative)])
+        lines += _labelled("direction +", [_way(found, ways.positive)])
+        lines += _labelled("direction -", [_way(found, ways.negative)])
         lines += _labelled("motion", [f"reversals: {ways.reversals}, rests: {ways.rests}, at rest"
                                       f" {ways.rested:.3g} s"])  # fmt: skip
     if found.told:
         can = ", ".join(_within(one) for one in found.told if one.can)
         lines += _labelled("identifiable", [can or "nothing"])
     lines += _labelled("only if", _open(found.told))
-    lines += _labelled("not identifiable", _not_told(found.told), 6)
+    lines += _labelled("unidentifiable", _not_identifiable(found.told), 6)
     if found.effects is not None:
         shown = [key for key, by in found.effects.items() if by >= SHOWS_FROM]
         hidden = [key for key in found.effects if key not in shown]
         lines += _labelled("effects", [f"would show: {', '.join(shown) or 'none'}",
                                        f"would not: {', '.join(hidden) or 'none'}"])  # fmt: skip
     lines += _labelled("add", [one.removeprefix("add ") for one in found.add])
-    said = [one for one in found.remarks if most is None or not isinstance(one, Aside)]
-    said = said if most is None else told_once(said, [found.file])
+    said = [one for one in found.remarks if most is None or not isinstance(one, MinorRemark)]
+    said = said if most is None else printed_once(said, [found.file])
     lines += _labelled("note", [_plain(found, one) for one in said])
     if found.refused:
         lines += _labelled("refused", [_plain(found, found.refused)])
@@ -67,7 +67,7 @@ def _lines(found: Examined, out: Path | None, most: int | None) -> list[str]:
     return lines
 
 
-def _within(one: Told) -> str:
+def _within(one: Identifiable) -> str:
     """A parameter, and within what share of its value it can be identified."""
     return one.name if one.within is None else f"{one.name} {100.0 * one.within:.2g} %"
 
@@ -129,7 +129,7 @@ def _sensor(found: Examined, one: SensorState) -> str:
     low, high = factor * one.low, factor * one.high
     if low == high:
         return f"{one.name}: always {low:.4g} {unit}".rstrip()
-    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no quantization step found"
+    step = f"step {number(factor * one.step)}" if one.step > 0.0 else "no steps"
     noise = f"noise {number(factor * one.noise, 2)}"
     share = max(one.noise, one.step / np.sqrt(12.0)) / (one.high - one.low)
     span = f"{low:.4g} to {high:.4g} {unit}".rstrip()
@@ -152,12 +152,12 @@ def _way(found: Examined, one: Way) -> str:
     )
 
 
-def _not_told(told: Iterable[Told]) -> list[str]:
+def _not_identifiable(told: Iterable[Identifiable]) -> list[str]:
     """The reasons, each with the parameters that it holds for."""
     return _together((one.why, one.name) for one in told if not (one.can or one.only_if))
 
 
-def _open(told: Iterable[Told]) -> list[str]:
+def _open(told: Iterable[Identifiable]) -> list[str]:
     """On what it depends whether others are identifiable, each with the parameters that it holds
     for."""
     return _together((one.only_if, one.name) for one in told if one.only_if)

@@ -6,9 +6,9 @@ from identification.signals.differentiate import differentiate
 from workbench.cards.units import si_unit
 from workbench.report.chart import Band, Chart, Line, Panel
 from workbench.report.chart_figure import evenly_spread
-from workbench.steps.doctor import Examined, Looked
+from workbench.steps.doctor import CheckedLog, Examined
 
-Seen = Looked | Examined
+Seen = CheckedLog | Examined
 SCREEN_UNITS = {"m": (1e3, "mm"), "Pa": (1e-5, "bar"), "m/s": (1e3, "mm/s")}
 MOST_BANDS = 60
 NOISE_WIDTHS = 4.0  # of the velocity, within which a direction is not sure

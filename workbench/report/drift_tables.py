@@ -3,10 +3,10 @@
 from collections.abc import Sequence
 
 from identification.drift.drift_result import DriftTest, Shift, Statistic
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from workbench.cards.readable import number, shown_unit
 from workbench.output import Row
-from workbench.remarks import told_once
+from workbench.remarks import printed_once
 from workbench.report.model_tables import reasons_once
 from workbench.report.notes import notes
 from workbench.screen import Part, instead, tabled
@@ -45,7 +45,7 @@ def _what_changed(test: DriftTest) -> str:
     return "; ".join(parts)
 
 
-def seen_sentence(test: DriftTest, limit: float) -> str:
+def detectable_sentence(test: DriftTest, limit: float) -> str:
     """The minimum detectable changes of a test, and on which parameters it is inconclusive.
 
     limit: relative change that it must be able to see. "" where nothing was tested.
@@ -61,8 +61,8 @@ def seen_sentence(test: DriftTest, limit: float) -> str:
 
 
 def reason_sentence(test: DriftTest, limit: float) -> str:
-    """Why a test has its verdict and, without an alarm, what it could have seen; limit as above."""
-    seen = "" if test.found_by else seen_sentence(test, limit)
+    """Why a test has its verdict and, without an alarm, its minimum detectable changes."""
+    seen = "" if test.found_by else detectable_sentence(test, limit)
     return "; ".join(filter(None, (test.reason or _all_that_moved(test), seen)))
 
 
@@ -130,7 +130,7 @@ def shift_table(one: Tested, logs: Sequence[str] = ()) -> Part:
 def _shift_row(shift: Shift) -> Row:
     interval = f"{signed_percent(shift.low)} to {signed_percent(shift.high)}"
     pairs = ((shift.before, shift.before_sd), (shift.after, shift.after_sd))
-    told = [told_estimate(value, shift.unit, sd).value for value, sd in pairs]
+    told = [reported_estimate(value, shift.unit, sd).value for value, sd in pairs]
     unit, factor = shown_unit(shift.unit)
     before, after = ("-" if value is None else number(factor * value, 5) for value in told)
     return (shift.name, before, after, unit, signed_percent(shift.change), interval)
@@ -158,20 +158,21 @@ def what_the_columns_say(found: Drifted) -> list[str]:
     """Legend of the tables, and what counts as a change."""
     setting = found.settings
     return [
-        "this log, mean of logs: how far the parameters have moved, of how far it takes to be"
-        " drift; chi-square: what the model leaves, of what it may",
-        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where it is"
-        f" sure: thresholds for a false alarm in {setting.run_length:g} logs or more",
-        "the intervals hold the errors of the model and of the log, and how much the machine varies"
+        "this log, mean of logs: drift statistic, of its threshold; chi-square: residual of the"
+        " model, of its limit",
+        f"a change counts beyond {100 * setting.margin:.3g} % of the model's value, and where"
+        f" significant: thresholds for a false alarm in {setting.run_length:g} logs or more",
+        "the intervals contain the errors of the model and of the log, and how much the machine"
+        " varies"
         f" from log to log ({100 * setting.variation:.3g} % until its logs have shown it)",
     ]
 
 
-def seen_lines(found: Drifted) -> list[str]:
+def detectable_lines(found: Drifted) -> list[str]:
     """The minimum detectable change of each test, and why a log was inconclusive."""
     out = []
     for one in found.tests:
-        said = seen_sentence(one.test, found.settings.to_be_seen)
+        said = detectable_sentence(one.test, found.settings.to_be_seen)
         if said:
             out.append(f"{one.source.file}: {said}")
         if one.test.reason:
@@ -183,7 +184,7 @@ def seen_lines(found: Drifted) -> list[str]:
 
 def drift_notes(found: Drifted) -> list[str]:
     """What to know of the tests: thresholds, inconclusive runs, remarks."""
-    return [*what_the_columns_say(found), *seen_lines(found), *found.remarks]
+    return [*what_the_columns_say(found), *detectable_lines(found), *found.remarks]
 
 
 def logs_of_drift(found: Drifted) -> tuple[str, ...]:
@@ -195,9 +196,9 @@ def logs_of_drift(found: Drifted) -> tuple[str, ...]:
 def drift_parts(found: Drifted) -> list[Part | str]:
     """Every run, the parameters of the last one, and what to know of the tests."""
     logs = logs_of_drift(found)
-    legend, seen = what_the_columns_say(found), seen_lines(found)
+    legend, seen = what_the_columns_say(found), detectable_lines(found)
     # What is inconclusive, and why, stands in the table too.
-    told = told_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
+    told = printed_once((line.partition("; inconclusive: ")[0] for line in seen), logs)
     short = [line for line in told if line not in drift_sentence(found)]
     return [
         run_table(found),

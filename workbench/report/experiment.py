@@ -21,9 +21,9 @@ PIECE_NAMES = {
     "stairs": "stairs up and down",
     "multisine": "a multisine",
 }
-PROMISE_LOOKS: tuple[tuple[str, Colour, float, str], ...] = (
+PROMISE_STYLES: tuple[tuple[str, Colour, float, str], ...] = (
     ("before", "before", -0.1, "now"),
-    ("after", "measured", 0.1, "promised after the run"),
+    ("after", "measured", 0.1, "expected after the run"),
 )
 RUN_CAPTION = (
     "Reference and simulated run on the model and on machines drawn from what the model leaves open"
@@ -192,7 +192,7 @@ def run_chart(found: Experiment) -> Chart:
 def promise_chart(found: Experiment) -> Chart:
     """Half intervals over the value, now and after the run; none where one is not identified."""
     lines = []
-    for key, colour, shift, name in PROMISE_LOOKS:
+    for key, colour, shift, name in PROMISE_STYLES:
         sizes = [getattr(one, key) for one in found.promise]
         told = [i for i, one in enumerate(sizes) if one and found.promise[i].value]
         shares = [100.0 * sizes[i] / abs(found.promise[i].value) for i in told]

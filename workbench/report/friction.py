@@ -8,7 +8,7 @@ import numpy as np
 from identification.arrays import Array
 from identification.log import Log
 from identification.model.estimates import KarnoppFit
-from identification.model.inverse_model import held_force
+from identification.model.inverse_model import zoh_force
 from identification.model.karnopp import NAMES, Karnopp
 from identification.model.resonance import load_acceleration
 from identification.signals.differentiate import differentiate, low_pass
@@ -45,7 +45,7 @@ class FrictionData:
 def friction_data(model: Model, log: Log) -> FrictionData:
     """What the log says of friction, force and motion smoothed alike."""
     motion = differentiate(log["y"], log.h)
-    F = held_force(log["F"]) if model.rig.kind == "motor" else log["F"]
+    F = zoh_force(log["F"]) if model.rig.kind == "motor" else log["F"]
     F = low_pass(F + _of_place(model, log), log.h, motion.cutoff)
     inner = slice(motion.edge, len(F) - motion.edge)
     left = F - _inertia(model, motion.a, log.h)

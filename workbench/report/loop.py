@@ -8,7 +8,7 @@ import numpy as np
 from design.loop import LoopRun
 from identification.arrays import Array
 from workbench.cards.readable import number, units_of
-from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.page import Section, table_section
 from workbench.report.validation_tables import validation_lines, validation_table
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Traces
@@ -128,7 +128,7 @@ def _of(name: str, run: LoopRun, values: Array, begin: int, span: int, factor: f
     """A line of a loop, called and coloured by its controller."""
     alone = name.removesuffix(COMPENSATED)
     shown = name if alone == PRESENT else name.replace(alone, alone.upper())
-    look: Look = "line" if alone == name else "dashed"
+    look: LineStyle = "line" if alone == name else "dashed"
     return _cut(run, values, begin, span, factor, shown, LOOP_COLOURS[alone], look)
 
 
@@ -140,7 +140,7 @@ def _cut(
     factor: float,
     name: str,
     colour: Colour,
-    look: Look,
+    look: LineStyle,
 ) -> Line:
     part = slice(begin, begin + span)
     t = run.t[part]

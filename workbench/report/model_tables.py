@@ -10,7 +10,7 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import as_shown, in_digits, length, number, times
 from workbench.documents.model import Model, used
 from workbench.output import Row
-from workbench.remarks import told_once
+from workbench.remarks import printed_once
 from workbench.report.notes import notes
 from workbench.screen import Part, instead, more, tabled
 
@@ -91,7 +91,7 @@ def model_parts(model: Model, remarks: Sequence[str]) -> list[Part | str]:
     logs, lines = logs_of(model), fit_lines(model)
     return [
         tabled(MODEL_HEAD, reasons_once(rows, logs), whole=rows),
-        instead(told_once(lines, logs), lines),
+        instead(printed_once(lines, logs), lines),
         *map(more, plant_lines(model)),
         notes((*remarks, *model.fit.remarks), logs),
     ]

@@ -22,10 +22,10 @@ if TYPE_CHECKING:
 
 SLOWER, FASTER = 0.7, 1.4  # of the natural frequency that a loop is tried with next
 TWO_DIGITS = 100.0
-LOOK_FOLDER = "check"  # where a picture of a log is proposed
+CHECK_FOLDER = "check"  # where a picture of a log is proposed
 
 
-def looked_over(logs: Sequence[str], card: str) -> Callable[[str], Step]:
+def check_of_refused(logs: Sequence[str], card: str) -> Callable[[str], Step]:
     """After a refusal of logs: look at the one that its reason names, else at the first."""
 
     def then(reason: str) -> Step:
@@ -45,7 +45,7 @@ def after_identify(model: "Model", logs: Sequence[str], card: str, folder: Path)
 
 def without_design(model: "Model | VelocityModel", card: str | None) -> Callable[[str], Step]:
     """After a refusal to design: look over the log that the model is of."""
-    return looked_over([one.file for one in model.log], _card_of(model, card))
+    return check_of_refused([one.file for one in model.log], _card_of(model, card))
 
 
 def _card_of(model: "Model | VelocityModel", card: str | None) -> str:
@@ -67,7 +67,7 @@ def after_design(
         return None
     words = ("design", str(model_file), *kept)
     if asked_poles:
-        return step("poles that keep the goals are searched", *words)
+        return step("poles that meet the goals are searched", *words)
     best = max(found.controllers.values(), key=lambda one: (-len(one.missed), _worst(one)))
     modulus, delay = _floor(_worst(best)), best.margins.delay_samples
     of_margins = all("margin" in missed for missed in best.missed)
@@ -79,10 +79,10 @@ def after_design(
 
 
 def after_robust(found: "Robust", model_file: Path) -> Step | None:
-    """Where no loop keeps the limits often enough: the run that narrows what is not sure."""
+    """Where no loop keeps the limits often enough: the run that reduces the uncertainty."""
     if found.passed:
         return None
-    return step("the run that narrows what is not sure", "experiment", model_file)
+    return step("the run that reduces the uncertainty", "experiment", model_file)
 
 
 def _worst(one: "Controller") -> float:
@@ -163,7 +163,7 @@ def after_doctor(found: "Examined", log: str, card: str, out: Path | None) -> St
     if found.verdict not in ("refused", "nothing"):
         return None
     if found.verdict == "nothing" and out is None:
-        return step("see the log", "doctor", log, "--card", card, "--out", LOOK_FOLDER)
+        return step("see the log", "doctor", log, "--card", card, "--out", CHECK_FOLDER)
     if found.verdict == "nothing":
         return step("once a run is added as above", "doctor", log, "--card", card)
     path = Path(card)

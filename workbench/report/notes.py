@@ -3,8 +3,8 @@
 from collections.abc import Collection, Iterable
 from dataclasses import replace
 
-from identification.remarks import Aside
-from workbench.remarks import Merged, merged, told_once
+from identification.remarks import MinorRemark
+from workbench.remarks import Merged, merged, printed_once
 from workbench.screen import Part, instead
 
 MOST_NOTES = 6
@@ -16,14 +16,14 @@ def notes(remarks: Iterable[str], logs: Collection[str] = (), most: int = MOST_N
     logs: names with which a remark on one log begins.
     """
     every = tuple(remarks)
-    told = told_once((one for one in every if not isinstance(one, Aside)), logs)
+    told = printed_once((one for one in every if not isinstance(one, MinorRemark)), logs)
     shown = [one._replace(text=f"note: {one.text}") for one in report_notes(every, logs)]
     return replace(instead(_noted(told), _noted(every), most, yields=True), merged=shown)
 
 
 def report_notes(remarks: Iterable[str], logs: Collection[str] = ()) -> list[Merged]:
     """All remarks for a report, asides after the others; those merged with what each said."""
-    return merged(sorted(remarks, key=lambda one: isinstance(one, Aside)), logs)
+    return merged(sorted(remarks, key=lambda one: isinstance(one, MinorRemark)), logs)
 
 
 def _noted(lines: Iterable[str]) -> list[str]:

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from workbench.cards.readable import force, length, units_of
-from workbench.report.chart import Chart, Colour, Line, Look, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Panel, chart_html
 from workbench.report.notes import notes
 from workbench.report.page import Section, lines_section
 from workbench.report.view import View
@@ -32,17 +32,15 @@ def error_lines(found: Predicted, rotary: bool) -> list[str]:
     lines = []
     if summary["position_rms"] is not None:
         rms = length(summary["position_rms"], rotary)
-        lines.append(f"position ({start}, driven by {by}): off by {rms} rms")
+        lines.append(f"position ({start}, driven by {by}): error {rms} rms")
     if summary["run_refused"] is not None:
         lines.append(f"position: {summary['run_refused']}")
     if summary["force_predicted_rms"] is not None:
         rms = force(summary["force_predicted_rms"], rotary)
-        lines.append(
-            f"force, inverse model: off by {rms} rms while sliding, outside the stick band"
-        )
+        lines.append(f"force, inverse model: error {rms} rms while sliding, outside the stick band")
     if summary["force_simulated_rms"] is not None:
         rms = force(summary["force_simulated_rms"], rotary)
-        lines.append(f"force, simulated: off by {rms} rms")
+        lines.append(f"force, simulated: error {rms} rms")
     return lines
 
 
@@ -87,11 +85,11 @@ def prediction_chart(found: Predicted, rotary: bool) -> Chart:
             every = [np.append(getattr(run, key), gap) for run in found.runs]
             values = factor * np.concatenate(every)
             if np.any(np.isfinite(values)):
-                look: Look = "line" if colour == "measured" else "dashed"
+                look: LineStyle = "line" if colour == "measured" else "dashed"
                 lines.append(Line(said, t, values, colour, look))
         panels.append(Panel("time [s]", f"{name} [{unit}]", lines))
         if len(lines) > 1:
             measured, model = lines[:2]
             off = Line(f"{measured.name} less {model.name}", t, measured.y - model.y)
-            panels.append(Panel("time [s]", f"off by [{unit}]", [off]))
+            panels.append(Panel("time [s]", f"error [{unit}]", [off]))
     return Chart("prediction", "measured and predicted position and force over time", panels)

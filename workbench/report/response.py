@@ -7,7 +7,7 @@ import numpy as np
 
 from identification.arrays import Array
 from identification.errors import UserError
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.frequency.estimate import COHERENCE_SURE, Response
 from identification.frequency.stretches import ComplexArray
 from identification.model.size import Size
@@ -15,7 +15,7 @@ from workbench.cards.parameter_units import shown
 from workbench.cards.readable import number
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
-from workbench.report.chart import Area, Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.chart import Area, Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.notes import notes, report_notes
 from workbench.report.page import Section, lines_section, table
 from workbench.report.view import View
@@ -65,7 +65,7 @@ def peak_table(found: Responded) -> Part:
 
 
 def _cells(one: Size, unit: str) -> tuple[str, str]:
-    told = told_estimate(one.value, unit, one.sd)
+    told = reported_estimate(one.value, unit, one.sd)
     shown_unit = "" if unit == "1" else f" {unit}"
     if told.low is None or told.high is None:
         return f"{number(one.value)}{shown_unit}", "not identifiable"
@@ -117,7 +117,7 @@ def friction_line(found: Responded) -> str:
     upto = float(every.f[every.body.seen][-1])
     with_, without = (sure_share(one, upto) for one in (every.with_friction, every.body))
     return (
-        f"friction: taken off the force; that leaves a coherence above {COHERENCE_SURE:g} on"
+        f"friction: subtracted from the force; that leaves a coherence above {COHERENCE_SURE:g} on"
         f" {100 * without:.0f} % of the octaves up to {number(upto)} Hz,"
         f" {100 * with_:.0f} % with friction left in"
     )
@@ -301,7 +301,9 @@ def _round_range(f: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _line(name: str, x: Array, y: Array, colour: Colour = "measured", look: Look = "line") -> Line:
+def _line(
+    name: str, x: Array, y: Array, colour: Colour = "measured", look: LineStyle = "line"
+) -> Line:
     return Line(name, x, y, colour, look)
 
 

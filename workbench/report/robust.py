@@ -8,7 +8,7 @@ from identification.arrays import Array
 from workbench.cards.parameter_units import shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design_file import design_document
-from workbench.report.chart import Chart, Colour, Line, Look, Mark, Panel, chart_html
+from workbench.report.chart import Chart, Colour, Line, LineStyle, Mark, Panel, chart_html
 from workbench.report.controllers import coefficients, controllers, drive_section
 from workbench.report.design_tables import design_lines
 from workbench.report.notes import notes
@@ -22,7 +22,7 @@ from workbench.steps.robust.robust import NOMINAL, ROBUST, Promise, Robust, Spre
 
 ROBUST_HEAD = ("over the machines drawn", "limit", "met", "5 %", "median", "95 %")
 BESIDE_HEAD = ("median, and share that meets the limit", "robust", "nominal", "present")
-CURVE_LOOKS: dict[str, tuple[Colour, Look]] = {
+CURVE_STYLES: dict[str, tuple[Colour, LineStyle]] = {
     ROBUST: ("model", "line"),
     NOMINAL: ("before", "dotted"),
     PRESENT: ("measured", "dashed"),
@@ -50,7 +50,7 @@ def robust_sentence(found: Robust) -> str:
     )
     if promise.every == 1.0:
         return (
-            f"{called}{with_it}: keeps every limit on each of {found.asked.draws} machines drawn."
+            f"{called}{with_it}: meets every limit on each of {found.asked.draws} machines drawn."
         )
     return (
         f"{called}{with_it}: each limit holds on at least {100 * least:.0f} % of"
@@ -75,7 +75,7 @@ def promise_table(found: Robust, rotary: bool) -> Part:
 def beside_table(found: Robust, rotary: bool) -> Part:
     """The medians of every loop, and the shares."""
     rows = [
-        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_LOOKS))
+        (one.words, *(_beside(one, found.promises.get(name), rotary) for name in CURVE_STYLES))
         for one, _ in _of(found.promises[ROBUST])
     ]
     return tabled(BESIDE_HEAD, rows, right=(1, 2, 3))
@@ -181,7 +181,7 @@ def _sections(found: Robust, rotary: bool) -> list[Section]:
 
 def _then(found: Robust) -> list[str]:
     if not found.passed:
-        return ["`workbench experiment MODEL` finds the run that narrows what is not sure, then"
+        return ["`workbench experiment MODEL` finds the run that reduces the uncertainty, then"
                 " identify and design again"]  # fmt: skip
     return ["`workbench validate MODEL design.json` shows its loops in time, `workbench export"
             " design.json --to c` writes the code"]  # fmt: skip
@@ -221,7 +221,7 @@ def _shares(found: Robust, one: Measure, rotary: bool) -> Panel:
         at, share = at[keep], share[keep]
         # Where many machines have one value the line goes up, which an axis takes as going on.
         apart = UPWARDS * float(np.max(np.abs(at), initial=1e-9)) * np.arange(len(at))
-        lines.append(Line(name, at + apart, share, *CURVE_LOOKS[name]))
+        lines.append(Line(name, at + apart, share, *CURVE_STYLES[name]))
     return Panel(
         f"{one.words.split(',')[0]}{unit}", "share of machines [%]", lines,
         marks=[] if limit is None else [Mark(factor * limit, "x")],

@@ -48,12 +48,12 @@ def traced_view(traced: Traced) -> View:
             "model.json": lambda: model_document(traced.model),
         },
         lambda: _sections(traced),
-        lambda: _telling_chart(traced),
+        lambda: _main_chart(traced),
         then_of(traced),
     )
 
 
-def _telling_chart(traced: Traced) -> Chart:
+def _main_chart(traced: Traced) -> Chart:
     """The residual against the signal that explains it, else the friction before and after."""
     drawn, rig = pictures(traced.trace), traced.model.rig
     if drawn:

@@ -61,7 +61,7 @@ def errors_table(found: Trace, rotary: bool, tested: bool = True) -> Part:
         )
         for key, name, factor, floor in errors
     ]
-    return tabled(head, _telling(rows), whole=rows)
+    return tabled(head, _main_rows(rows), whole=rows)
 
 
 def _cell(value: float | None, factor: float) -> str:
@@ -213,7 +213,7 @@ def logs_of_trace(traced: Traced) -> tuple[str, ...]:
     return tuple(dict.fromkeys(source.log.name for source in (*traced.train, *traced.test)))
 
 
-def _telling(errors: list[Row]) -> list[Row]:
+def _main_rows(errors: list[Row]) -> list[Row]:
     """The errors in newtons and millimetres that are known; those that fell, where any did."""
     known = [row for row in errors if set(row[1:5]) != {"-"} and "%" not in row[0]]
     return [row for row in known if row[1] != row[2] or row[3] != row[4]] or known

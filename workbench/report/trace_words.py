@@ -15,7 +15,7 @@ MOST = 1000.0  # change shown [%]
 NOISE = 1.5  # times the sensors' noise, up to which nothing is left
 
 
-class Told(NamedTuple):
+class ReportedError(NamedTuple):
     """The error by which a trace is reported: its name, before, after, its noise, and how each is
     written."""
 
@@ -107,7 +107,7 @@ def _on_signals(unknown: Dependence) -> str:
 def share_explained(traced: Traced) -> str:
     """How much of what was missing the effects explain, and on what the rest depends."""
     found = traced.trace
-    if told_by(traced) is None:  # no error in which they would show
+    if reported_error(traced) is None:  # no error in which they would show
         return ""
     share = 100 * found.left.share
     it, where = (
@@ -129,7 +129,7 @@ def unexplained(traced: Traced, signals: Sequence[str] = ()) -> str:
     left, off = found.after["train"].force_rms, found.after["train"].position_rms
     if left is not None and left <= NOISE * found.noise_force and off is not None:
         return (
-            f"the free run is off by {length(off, rotary)} in 2 s (sensors' noise"
+            f"the free run has an error of {length(off, rotary)} in 2 s (sensors' noise"
             f" {length(found.noise_y, rotary)}), and it {depends}."
         )
     said = "an unknown part" if left is None else force(left, rotary)
@@ -158,33 +158,33 @@ def nothing_missing(found: Trace, rotary: bool) -> str:
 
 def fall_of_error(traced: Traced) -> str:
     """How the error fell in which the effects show."""
-    told = told_by(traced)
+    told = reported_error(traced)
     if told is None:
         return ""
     noise = "" if told.noise is None else f" (sensors' noise {told.write(told.noise)})"
     return f"{told.name} {told.write(told.before)} -> {told.write(told.after)}{noise}."
 
 
-def told_by(traced: Traced) -> Told | None:
+def reported_error(traced: Traced) -> ReportedError | None:
     """The force error, or where that hardly falls the one that falls most."""
     found, rotary = traced.trace, traced.model.rotary
     before, after = found.before["test"], found.after["test"]
     where = "Held-out" if traced.test else "On stretches left out,"
     noise, rate = found.noise_force, found.noise_actuator
     every = (
-        Told(
+        ReportedError(
             f"{where} force error",
             *_both(before, after, "force_rms"),
             noise,
             lambda x: force(x, rotary),
         ),
-        Told(
+        ReportedError(
             f"{where} error of the actuator equation",
             *_both(before, after, "actuator_rms"),
             rate,
             lambda x: f"{force(x, rotary)}/s",
         ),
-        Told(
+        ReportedError(
             f"{where} position error in 2 s",
             *_both(before, after, "position_rms"),
             found.noise_y,

@@ -131,7 +131,7 @@ def _verdict(found: VelocityTraced) -> str:
             )
         case "inseparable":
             able = ", ".join(one.key for one in left.rivals if one.better)
-            return f"inseparable: {able} explain what is left alike; before, {over}"
+            return f"inseparable: {able} explain the residual equally; before, {over}"
         case _:
             return f"unknown: {over}, and no richer structure predicts it clearly better"
 
@@ -253,7 +253,7 @@ def _validation_table(found: VelocityValidation) -> Part:
 def _passed(found: VelocityValidation) -> str:
     many = len(found.figures)
     if found.passed:
-        return f"Passed: the loop keeps every limit on {many} plants."
+        return f"Passed: the loop meets every limit on {many} plants."
     failed = sum(bool(one.misses) for one in found.figures.values())
     return f"Not passed: on {failed} of {many} plants a limit is missed."
 

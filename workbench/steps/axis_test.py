@@ -14,7 +14,7 @@ from scipy.stats import norm
 
 from identification.arrays import Array
 from identification.estimation.axis_equation import AxisEquation, axis_equation
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.estimation.surroundings import surroundings
 from identification.model.estimates import Estimate
 from identification.model.surroundings import Surroundings
@@ -96,7 +96,7 @@ class AxisTest:
         identified."""
         found = {one.light for one in self.quantities}
         worst = next(light for light in WORST if light in found)
-        if worst == "red" or not (self.unjudged or self.blind):
+        if worst == "red" or not (self.untested or self.blind):
             return worst
         return "yellow"
 
@@ -106,7 +106,7 @@ class AxisTest:
         return any(self.of(name).estimate.value is None for name in ("F_cp", "F_cn"))
 
     @property
-    def unjudged(self) -> bool:
+    def untested(self) -> bool:
         """Whether no number of the machine has limits."""
         return all(one.allowed is None or one.allowed.source == "usual" for one in self.quantities)
 
@@ -123,7 +123,7 @@ class AxisTest:
             found = (self.of(name).estimate for name in ("F_cp", "F_cn"))
             why = next(one.reason or "" for one in found if one.value is None)
             out.append(f"Coulomb friction is not identifiable: {why.partition(';')[0]}")
-        if self.unjudged:
+        if self.untested:
             why = self.earlier.said if self.earlier else "give --registry, or the card [limits]"
             out.append(f"no limits to test against: {why}")
         return tuple(out)
@@ -174,7 +174,7 @@ def told_of(
         elif found.relative > MOST_UNEXPLAINED:
             out[name] = Estimate(None, units[name], reason=unheld)
         else:
-            out[name] = told_estimate(
+            out[name] = reported_estimate(
                 found.values[name], units[name], found.sd[name], bounds=(0.0, np.inf)
             )
     value, sd = found.offset if not around.force.value else (around.force.value, around.force.sd)
@@ -252,7 +252,7 @@ def judged(name: str, told: Estimate, allowed: Allowed | None) -> Quantity:
         said = _said(meaning, told, allowed, "") if light == "red" else ""
         return Quantity(name, meaning, told, allowed, light, said)
     outside = not allowed.low <= told.value <= allowed.high
-    unsure = ", though this log is not sure of it" if outside else " within its interval"
+    unsure = ", though not significantly by this log" if outside else " within its interval"
     if allowed.source == "usual":
         unsure = ": something else acts"
     return Quantity(name, meaning, told, allowed, light, _said(meaning, told, allowed, unsure))

@@ -16,7 +16,7 @@ from design.tracking import Demand
 from design.tune import Asked, Goals, Tuned, tune_pid, tune_rst
 from identification.errors import BadModel, BadSpecification
 from identification.model.plant import Actuator
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.cards.readable import length, number, shown_unit
 from workbench.documents.design import (
@@ -370,7 +370,7 @@ def _compensator(model: Model, h: float) -> CompensatorValues:
 def _remarks(model: Model, found: Design, chosen: Recommendation) -> list[str]:
     out = list[str]()
     if chosen.controller == "none":
-        out.append(Aside(f"no controller is recommended, {chosen.why}"))
+        out.append(MinorRemark(f"no controller is recommended, {chosen.why}"))
     names = unknown_viscous(model)
     if found.plant.source == "physical" and names:
         out.append(f"{' and '.join(names)} not identified: an assumed value stands in the design")

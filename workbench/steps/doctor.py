@@ -32,12 +32,12 @@ from identification.signals.renewal import renewed
 from identification.signals.thin import thinned
 from workbench.cards.card import Card
 from workbench.cards.units import conversion
-from workbench.documents.model import Told
+from workbench.documents.model import Identifiable
 from workbench.documents.plausible import log_remarks
 from workbench.logs.runs import read_signals, with_force
-from workbench.steps.hardly_tells import hardly_tells
-from workbench.steps.runs_tell import RunsTell, runs_tell
-from workbench.steps.told_by_log import Ways
+from workbench.steps.hardly_identifiable import hardly_identifiable
+from workbench.steps.identifiability_of_runs import RunsIdentifiability, identifiability_of_runs
+from workbench.steps.identifiable_by_log import Ways
 
 DOCTOR_SCHEMA = "doctor/1"
 LIMITED = ("u", "F", "p_p", "p_n")  # signals whose range may end
@@ -97,7 +97,7 @@ class Examined:
     bad: tuple[BadSamples, ...]
     delays: tuple[Delay, ...]
     ways: Ways | None
-    told: tuple[Told, ...]
+    told: tuple[Identifiable, ...]
     add: tuple[str, ...]
     refused: str
     remarks: tuple[str, ...]
@@ -108,7 +108,7 @@ class Examined:
     effects: Mapping[str, float] | None = None
 
     @property
-    def main(self) -> tuple[Told, ...]:
+    def main(self) -> tuple[Identifiable, ...]:
         """What is identifiable of the nine, or of all numbers of a rig that has no friction."""
         of_valve = self.rig.kind == "velocity"
         return tuple(one for one in self.told if of_valve or one.name in NAMES)
@@ -123,7 +123,7 @@ class Examined:
 
 
 @dataclass(frozen=True, eq=False)
-class Looked:
+class CheckedLog:
     """A log as far as it is known without identifiability: the first and quick part of a check.
 
     raw: signals as recorded; log: the longest run, None where there is none.
@@ -145,7 +145,7 @@ class Looked:
         return max(self.runs, key=len) if self.runs else None
 
 
-def looked(path: Path, card: Card) -> Looked:
+def checked_log(path: Path, card: Card) -> CheckedLog:
     """The log in the file, read by its card, repaired and cut into runs.
 
     A log that `identify` would refuse is looked at as far as it goes. Raises BadLog or BadCard
@@ -168,7 +168,7 @@ def looked(path: Path, card: Card) -> Looked:
         refused = str(error)
         runs = _as_far_as_it_goes(raw, path, card)
     bad += [one for name in LIMITED if name in raw for one in limits(raw, name)]
-    return Looked(
+    return CheckedLog(
         file=path.name,
         rig=rig,
         clock=clock,
@@ -186,18 +186,18 @@ def examine(path: Path, card: Card, *, effects: bool = False) -> Examined:
 
     Raises as `looked` does.
     """
-    found = looked(path, card)
+    found = checked_log(path, card)
     log, runs = found.log, found.runs
     seen = (
-        runs_tell(runs, found.rig, effects=effects)
+        identifiability_of_runs(runs, found.rig, effects=effects)
         if runs and not found.refused
-        else RunsTell(reason=found.refused)
+        else RunsIdentifiability(reason=found.refused)
     )
     remarks = list(found.remarks)
     late = max(seen.surroundings.lag.value, 0.0) if found.rig.kind == "motor" else 0.0
     if log is not None and not found.refused:
         remarks += log_remarks(runs, found.rig, card.signals)
-        remarks += hardly_tells(runs, found.rig)
+        remarks += hardly_identifiable(runs, found.rig)
     return Examined(
         file=found.file,
         rig=found.rig,

@@ -9,13 +9,13 @@ from identification.estimation.windowed_run.parameters import plant_with
 from identification.model.plant import Plant
 from workbench.documents.model import Model, used
 from workbench.steps.closed_loop import in_the_loop
-from workbench.steps.drift import model_in_force
+from workbench.steps.drift import active_model
 
 NO_BAND_SHARE, USUAL_BAND_SHARE = (
     1e-3,
     0.03,
 )  # of the logs' speed: a band that none has, and a usual one
-UNTOLD_SPREAD = 0.3  # log of a value that no log identifies, one sigma
+UNIDENTIFIED_SPREAD = 0.3  # log of a value that no log identifies, one sigma
 
 
 def in_loop(model: Model) -> Plant:
@@ -40,14 +40,14 @@ def lost_bands(model: Model) -> dict[str, float]:
 def drawn_plants(model: Model, rng: np.random.Generator, count: int) -> tuple[Plant, ...]:
     """Plants drawn from the errors of the model's parameters; those that no log identifies within a
     third of what is assumed."""
-    known = model_in_force(model, "")
+    known = active_model(model, "")
     plant = in_loop(model)
     told = rng.multivariate_normal(
         known.values, known.covariance, count, check_valid="ignore", method="svd"
     )
     lost = lost_bands(model)
     assumed = {**_assumed(model, known.untold), **lost}
-    free = np.exp(UNTOLD_SPREAD * rng.standard_normal((count, len(assumed))))
+    free = np.exp(UNIDENTIFIED_SPREAD * rng.standard_normal((count, len(assumed))))
     names = (*known.names, *assumed)
     sets = np.hstack([told, free * np.array(list(assumed.values()))])
     last = {name: i for i, name in enumerate(names)}  # what is assumed replaces what was lost

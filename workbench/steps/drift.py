@@ -11,9 +11,9 @@ import numpy as np
 from identification.drift.drift_result import DriftTest, DriftVerdict, Shift, Statistic
 from identification.drift.drift_test import DriftSettings, drift_test
 from identification.drift.mewma import DriftState
-from identification.drift.reference_model import InForce
+from identification.drift.reference_model import ReferenceModel
 from identification.errors import BadModel
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.karnopp import NAMES
 from identification.model.plant import Motor
@@ -101,7 +101,7 @@ def model_key(model: Model) -> str:
     return hashlib.sha256(dumps(document).encode()).hexdigest()
 
 
-def model_in_force(model: Model, key: str) -> InForce:
+def active_model(model: Model, key: str) -> ReferenceModel:
     """The model as the drift test takes it; key: names it in the stored state.
 
     Without a correlation in the model file the parameters' errors count as independent.
@@ -114,7 +114,7 @@ def model_in_force(model: Model, key: str) -> InForce:
     told = {n: e for n, e in every.items() if e.known and e.sd is not None}
     why = "it gives no standard deviation"
     untold = {n: e.reason or why for n, e in every.items() if n not in told}
-    return InForce(
+    return ReferenceModel(
         plant=model.simulated,
         names=tuple(told),
         values=np.array([used(e) for e in told.values()]),
@@ -155,17 +155,17 @@ def drift_of(
     """
     settings = settings or DriftSettings()
     _same_machine(model, sources)
-    in_force = replace(model_in_force(model, key), rig=sources.rig)
+    in_force = replace(active_model(model, key), rig=sources.rig)
     remarks = [*model.read, *sources.remarks]
     if sources.card.name != model.card:
         remarks.append(f"the model is of {model.card}, the logs of {sources.card.name}")
     if model.own_logs is None and model.fit.chi_square > ADEQUATE:
         remarks.append(
             "the model leaves more than noise, and its file does not hold how far its own logs lie"
-            " from it; identify it again, or a drift may be cried that is the model's own misfit"
+            " from it; identify it again, or the model's own misfit may be taken for drift"
         )
     if stream is not None and stream.state.model != key:
-        remarks.append("the stored state is of another model; it begins anew with this one")
+        remarks.append("the stored state is of another model; it starts again with this one")
         stream = None
     before = {one.sha256 for one in stream.seen} if stream else set()
     state = stream.state if stream else None
@@ -245,7 +245,7 @@ def _of_run(one: Tested) -> dict[str, Any]:
         "unsure": list(test.unsure),
         "parameters": {name: _number(shift) for name, shift in test.shifts.items()},
         "not_judged": dict(test.not_judged),
-        "could_have_seen": seen_sizes(test),
+        "could_have_seen": detectable_sizes(test),
         "single": _statistic(test.single),
         "alone": _statistic(test.alone),
         "mean": _statistic(test.mean),
@@ -254,7 +254,7 @@ def _of_run(one: Tested) -> dict[str, Any]:
     }
 
 
-def seen_sizes(test: DriftTest) -> dict[str, float | None]:
+def detectable_sizes(test: DriftTest) -> dict[str, float | None]:
     """Smallest change of each parameter that a test could have seen, None where it sees none."""
     return {n: x if np.isfinite(x) else None for n, x in test.could_have_seen.items()}
 
@@ -263,8 +263,8 @@ def _number(shift: Shift) -> dict[str, Any]:
     """A parameter before, after, and its relative change, each as results carry a parameter."""
     return {
         "name": shift.name,
-        "before": as_number(told_estimate(shift.before, shift.unit, shift.before_sd)),
-        "after": as_number(told_estimate(shift.after, shift.unit, shift.after_sd)),
+        "before": as_number(reported_estimate(shift.before, shift.unit, shift.before_sd)),
+        "after": as_number(reported_estimate(shift.after, shift.unit, shift.after_sd)),
         "change": as_number(Estimate(shift.change, "1", shift.sd, shift.low, shift.high)),
     }
 

@@ -28,7 +28,7 @@ from identification.model.karnopp import NAMES
 from identification.model.plant import Actuator, Motor, actuator_units
 from identification.model.surroundings import Surroundings
 from identification.progress import KeepGoing, without_end
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from identification.signals.differentiate import differentiate
 from workbench.cards.effect_values import relabelled
 from workbench.cards.parameter_units import friction_units
@@ -42,7 +42,7 @@ from workbench.documents.model import (
 )
 from workbench.documents.versions import versions
 from workbench.logs.sources import Source
-from workbench.steps.drift import model_in_force
+from workbench.steps.drift import active_model
 
 Progress = Callable[[str, float], None]
 Orders = tuple[int, int, int]
@@ -114,7 +114,7 @@ def identify(
         resonance=resonance_of(fit.surroundings, rig),
         falling=fit.falling,
     )
-    known = with_own_logs(model_in_force(model, ""), logs, alone)
+    known = with_own_logs(active_model(model, ""), logs, alone)
     return replace(model, own_logs=known.own_logs), fit
 
 
@@ -237,7 +237,7 @@ def closed_loop_remarks(logs: Sequence[Log]) -> list[str]:
             together = float(np.corrcoef(log["r"], log["y"])[0, 1])
             if together > TRACKS:
                 out.append(
-                    Aside(
+                    MinorRemark(
                         f"{log.name}: logged in a closed loop (r and y correlate by"
                         f" {together:.2f}); the ARX plant is fitted directly, so noise fed back may"
                         " bias it"

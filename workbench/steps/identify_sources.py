@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate, KarnoppFit
 from identification.model.karnopp import NEGATIVE
 from identification.progress import KeepGoing, without_end
@@ -14,10 +14,10 @@ from workbench.documents.model import Model
 from workbench.documents.plain import as_number
 from workbench.documents.plausible import model_remarks
 from workbench.logs.sources import Source, Sources
+from workbench.steps.identifiability_of_runs import identifiability_of_runs
 from workbench.steps.identify import Options, Progress, identify
 from workbench.steps.other_kind import looks_like_velocity
 from workbench.steps.present import present_of_card
-from workbench.steps.runs_tell import runs_tell
 from workbench.steps.surrounding_lines import surrounding_lines
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def identify_sources(
     except NotIdentifiable as error:
         said = looks_like_velocity(logs, sources.rig)
         raise NotIdentifiable("; ".join([str(error), *said])) from error
-    gate = runs_tell(logs, sources.rig, options.drive, fit=fit)
+    gate = identifiability_of_runs(logs, sources.rig, options.drive, fit=fit)
     now = present_of_card(sources.card, sources.rig, model.period)
     bad = (*sources.bad, *fit.bad)
     model = replace(model, bad_samples=bad, controller=now, identifiability=gate.told)
@@ -98,7 +98,8 @@ def broken_promises(model: Model) -> tuple[str, ...]:
         return ()
     why = "a stop is lost" if model.fit.adequate else "the model lacks an effect"
     return (
-        f"intervals are wider than the logs promised (in brackets): {', '.join(wider)}; {why}, or"
+        f"intervals are wider than predicted from the logs (in brackets): {', '.join(wider)};"
+        f" {why}, or"
         " their noise is not the sensors' alone",
     )
 
@@ -126,7 +127,7 @@ def _posterior(found: "Posterior", fit: KarnoppFit) -> dict[str, Any]:
     spread = dict(zip(found.names, np.std(found.samples, axis=0).tolist(), strict=True))
     bounds = _bounds(fit)
     for name, (low, median, high) in found.interval().items():
-        told[name] = told_estimate(
+        told[name] = reported_estimate(
             median, units[name], spread[name], interval=(low, high), bounds=bounds[name]
         )
     return {

@@ -12,7 +12,7 @@ from workbench.cards.card import load_card
 from workbench.files import shipped_cards
 from workbench.logs.fetch import DATA_VARIABLE
 
-TOLD_VERSIONS = (
+SHOWN_VERSIONS = (
     "servo-workbench", "numpy", "scipy", "numba", "pandas", "pyarrow", "pint", "matplotlib",
 )  # fmt: skip
 OPTIONAL = {"psycopg": "PostgreSQL (servo-workbench[postgres])",
@@ -34,14 +34,14 @@ class Installation:
     wrong: tuple[str, ...]
 
 
-def look_over() -> Installation:
+def check_installation() -> Installation:
     """The installation that runs this."""
     wrong = list[str]()
     return Installation(
         python=f"{platform.python_version()} ({sys.executable})",
         platform=f"{platform.system()} {platform.release()}, {platform.machine()}",
         processors=os.cpu_count() or 1,
-        packages={name: _version(name) or "missing" for name in TOLD_VERSIONS},
+        packages={name: _version(name) or "missing" for name in SHOWN_VERSIONS},
         optional={name: _version(name) for name in OPTIONAL},
         cache=_cache(wrong),
         data=_data(wrong),

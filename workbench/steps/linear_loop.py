@@ -9,7 +9,7 @@ from design.elastic import Swing, elastic_plant
 from design.linear import ForceGains, commanded_plant, force_gains, linear_plant
 from identification.arrays import Array
 from identification.errors import BadSpecification, NotIdentifiable
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import Estimate
 from identification.model.plant import Actuator, Motor
 from workbench.cards.parameter_units import shown
@@ -200,7 +200,7 @@ def _viscous(model: Model) -> Estimate:
         return Estimate(None, one.unit, reason=reason, assumed=mean)
     if one.sd is None or other.sd is None:
         return Estimate(mean, one.unit)
-    return told_estimate(mean, one.unit, 0.5 * math.hypot(one.sd, other.sd))
+    return reported_estimate(mean, one.unit, 0.5 * math.hypot(one.sd, other.sd))
 
 
 def _arx(model: Model, period: float | None, known: bool) -> Linear:
@@ -249,10 +249,10 @@ def _corner_bodies(model: Model) -> list[tuple[float, float, tuple[Swing, ...]]]
     ends = [_ends(model.friction[name]) for name in ("F_vp", "F_vn")]
     least, most = min(low for low, _ in ends), max(high for _, high in ends)
     bodies = [(m, f) for m in _ends(model.friction["m"]) for f in (max(least, 0.0), most)]
-    return [(m, f, swings) for m, f in bodies for swings in _swings_told(model)]
+    return [(m, f, swings) for m, f in bodies for swings in _known_resonances(model)]
 
 
-def _swings_told(model: Model) -> Iterator[tuple[Swing, ...]]:
+def _known_resonances(model: Model) -> Iterator[tuple[Swing, ...]]:
     """The elastic parts at both ends of the interval of their frequency."""
     two = model.resonance
     if two is None:

@@ -162,7 +162,7 @@ def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Arr
     dwell = max(
         max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
     )
-    w = SMOOTH_SPEED * min(one.controllers[judged_of(one)].dominant[0] for one in designs)
+    w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
     levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
     return np.concatenate([levels, _smooth(amplitude, w, h, SMOOTH_PERIODS)])
 
@@ -194,7 +194,7 @@ def slowest(found: Design) -> float:
     return -found.plant.h / float(np.log(min(radius, 0.9999)))
 
 
-def judged_of(found: Design) -> Structure:
+def tested_of(found: Design) -> Structure:
     """The controller that decides: the recommended one, or the first there is."""
     there = [name for name in DESIGNED_STRUCTURES if name in found.controllers]
     return next((name for name in there if name == found.recommended), there[0])

@@ -12,7 +12,7 @@ from identification.velocity.model import Valve
 from identification.velocity.other_kind import body_squares
 from identification.velocity.record import AHEAD, Record, recorded
 from identification.velocity.rivals import HeldOut, clearly_better, held_out
-from identification.velocity.told import told, units
+from identification.velocity.valve_estimates import units, valve_estimates
 from workbench.cards.readable import length
 from workbench.documents.model import Model
 from workbench.steps.predict import predict
@@ -51,7 +51,7 @@ def looks_like_velocity(
     try:
         record = recorded([_slower(log) for log in commanded])
         found = fit(record)
-        told(record, found, units(rig.motion, "1"))
+        valve_estimates(record, found, units(rig.motion, "1"))
     except UserError:
         return ()
     held = held_out(record, found.valve, found.free, None)

@@ -44,7 +44,7 @@ def recommended(model: Model, found: Design) -> Recommendation:
         said = "; ".join(
             f"{n.upper()}: {', '.join(c.missed)}" for n, c in found.controllers.items()
         )
-        return Recommendation("none", False, f"none keeps every goal ({said})")
+        return Recommendation("none", False, f"none meets every goal ({said})")
     figures = compared(model, found)
     alone = _best(kept, figures)
     both = (alone, alone + COMPENSATED)

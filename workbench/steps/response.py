@@ -11,7 +11,7 @@ from design.measured_loop import MeasuredMargins, measured_margins
 from design.polynomial import evaluate
 from identification.arrays import Array, BoolArray
 from identification.errors import BadModel, NotIdentifiable
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.frequency.body import body_response
 from identification.frequency.estimate import COHERENCE_SURE, Response, in_series
 from identification.frequency.machine import MachineResponses, body_by_force, machine_responses
@@ -290,7 +290,7 @@ def _plain(value: float | None, unit: str) -> dict[str, Any]:
 
 
 def _sized(one: Size, unit: str) -> dict[str, Any]:
-    return as_number(told_estimate(one.value, unit, one.sd))
+    return as_number(reported_estimate(one.value, unit, one.sd))
 
 
 def response_frame(found: Responded) -> "pd.DataFrame":

@@ -7,7 +7,7 @@ from typing import Any, Literal
 import numpy as np
 
 from identification.errors import BadModel
-from identification.remarks import Aside
+from identification.remarks import MinorRemark
 from workbench.cards.parameter_units import Shown, shown
 from workbench.documents.design import Design, Structure
 from workbench.documents.design_file import design_digest
@@ -23,12 +23,12 @@ from workbench.steps.loop_figures import (
     Limits,
     LoopFigures,
     Traces,
-    judged_of,
     loop_figures,
     loop_runs,
     present_figures,
     references,
     takes_compensator,
+    tested_of,
 )
 from workbench.steps.recommend import in_thousandths, reasons
 
@@ -95,7 +95,7 @@ def validate(
                 traces[name + suffix, place] = run
                 one = loop_figures(machine, loop, run, limits, arx=arx)
                 figures[name + suffix][place] = one
-    judged = judged_of(found)
+    judged = tested_of(found)
     first = {name: places["model"] for name, places in figures.items()}
     with_it = found.recommendation is not None and found.recommendation.compensator
     return Validation(
@@ -130,7 +130,7 @@ def _remarks(
     machines: Sequence[Model | None],
 ) -> list[str]:
     out: list[str] = [
-        Aside(
+        MinorRemark(
             f"with the compensator, on the {place}: error at standstill"
             f" {100 * figures[judged][place].standstill_relative:.3g} ->"
             f" {100 * one.standstill_relative:.3g} %, along the smooth reference"
@@ -155,7 +155,7 @@ def _remarks(
             seen = _seen(one, unit, missed=not name.endswith(COMPENSATED))
             told = (f"{called} on the {place}: {line}" for line in seen)
             # What the table of the loops shows of those that nobody takes is an aside.
-            out += told if name in (judged, taken) else map(Aside, told)
+            out += told if name in (judged, taken) else map(MinorRemark, told)
     if found.compensator.assumed:
         out.append(f"simulated with assumed values of {', '.join(found.compensator.assumed)}")
     return out

@@ -20,7 +20,7 @@ from identification.velocity.rivals import (
     held_out,
     left_by_valve,
 )
-from identification.velocity.told import told, told_beside, units
+from identification.velocity.valve_estimates import estimates_beside, units, valve_estimates
 from workbench.documents.plain import as_number
 from workbench.documents.velocity import PredictionErrors, VelocityLog, VelocityModel
 from workbench.documents.versions import versions
@@ -48,7 +48,7 @@ def identify_velocity(sources: Sources, *, keep_going: KeepGoing = without_end) 
     """The model of the rig from its runs; raises NotIdentifiable where no gain is identifiable."""
     record = recorded(logs_of_runs(sources))
     found = fit(record, keep_going=keep_going)
-    numbers = told(record, found, _units(sources))
+    numbers = valve_estimates(record, found, _units(sources))
     held = held_out(record, found.valve, found.free, None)
     other = looks_like_friction(record, found.valve, held, sources.rig) if keep_going() else ()
     return _model(sources, numbers, held, record.noise, other)
@@ -67,12 +67,12 @@ def trace_velocity(
     if unseen is not None:
         unseen = replace(unseen, u_max=record.u_max)
     left = left_by_valve(record, unseen, keep_going=keep_going)
-    numbers = told(record, left.fitted, _units(train))
+    numbers = valve_estimates(record, left.fitted, _units(train))
     named = next((one for one in left.rivals if one.key == left.named), None)
     noise = (unseen or record).noise
     model = _model(train, numbers, named.left if named else left.held, noise, ())
     if left.named is not None:
-        beside = told_beside(left.fitted, STRUCTURES[left.named].adds, _units(train))
+        beside = estimates_beside(left.fitted, STRUCTURES[left.named].adds, _units(train))
         model = replace(model, effects={left.named: beside})
     return VelocityTraced(left, model, train.runs, test.runs if test else (), noise)
 

@@ -21,7 +21,7 @@ from identification.model.karnopp import Karnopp
 from identification.progress import Halt
 from identification.signals.clock_jitter import position_noise
 from identification.signals.differentiate import Motion, differentiate, resolution
-from identification.signals.force_walk import corrected_share, force_walk
+from identification.signals.force_random_walk import corrected_share, force_random_walk
 from identification.signals.intersample import kinks
 from identification.signals.noise import local_noise, quiet_part
 from identification.signals.weak_form import (
@@ -171,7 +171,7 @@ def motion_log(
     if not by_command:
         return one
     noise_F = min(noise_F, _unexplained(one))
-    walk = force_walk(log["F"], motion.y, integral(u, h), h, 1.0 / motion.cutoff)
+    walk = force_random_walk(log["F"], motion.y, integral(u, h), h, 1.0 / motion.cutoff)
     # A walk's steps are in the third differences by which the sensor's noise was seen.
     noise_F = float(np.sqrt(max(noise_F**2 - OF_WALK * walk**2, LEAST_PART_OF_NOISE * noise_F**2)))
     return replace(one, noise_F=noise_F, walk=walk)

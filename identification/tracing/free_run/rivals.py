@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from identification.estimation.structure_fit import FittedStructure
-from identification.thresholds import COMPLETE, LEAST_SHARE, LUCK_IN_GAIN
+from identification.thresholds import CHANCE_IN_GAIN, COMPLETE, LEAST_SHARE
 from identification.tracing.free_run.backward_elimination import Setting, fitted, only, seconds
 from identification.tracing.regression.candidates import EffectCandidate
 from identification.tracing.regression.stepwise import Choice, Step, merit, share
@@ -17,12 +17,12 @@ def equal_rivals(step: Step) -> tuple[EffectCandidate, ...]:
         c
         for c in step.rivals
         if c.effect.key not in step.apart
-        and mine - merit(c) < LUCK_IN_GAIN
+        and mine - merit(c) < CHANCE_IN_GAIN
         and share(c, step.base) >= LEAST_SHARE
     )
 
 
-def told_apart(choice: Choice, after: FittedStructure, setting: Setting) -> Choice:
+def discriminated(choice: Choice, after: FittedStructure, setting: Setting) -> Choice:
     """The choice, its steps with those rivals named whose run falls short where this one follows.
 
     The equations see means over stretches of sliding; the run has the starts and stops too.
@@ -42,7 +42,7 @@ def told_apart(choice: Choice, after: FittedStructure, setting: Setting) -> Choi
                 setting.halt.left_out(f"rivals of {key} on the free run")
                 return
             lost = seconds(setting) * (run.misfit - after.misfit)
-            if not run.imposed and run.misfit > COMPLETE and lost > LUCK_IN_GAIN:
+            if not run.imposed and run.misfit > COMPLETE and lost > CHANCE_IN_GAIN:
                 yield rival.effect.key
 
     return replace(choice, steps=tuple(replace(x, apart=frozenset(short(x))) for x in choice.steps))

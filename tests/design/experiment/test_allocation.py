@@ -7,7 +7,7 @@ import pytest
 
 from design.experiment.allocation import d_optimal, t_optimal
 from design.experiment.precision import log_det
-from identification.experiment.structures import told_apart
+from identification.experiment.structures import discriminated
 
 ALL = np.arange(2)
 
@@ -53,5 +53,5 @@ def test_rivals_are_told_apart_by_the_segment_in_which_they_differ() -> None:
     pairs = [Pair(1, (0, 2)), Pair(2, (0, 1))]
     found = t_optimal(matrices, pairs, np.ones(2), 3.0)
     assert found.times[1] > 2.9
-    left = told_apart(np.tensordot(found.times, matrices, 1), 1, (0, 2))
+    left = discriminated(np.tensordot(found.times, matrices, 1), 1, (0, 2))
     assert found.value == pytest.approx(np.log(left + 1.0), rel=1e-3)

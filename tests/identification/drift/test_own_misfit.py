@@ -7,12 +7,12 @@ import pytest
 
 from identification.arrays import Array
 from identification.drift.drift_result import DriftTest
-from identification.drift.drift_test import DriftSettings, judged_estimate
+from identification.drift.drift_test import DriftSettings, tested_estimate
 from identification.drift.log_estimate import LogEstimate
 from identification.drift.mewma import fresh_state
 from identification.drift.own_logs import own_logs_of, with_own_logs
 from identification.drift.own_misfit import own_misfit
-from identification.drift.reference_model import InForce, OwnLogs, in_force
+from identification.drift.reference_model import OwnLogs, ReferenceModel, in_force
 from identification.errors import BadModel
 from identification.estimation.fit import fit_plant
 from identification.log import Rig
@@ -32,19 +32,19 @@ def estimate(rng: np.random.Generator, factor: Array, left: float = LEFT) -> Log
     return LogEstimate(NAMES, values, covariance, {}, left, 1e9)
 
 
-def model(rng: np.random.Generator, logs: int = 3) -> InForce:
+def model(rng: np.random.Generator, logs: int = 3) -> ReferenceModel:
     """The mean of its logs, with a misfit of them."""
     own = [estimate(rng, np.ones(9)) for _ in range(logs)]
     values = np.mean([one.values for one in own], axis=0)
     covariance = np.diag((SAID * NINE.array) ** 2) / logs
-    found = InForce(
+    found = ReferenceModel(
         Plant(NINE, ACTUATOR), NAMES, values, covariance, Rig("force"), "force", chi_square=LEFT
     )
     return replace(found, own_logs=own_logs_of(found, own))
 
 
-def verdict(known: InForce, log: LogEstimate) -> DriftTest:
-    return judged_estimate(known, log, "log", fresh_state("", known.names), DriftSettings())
+def verdict(known: ReferenceModel, log: LogEstimate) -> DriftTest:
+    return tested_estimate(known, log, "log", fresh_state("", known.names), DriftSettings())
 
 
 def worn() -> Array:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.drift.mewma import Mean
-from identification.drift.single_log import LogChange, seen_alone, seen_together
+from identification.drift.single_log import LogChange, detectable_alone, detectable_together
 
 MEASURED = 1e-6 * np.array([[4.0, 1.5, 0.0], [1.5, 4.0, 0.0], [0.0, 0.0, 25.0]])
 VARIED = np.full(3, 1e-4)
@@ -36,7 +36,7 @@ def test_margin_and_variation_do_not_add_up() -> None:
 def test_the_smallest_change_is_seen_as_often_as_is_said() -> None:
     rng = np.random.default_rng(1)
     errors = rng.multivariate_normal(np.zeros(3), MEASURED, 400)
-    sizes = seen_alone(of([0.0, 0.0, 0.0]), SQUARE)
+    sizes = detectable_alone(of([0.0, 0.0, 0.0]), SQUARE)
     for i, size in enumerate(sizes):
         changed = size * np.eye(3)[i]
         alarms = [of(list(changed + error)).alone[i] ** 2 > SQUARE for error in errors]
@@ -47,7 +47,7 @@ def test_all_together_see_the_smallest_change_at_least_as_often() -> None:
     rng = np.random.default_rng(2)
     errors = rng.multivariate_normal(np.zeros(3), MEASURED, 200)
     margin = np.full(3, 0.02)
-    sizes = seen_together(Mean((0, 1, 2), np.zeros(3), MEASURED, margin), SQUARE)
+    sizes = detectable_together(Mean((0, 1, 2), np.zeros(3), MEASURED, margin), SQUARE)
     for i, size in enumerate(sizes):
         changed = size * np.eye(3)[i]
         squares = [
@@ -58,4 +58,4 @@ def test_all_together_see_the_smallest_change_at_least_as_often() -> None:
 
 def test_a_change_that_nothing_shows_is_never_seen() -> None:
     blind = Mean((0,), np.zeros(1), np.array([[1e4]]), np.array([0.02]))
-    assert seen_together(blind, SQUARE)[0] == np.inf
+    assert detectable_together(blind, SQUARE)[0] == np.inf

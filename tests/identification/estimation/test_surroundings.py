@@ -124,8 +124,10 @@ def test_what_is_unsure_of_a_force_taken_out_is_unsure_of_friction() -> None:
     log = Log("swing", {"t": t, "y": 0.3 * np.sin(t), "F": np.sin(t)})
     one = Estimate(0.3, "N m", 0.001, 0.298, 0.302)
     around = Surroundings(force=Size(1.0, 0.003), cosine=Size(0.1, 0.004), sine=Size(3.0, 0.001))
-    wider = widened_friction({"F_cp": one, "F_cn": replace(one, value=None)}, around, [log])
-    assert set(wider) == {"F_cp"}
+    known = {"F_cp": one, "F_cn": replace(one, value=None)}
+    known["m"] = Estimate(10.0, "kg m^2", 1e-6, 10.0, 10.0)
+    wider = widened_friction(known, around, [log])
+    assert set(wider) == {"F_cp", "m"} and wider["m"].sd == pytest.approx(0.01, rel=1e-3)
     sd = wider["F_cp"].sd
     assert sd is not None and abs(sd - np.hypot(0.001, np.hypot(0.003, 0.004 * 0.98))) < 2e-4
     low, high = wider["F_cp"].low, wider["F_cp"].high

@@ -18,7 +18,7 @@ from identification.estimation.estimates import (
     estimates,
     normal_samples,
     of_effect,
-    told_estimate,
+    reported_estimate,
 )
 from identification.log import Rig
 from identification.model.karnopp import NAMES, NEGATIVE
@@ -53,11 +53,11 @@ def test_no_estimate_breaks_the_rule(
 ) -> None:
     value = -size if negative else size
     bounds = (-np.inf, 0.0) if negative else (0.0, np.inf)
-    one = told_estimate(value, "N", sd, bounds=bounds, beside=beside)
+    one = reported_estimate(value, "N", sd, bounds=bounds, beside=beside)
     assert broken(one) is None
     if sd is not None and np.isfinite(sd):
         skewed = (value - below * 1.96 * sd, value + above * 1.96 * sd)
-        one = told_estimate(value, "N", sd, interval=skewed, bounds=bounds, beside=beside)
+        one = reported_estimate(value, "N", sd, interval=skewed, bounds=bounds, beside=beside)
         assert broken(one) is None
     assert one.at_most is None or one.value is None
     assert one.known or one.reason
@@ -108,13 +108,13 @@ def test_what_no_log_moves_from_its_default_is_given_with_the_law() -> None:
     ],
 )
 def test_the_reason_is_said_in_words(value: float, sd: float | None, said: str) -> None:
-    one = told_estimate(value, "kg", sd, bounds=(0.0, 50.0))
+    one = reported_estimate(value, "kg", sd, bounds=(0.0, 50.0))
     assert one.value is None and one.assumed == value and not one.known
     assert one.reason is not None and said in one.reason
 
 
 def test_an_interval_ends_where_the_parameter_does() -> None:
-    one = told_estimate(49.0, "1", 1.0, bounds=(0.0, 50.0))
+    one = reported_estimate(49.0, "1", 1.0, bounds=(0.0, 50.0))
     assert one.low == pytest.approx(47.04)
     assert one.high == 50.0
 

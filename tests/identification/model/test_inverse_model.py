@@ -20,7 +20,7 @@ from identification.model.inverse_model import (
     fit_inverse,
     force_error,
     force_predicted,
-    held_force,
+    zoh_force,
 )
 from identification.model.karnopp import Karnopp, friction
 from identification.signals.differentiate import Method
@@ -111,7 +111,7 @@ def test_a_held_force_is_seen_half_a_sample_late() -> None:
     held = log.with_signals(F=np.append(0.5 * (log["F"][1:] + log["F"][:-1]), log["F"][-1]))
     blind, aware = (force_error(held, TRUE, Smoothing(held=k)).relative for k in (False, True))
     assert aware < 0.6 * blind
-    np.testing.assert_allclose(held_force(np.array([1.0, 3.0, 5.0])), [1.0, 2.0, 4.0])
+    np.testing.assert_allclose(zoh_force(np.array([1.0, 3.0, 5.0])), [1.0, 2.0, 4.0])
 
 
 def test_predicted_force_is_the_applied_one() -> None:

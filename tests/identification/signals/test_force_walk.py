@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.arrays import Array
-from identification.signals.force_walk import corrected_share, force_walk
+from identification.signals.force_random_walk import corrected_share, force_random_walk
 
 H, N = 2e-3, 20_000
 K1, K2 = 2e4, 1e4
@@ -31,24 +31,24 @@ def signals(step: float, seed: int, dead: float = 0.0) -> tuple[Array, Array, Ar
 @settings(max_examples=20, deadline=None)
 @given(step=st.floats(3e-4, 0.1), seed=st.integers(0, 10_000))
 def test_the_step_of_a_walk_is_found(step: float, seed: int) -> None:
-    found = force_walk(*signals(step, seed), H, 8 * H)
+    found = force_random_walk(*signals(step, seed), H, 8 * H)
     assert found == pytest.approx(step, rel=0.3)
 
 
 @settings(max_examples=20, deadline=None)
 @given(seed=st.integers(0, 10_000))
 def test_an_exact_command_has_none(seed: int) -> None:
-    assert force_walk(*signals(0.0, seed), H, 8 * H) == 0.0
+    assert force_random_walk(*signals(0.0, seed), H, 8 * H) == 0.0
 
 
 def test_what_a_valve_swallows_is_no_noise() -> None:
     for seed in range(5):
-        assert force_walk(*signals(0.0, seed, dead=0.02), H, 8 * H) == 0.0
+        assert force_random_walk(*signals(0.0, seed, dead=0.02), H, 8 * H) == 0.0
 
 
 def test_a_log_too_short_tells_none() -> None:
     F, y, impulse = (x[:200] for x in signals(0.05, 1))
-    assert force_walk(F, y, impulse, H, 8 * H) == 0.0
+    assert force_random_walk(F, y, impulse, H, 8 * H) == 0.0
 
 
 def test_the_corrections_share_is_that_of_the_steady_filter() -> None:

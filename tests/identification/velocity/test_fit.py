@@ -14,7 +14,7 @@ from identification.signals.renewal import renewed
 from identification.velocity.fit import fit
 from identification.velocity.model import NUMBERS, Valve
 from identification.velocity.record import recorded
-from identification.velocity.told import told, units
+from identification.velocity.valve_estimates import units, valve_estimates
 from tests.identification.velocity.made import TRUE, command, made
 
 U = command(np.random.default_rng(5), 0.01, 25.0)
@@ -23,7 +23,7 @@ T = 0.01 * np.arange(2500)
 
 def found_in(log: Log) -> Mapping[str, Estimate]:
     record = recorded([log])
-    return told(record, fit(record), units("linear", "V"))
+    return valve_estimates(record, fit(record), units("linear", "V"))
 
 
 def near(found: Mapping[str, Estimate], h: float, true: Valve = TRUE) -> None:
@@ -58,7 +58,7 @@ def test_a_machine_wired_the_other_way_round() -> None:
 
 def test_several_logs_are_one_machine() -> None:
     record = recorded([made(46, duration=15.0), made(47, duration=15.0)])
-    near(told(record, fit(record), units("linear", "V")), 0.01)
+    near(valve_estimates(record, fit(record), units("linear", "V")), 0.01)
 
 
 def test_one_direction_tells_that_one_alone() -> None:

@@ -35,7 +35,7 @@ def quick(work: Work, course: Course) -> str:
 def work(where: str, root: str, *, once: bool = False) -> None:
     """Run a worker with `quick` in place of the fits."""
     patched: Any = worker
-    patched.done, patched.TASK_LEASE, patched.QUEUE_LOOK = quick, LEASE, LOOKS_EVERY
+    patched.done, patched.TASK_LEASE, patched.QUEUE_POLL = quick, LEASE, LOOKS_EVERY
     settings = PageSettings(where, root)
     worker.run_worker(settings, lambda event, **details: None, once=once)
 

@@ -7,7 +7,7 @@ import pytest
 
 from tests.workbench.page.conftest import NOW, Page
 from workbench.page.fleet import asked_for
-from workbench.registry.at_a_glance import TREND_LOGS, glance, state_of, with_log
+from workbench.registry.machine_summary import TREND_LOGS, most_moved, state_of, with_log
 from workbench.registry.overview import FleetAsked, fleet_page
 from workbench.registry.queue import Queue
 from workbench.registry.results import condition, last_logs
@@ -97,11 +97,11 @@ def test_pages_are_filtered_sorted_and_cut(where: str) -> None:
 
 
 def test_what_moved_most_is_what_surely_moved() -> None:
-    assert glance({}) == (None, None)
-    assert glance(evidence(told("a", 0.5, 0.5), told("b", -0.1, 0.01))) == ("b", -0.1)
-    assert glance(evidence(told("a", 0.01, 0.01), told("b", 0.015, 0.1)))[0] == "a"
+    assert most_moved({}) == (None, None)
+    assert most_moved(evidence(told("a", 0.5, 0.5), told("b", -0.1, 0.01))) == ("b", -0.1)
+    assert most_moved(evidence(told("a", 0.01, 0.01), told("b", 0.015, 0.1)))[0] == "a"
     old = {"drift": {"moved": [{"name": "F_cp", "before": 10.0, "after": 12.0}]}}
-    name, by = glance(old)
+    name, by = most_moved(old)
     assert name == "F_cp" and by == pytest.approx(0.2)
     trend: dict[str, list[float]] = {}
     for k in range(TREND_LOGS + 5):

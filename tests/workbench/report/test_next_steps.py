@@ -27,7 +27,7 @@ from workbench.report.next_steps import (
     after_experiment,
     after_identify,
     after_validate,
-    looked_over,
+    check_of_refused,
     without_design,
 )
 from workbench.steps.loop_figures import Limits
@@ -73,7 +73,7 @@ def test_names_are_quoted_for_a_shell() -> None:
 
 
 def test_a_refusal_of_logs_looks_over_the_one_it_names() -> None:
-    then = looked_over(["logs/a.csv", "logs/b.csv"], "card.toml")
+    then = check_of_refused(["logs/a.csv", "logs/b.csv"], "card.toml")
     assert taken(then("b.csv: no motion")) == "workbench doctor logs/b.csv --card card.toml"
     assert taken(then("no motion")) == "workbench doctor logs/a.csv --card card.toml"
 

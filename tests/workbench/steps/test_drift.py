@@ -23,7 +23,7 @@ from workbench.output import dumps
 from workbench.steps.drift import (
     Drifted,
     Stream,
-    model_in_force,
+    active_model,
     model_key,
     read_stream,
 )
@@ -110,7 +110,7 @@ def test_the_model_file_carries_its_own_logs_and_older_ones_keep_their_key(tmp_p
     path.write_text(dumps(model_document(replace(model, own_logs=own))), encoding="utf-8")
     read = read_model(path)
     assert read.own_logs == own
-    assert model_in_force(read, "k").own_logs == own
+    assert active_model(read, "k").own_logs == own
     document = model_document(replace(model, own_logs=None))
     del document["own_logs"], document["bad_samples"]  # as before there were any
     path.write_text(dumps(document), encoding="utf-8")
@@ -234,7 +234,7 @@ def test_the_model_file_keeps_the_covariance_of_the_fit(tmp_path: Path) -> None:
     path = tmp_path / "model.json"
     path.write_text(dumps(model_document(found.model)), encoding="utf-8")
     model = read_model(path)
-    known = model_in_force(model, model_key(model))
+    known = active_model(model, model_key(model))
     assert known.names == found.fit.free
     off = found.fit.covariance[0, 1] / np.sqrt(
         found.fit.covariance[0, 0] * found.fit.covariance[1, 1]
@@ -248,7 +248,7 @@ def test_the_model_file_keeps_the_covariance_of_the_fit(tmp_path: Path) -> None:
 
 def test_an_older_model_file_without_a_correlation_is_read() -> None:
     model = replace(identified().model, correlation=None)
-    known = model_in_force(model, "k")
+    known = active_model(model, "k")
     assert known.covariance == pytest.approx(np.diag(np.diag(known.covariance)))
 
 

@@ -14,7 +14,7 @@ from workbench.cards.card import load_card
 from workbench.logs.runs import read_runs
 from workbench.page.card_form import OTHER_FIELD, form_of, kept_form
 from workbench.steps.first_card.answers import BadAnswer, with_rig
-from workbench.steps.first_card.looked_over import looked_over
+from workbench.steps.first_card.checked_proposal import checked_proposal
 from workbench.steps.first_card.proposal import Proposal, proposed
 from workbench.steps.first_card.written import written
 
@@ -82,11 +82,13 @@ def test_an_error_drives_nothing_and_names_its_reference(
 
 def test_what_is_hardly_told_stands_in_the_card(joint: dict[str, Array], tmp_path: Path) -> None:
     held = joint["y"][(np.arange(len(T)) // 10) * 10]
-    found = looked_over(propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, held, joint["F"]))
+    found = checked_proposal(
+        propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, held, joint["F"])
+    )
     assert any("the position is renewed at 50 Hz" in one for one in found.hardly)
     assert "# the position is renewed at 50 Hz" in written(found)
     assert found.as_json()["hardly_told"] == found.hardly
-    sound = looked_over(
+    sound = checked_proposal(
         propose(tmp_path, "time [s],angle [rad],torque [Nm]", T, joint["y"], joint["F"])
     )
     assert sound.hardly == () and sound.refused == ""

@@ -7,7 +7,7 @@ from benchmarks.init_real_tables import machine
 from benchmarks.init_table_words import KINDS
 from identification.arrays import Array
 from identification.log import Log, Rig
-from workbench.steps.hardly_tells import hardly_tells
+from workbench.steps.hardly_identifiable import hardly_identifiable
 
 T: Array = np.asarray(2e-3 * np.arange(5000), dtype=np.float64)
 FORCE = Rig("force", motion="rotary")
@@ -20,7 +20,7 @@ def noise(size: float) -> Array:
 
 def said(rig: Rig, t: Array, y: Array, drive: Array) -> str:
     name = "F" if rig.kind == "force" else "u"
-    return " ".join(hardly_tells([Log("run", {"t": t, "y": y, name: drive})], rig))
+    return " ".join(hardly_identifiable([Log("run", {"t": t, "y": y, name: drive})], rig))
 
 
 SWING: Array = 0.9 * np.sin(1.9 * T) + 0.5 * np.sin(4.8 * T + 1.0)
@@ -58,4 +58,4 @@ def test_nearly_one_way_is_told_by_its_share() -> None:
 
 
 def test_where_nothing_is_said_no_run_is_needed() -> None:
-    assert hardly_tells([], FORCE) == ()
+    assert hardly_identifiable([], FORCE) == ()

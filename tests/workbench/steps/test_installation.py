@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from workbench.report.installation import installation_view
-from workbench.steps.installation import look_over
+from workbench.steps.installation import check_installation
 
 
 def test_versions_kernels_and_cards_are_told(
@@ -14,7 +14,7 @@ def test_versions_kernels_and_cards_are_told(
     (tmp_path / "emps").mkdir()
     (tmp_path / "emps/DATA_EMPS.mat").write_bytes(b"")
     monkeypatch.setenv("WORKBENCH_DATA", str(tmp_path))
-    found = look_over()
+    found = check_installation()
     assert found.packages["numpy"][0].isdigit()
     cards = found.data["cards"]
     assert isinstance(cards, dict) and cards["emps"] == {"there": 1, "of": 2}
@@ -28,5 +28,5 @@ def test_a_folder_of_data_that_is_none_is_wrong(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("WORKBENCH_DATA", str(tmp_path / "nowhere"))
-    (line,) = look_over().wrong
+    (line,) = check_installation().wrong
     assert "WORKBENCH_DATA" in line and "\n" not in line

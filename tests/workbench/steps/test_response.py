@@ -159,7 +159,9 @@ def test_of_many_logs_a_report_takes_the_longest(monkeypatch: pytest.MonkeyPatch
     (section,) = over_frequency(model(ONE), runs)
     (of_longest,) = over_frequency(model(ONE), runs[1:3])
     assert section.html == of_longest.html
-    assert section.title == "Over frequency" and "friction: taken off the force" in section.html
+    assert (
+        section.title == "Over frequency" and "friction: subtracted from the force" in section.html
+    )
     still = log.with_signals(y=np.zeros(len(log)))
     assert over_frequency(model(ONE), [replace(runs[1], log=still)]) == []
 
@@ -269,7 +271,7 @@ def test_words_and_pictures() -> None:
     found = responded(TWO)
     assert "an anti-resonance at 4" in response_sentence(found)
     text = response_view(found).screen().text()
-    assert "Hz" in text.splitlines()[0] and "friction: taken off the force" in text
+    assert "Hz" in text.splitlines()[0] and "friction: subtracted from the force" in text
     html = response_view(found).page()
     assert html.count('<figure class="chart"') == 3
     for title in ("Plant", "Resonances and margins", "Open loop", "Controller"):

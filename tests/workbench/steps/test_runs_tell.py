@@ -78,7 +78,7 @@ def test_a_broken_promise_is_told(both_ways: tuple[Path, Identified]) -> None:
     model = both_ways[1].model
     assert broken_promises(model) == ()
     (line,) = broken_promises(promised(model, 0.9 / BROKEN))
-    assert line.startswith("intervals are wider than the logs promised (in brackets): m ")
+    assert line.startswith("intervals are wider than predicted from the logs (in brackets): m ")
     assert broken_promises(promised(model, 1.1 / BROKEN)) == ()
 
 

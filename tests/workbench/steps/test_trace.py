@@ -214,7 +214,7 @@ def test_what_is_left_and_depends_on_no_signal_is_said_so() -> None:
     assert text.startswith("Unknown: the model leaves 0.07 N of force")
     assert "depends on none of the signals" in text
     text = trace_sentence(traced(found))  # no more force than the sensors' noise: it is in the run
-    assert text.startswith("Unknown: the free run is off by") and "10 µm in 2 s" in text
+    assert text.startswith("Unknown: the free run has an error of") and "10 µm in 2 s" in text
 
 
 def test_an_actuator_that_was_not_judged_is_not_called_complete() -> None:

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from design.experiment.precision import looked_at, precision
+from design.experiment.precision import evaluated, precision
 from design.experiment.search import best_run
 from design.experiment.separation import pairs_of, separation
 from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.errors import NotIdentifiable
 from identification.experiment.information import Information, unknowns
-from identification.experiment.structures import looked_for, told_apart
+from identification.experiment.structures import discriminated, sought
 from identification.model.plant import Plant
 from identification.progress import KeepGoing, Progress
 from workbench.cards.effect_values import known_effect
@@ -76,7 +76,7 @@ def experiment(
             f" ({bench.controller} hardly moves the machine within them); widen the limits, or"
             " give another --design"
         )
-    seen = looked_at(machines[:1], r)
+    seen = evaluated(machines[:1], r)
     per = len(asked) if not rivals else 1
     return Experiment(
         card=model.card,
@@ -107,7 +107,7 @@ def _rivals(model: Model, wanted: Wanted) -> tuple[Acting, ...]:
     limits, plant = limits_of(model, wanted), in_loop(model)
     own = {one.key: one for one in plant.effects}
     return tuple(
-        own.get(key) or looked_for(known_effect(key, model.library), plant, limits.stroke)
+        own.get(key) or sought(known_effect(key, model.library), plant, limits.stroke)
         for key in wanted.rivals
     )
 
@@ -127,7 +127,7 @@ def _with_one_each(plants: Sequence[Plant], rivals: Sequence[Acting]) -> tuple[P
 def _apart(told: Information, keys: Sequence[str]) -> tuple[Separation, ...]:
     """How far the run discriminates each pair, the hardest first."""
     found = [
-        Separation(*pair.names, float(np.sqrt(told_apart(told.matrix, pair.one, pair.others))))
+        Separation(*pair.names, float(np.sqrt(discriminated(told.matrix, pair.one, pair.others))))
         for pair in pairs_of(told, keys)
     ]
     return tuple(sorted(found, key=lambda one: one.deviations))
@@ -160,7 +160,7 @@ def _remarks(model: Model, exceeding: int, scale: float) -> list[str]:
         out.append(f"{names}: not identifiable; tried within a third of the assumed values")
     if not model.fit.adequate:
         out.append(
-            "the model leaves more than noise of its logs: what is promised holds for a machine"
+            "the model leaves more than noise of its logs: the prediction holds for a machine"
             " like the model; run 'workbench trace' for what is missing"
         )
     if scale < 1.0:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.arrays import Array
-from workbench.cards.headers import Header, meaning, tells_purpose, words_of
+from workbench.cards.headers import Header, meaning, says_purpose, words_of
 
 SAME_MOTION = 0.95  # correlation from which two positions are one axis with two sensors
 
@@ -41,7 +41,7 @@ def axes_of(columns: Sequence[tuple[Header, int]], alike: Array) -> dict[int, st
 def _may_be_a_name(word: str) -> bool:
     """Whether a word may name an axis: it says nothing else, or is itself a position's name."""
     means = meaning(word)
-    return not tells_purpose(word) and (not means or "position" in means or len(word) == 1)
+    return not says_purpose(word) and (not means or "position" in means or len(word) == 1)
 
 
 def _positions(
@@ -80,7 +80,7 @@ def _is_position(head: Header) -> bool:
 
 def stem(head: Header) -> tuple[str, ...]:
     """What a header says beside what its signal is for: "theta" of "target_theta"."""
-    return tuple(word for word in words_of(head.name) if not tells_purpose(word))
+    return tuple(word for word in words_of(head.name) if not says_purpose(word))
 
 
 def correlation(x: Array) -> Array:

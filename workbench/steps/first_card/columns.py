@@ -19,7 +19,7 @@ from workbench.logs.unknown import UnknownLog
 from workbench.steps.first_card.axes import axes_of, correlation
 from workbench.steps.first_card.registers import Register, read_register
 
-MOST_ROWS_LOOKED_AT = 10_000
+MOST_ROWS_READ = 10_000
 MOST_MISSING = 0.1  # of a column that is used
 WAY_BLOCKS = 2000  # means of a column over which its way is reckoned
 MOST_UNEVEN = 0.2  # steps that are off the median by more than half of it, of a clock
@@ -61,7 +61,7 @@ class Column:
     @cached_property
     def numbers(self) -> Array:
         """The first values that are numbers, as many as are looked at."""
-        part = self.values[:MOST_ROWS_LOOKED_AT]
+        part = self.values[:MOST_ROWS_READ]
         return np.asarray(part[np.isfinite(part)])
 
     @cached_property
@@ -134,7 +134,7 @@ class Columns:
 
 def columns_of(log: UnknownLog) -> Columns:
     """The columns of a log on one grid; raises BadLog where none of them is a clock."""
-    read = [_signed(one) for one in _told_units([_column(one) for one in log.columns])]
+    read = [_signed(one) for one in _known_units([_column(one) for one in log.columns])]
     usable = [one for one in read if not _unusable(one)]
     left_out = {one.raw.number: why for one in read if (why := _unusable(one))}
     clock = _clock(log.path, usable, [one for one in read if one.raw.unusable])
@@ -142,7 +142,7 @@ def columns_of(log: UnknownLog) -> Columns:
     clocks = {one.raw.number for one in usable if one is not clock and _second(one, clock)}
     left_out |= dict.fromkeys(sorted(clocks), "goes up evenly, as another clock does")
     others = [one for one in usable if one is not clock and one.raw.number not in clocks]
-    grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_LOOKED_AT))
+    grid = max(1, -(-round(np.ptp(clock.values) / step) // MOST_ROWS_READ))
     signals = [replace(one, x=_on_grid(clock.values, one.values, step, grid)) for one in others]
     kept, twice = _without_doubles(signals)
     kept = _with_axes(kept)
@@ -156,7 +156,7 @@ def _column(raw: RawColumn) -> Column:
     return Column(raw, read_header(raw.header, raw.unit_below), raw.values, raw.values)
 
 
-def _told_units(columns: Sequence[Column]) -> list[Column]:
+def _known_units(columns: Sequence[Column]) -> list[Column]:
     """The columns, their doubtful units believed where others' headers end in units too."""
     plain = [one for one in columns if one.header.unit and not one.header.doubtful]
     if len(plain) < FEWEST_WITH_UNITS:
@@ -308,7 +308,7 @@ def _said(one: Column) -> float:
 
 def _same(one: Column, other: Column) -> bool:
     """Whether two columns are one signal but for scale and offset: what is left is rounding."""
-    first, second = one.values[:MOST_ROWS_LOOKED_AT], other.values[:MOST_ROWS_LOOKED_AT]
+    first, second = one.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
     both = np.isfinite(first) & np.isfinite(second)
     a, b = first[both] - first[both].mean(), second[both] - second[both].mean()
     square, spread = float(a @ a), float(np.std(b))

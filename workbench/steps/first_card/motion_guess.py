@@ -35,7 +35,7 @@ class MotionGuess(NamedTuple):
         return "rotor" if self.rotor and self.motion == "rotary" else self.motion
 
 
-def told_motion(roles: Roles) -> MotionGuess:
+def known_motion(roles: Roles) -> MotionGuess:
     """Turns or slides: by units, by words, by a turn in the position's values; else a guess."""
     weak = {
         name: column.header.turning

@@ -17,7 +17,7 @@ from identification.signals.relations import (
     lead,
 )
 from workbench.steps.first_card.axes import correlation, stem
-from workbench.steps.first_card.columns import MOST_ROWS_LOOKED_AT, Column
+from workbench.steps.first_card.columns import MOST_ROWS_READ, Column
 
 STRETCHES = (2, 8, 32)  # samples over which a position's change is the velocity's sum
 FEWEST_AT_LIMIT = 3  # samples at which a limited command stands at its limit
@@ -153,7 +153,7 @@ def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
     for k, part in enumerate(signals):
         if k in (i, j) or part.flag or len(part.values) != len(signals[i].values):
             continue
-        c = part.values[:MOST_ROWS_LOOKED_AT]
+        c = part.values[:MOST_ROWS_READ]
         if len(c) != len(a) or float(np.ptp(c)) > width:
             continue
         same = np.abs(b - a - c) < SAME_SUM * width
@@ -164,7 +164,7 @@ def _added(signals: Sequence[Column], i: int, j: int) -> int | None:
 
 def _both(one: Column, other: Column) -> tuple[Array, Array]:
     """The rows looked at in which both have a number."""
-    a, b = one.values[:MOST_ROWS_LOOKED_AT], other.values[:MOST_ROWS_LOOKED_AT]
+    a, b = one.values[:MOST_ROWS_READ], other.values[:MOST_ROWS_READ]
     both = np.isfinite(a) & np.isfinite(b)
     return a[both], b[both]
 

@@ -15,13 +15,13 @@ from workbench.cards.card_tables import FileSpec
 from workbench.cards.units import Motion
 from workbench.logs.unknown import read_unknown
 from workbench.steps.first_card.columns import Column, Columns, columns_of
-from workbench.steps.first_card.motion_guess import MotionGuess, told_motion
+from workbench.steps.first_card.motion_guess import MotionGuess, known_motion
 from workbench.steps.first_card.remarks import BALANCED, remarks_on
-from workbench.steps.first_card.roles import Roles, told_roles
+from workbench.steps.first_card.roles import Roles, known_roles
 from workbench.steps.first_card.sizes import UnitGuess, factor
 from workbench.steps.first_card.unit_guess import guessed_units
 from workbench.steps.first_card.weights import SURE, said
-from workbench.steps.hardly_tells import ALL_FOLLOWED
+from workbench.steps.hardly_identifiable import ALL_FOLLOWED
 
 CARD_ORDER = ("t", "r", "y", "F", "p_p", "p_n", "u", "temperature")
 MOTOR_CONSTANT = re.compile(
@@ -88,7 +88,7 @@ class Proposal:
     kind.
 
     hardly: what is hardly identifiable from the log; refused: why it cannot be read by the card;
-    both empty until it was tried (`looked_over`)."""
+    both empty until it was tried (`checked_proposal`)."""
 
     path: Path
     name: str
@@ -143,7 +143,7 @@ def proposed(path: Path, name: str | None = None, axis: str | None = None) -> Pr
     """
     columns = columns_of(read_unknown(path))
     signals, only = _of_axis(columns, axis)
-    roles = told_roles(signals, only)
+    roles = known_roles(signals, only)
     if roles is None:
         there = ", ".join(one.shown for one in columns.signals) or "none"
         raise BadLog(
@@ -197,7 +197,7 @@ def _of_roles(columns: Columns, roles: Roles, name: str) -> Proposal:
     """The card by these roles."""
     other = roles.other
     roles, area = _pressure_beside_force(columns, roles)
-    motion = told_motion(roles)
+    motion = known_motion(roles)
     units = guessed_units(columns, roles, motion)
     rig = [_kind_guess(roles, other), _motion_guess(motion), *_rig(columns, roles, motion.motion)]
     if area is not None:

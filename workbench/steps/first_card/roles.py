@@ -14,14 +14,14 @@ from scipy.optimize import linear_sum_assignment
 
 from identification.arrays import Array
 from identification.log import RigKind
-from identification.signals.relations import TELLS_SIGN, ForceLaw, actuator_share, force_law
+from identification.signals.relations import GIVES_SIGN, ForceLaw, actuator_share, force_law
 from workbench.steps.first_card.columns import Column
 from workbench.steps.first_card.pairs import MOST_CONSTANT, Pairs, Seen
 from workbench.steps.first_card.weights import (
     ALL_VELOCITY,
     AREA_RATIOS,
+    FORCE_LIKENESS,
     LEAST_SCORE,
-    LOOKS_LIKE_A_FORCE,
     MIRRORED,
     RULED_OUT,
     SURE,
@@ -44,17 +44,17 @@ from workbench.steps.first_card.weights import (
 MOST_BODIES, MOST_WAYS, MOST_CHAMBERS = 8, 14, 8  # that physics is asked about
 FIRST_AXIS = 2.0  # log-odds for the axis that comes first, of several alike
 FAR_BEHIND = 7.0  # log-odds behind the likeliest position, from which one is not tried
-FRICTION_TELLS_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
+FRICTION_GIVES_SIGN = 5e-3  # share of a force that its step at the reversal explains, the same
 MOSTLY_ITS_LAW = 0.5  # share of a force that its law explains, without work the same
-WORK_TELLS_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
-COMMAND_TELLS_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
+WORK_GIVES_SIGN = 0.3  # share of the exchanged work, the same of what its law hardly explains
+COMMAND_GIVES_SIGN = 0.2  # share of a command that its law explains, from which its sign is known
 MOST_BY_CHANGE, MOST_UNNAMED = 4.0, 1.5  # log-odds that a force's change gives a command at most
 SAME_POSITION = 0.95  # correlation with the position, that no command has
 MOST_NEARER = 2.0  # log-odds that a velocity gives for what it is the derivative of, at most more
 EXACTLY = 0.02  # of a drive, left by its law along what it surely moves
 MORE_EXACTLY = 0.5  # of what its law leaves of a drive, left along what is rather the position
 CLEAR = 1.0  # log-odds that the next best column is behind at least, for a role to be sure
-HEADER_TELLS = 2.0  # log-odds by a header, without which no role is sure
+HEADER_SAYS = 2.0  # log-odds by a header, without which no role is sure
 
 Sign = float
 
@@ -115,7 +115,7 @@ class _Choice:
         return {"y": self.way.y, **self.way.columns, **self.others}
 
 
-def told_roles(signals: Sequence[Column], only: Column | None = None) -> Roles | None:
+def known_roles(signals: Sequence[Column], only: Column | None = None) -> Roles | None:
     """The signals of a log; None where no column moves as a body that another one drives.
 
     only: the column that is to be the position, where somebody has said so.
@@ -163,7 +163,7 @@ def _bodies(pairs: Pairs, only: Column | None) -> list[tuple[Seen, float]]:
             continue
         if one.motion is not None:
             found.append((head + moves_like_a_body(one) + derived[k], k))
-    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_TELLS]
+    named = [k for _, k in found if said(pairs.signals[k], "y") >= HEADER_SAYS]
     if named:  # beside a position that is called one no reference or model is any
         beside = ("reference", "model")
         found = [one for one in found if pairs.signals[one[1]].header.purpose not in beside]
@@ -186,7 +186,7 @@ def _ways(
     drive, acting: log-odds of each signal as either, by what it is of the others.
     """
     laws, y, pairs = seen.laws, seen.y, seen.pairs
-    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_TELLS]
+    named = [one for one in pairs.signals if max(said(one, "F"), said(one, "u")) >= HEADER_SAYS]
     # what the velocity follows may well drive a valve, where nothing else is said to drive
     alone = named[0] if len(named) == 1 and "velocity" not in named[0].header.means else None
     for k, law in enumerate(laws):
@@ -245,7 +245,7 @@ def _mirrored(one: ForceLaw, other: ForceLaw) -> bool:
 
     Of two chambers the one is filled as the other is emptied; a force beside a pressure is no such.
     """
-    alike = min(one.share, other.share) > LOOKS_LIKE_A_FORCE
+    alike = min(one.share, other.share) > FORCE_LIKENESS
     return alike and one.way * other.way < 0.0
 
 
@@ -323,19 +323,19 @@ def _gain(way: _Way, k: int, role: str, moved: float) -> float:
         return head + 2.5 + float(np.clip(nearer, 0.0, MOST_NEARER))
     if role == "u":
         one_way = 1.5 if one.x.min() * one.x.max() > 0.0 else 0.0
-        most = MOST_BY_CHANGE if head >= HEADER_TELLS else MOST_UNNAMED
-        if head < HEADER_TELLS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
+        most = MOST_BY_CHANGE if head >= HEADER_SAYS else MOST_UNNAMED
+        if head < HEADER_SAYS and abs(seen.pairs.alike[seen.at, k]) > SAME_POSITION:
             return -3.0  # one more position, of a model or another sensor
         return head + float(np.clip(8.0 * moved - 1.0 - one_way, -2.0, most))
     return head + 1.0 if role == "F" else head - 1.0
 
 
-def _tells_sign(law: ForceLaw) -> bool:
+def _gives_sign(law: ForceLaw) -> bool:
     """Whether a law gives the sign of a force or command: by its work, or by friction in it."""
-    if abs(law.work) > TELLS_SIGN:
-        return law.share > COMMAND_TELLS_SIGN or abs(law.work) > WORK_TELLS_SIGN
+    if abs(law.work) > GIVES_SIGN:
+        return law.share > COMMAND_GIVES_SIGN or abs(law.work) > WORK_GIVES_SIGN
     onwards = law.friction is None  # one way: along it
-    in_it = law.friction is not None and law.friction > FRICTION_TELLS_SIGN
+    in_it = law.friction is not None and law.friction > FRICTION_GIVES_SIGN
     return (onwards or in_it) and law.share > MOSTLY_ITS_LAW
 
 
@@ -345,7 +345,7 @@ def _signs(best: _Choice) -> dict[str, Sign]:
     out = dict.fromkeys(best.columns, 1.0)
     if way.kind != "electro-pneumatic":
         (name,) = way.columns
-        out[name] = way.law.way if _tells_sign(way.law) else 1.0
+        out[name] = way.law.way if _gives_sign(way.law) else 1.0
     if "u" in best.others:
         u = best.others["u"].x
         out["u"] = actuator_share(way.force, seen.motion.v, u, seen.motion.cutoff)[1]
@@ -370,7 +370,7 @@ def _odds(best: _Choice, choices: Sequence[_Choice]) -> dict[str, float]:
         own = best.gains.get(role)
         odds = min(ahead, own) if own is not None else ahead
         odds = min(odds, SURE - CLEAR + best.behind.get(role, CLEAR))
-        told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_TELLS
+        told = said(column, role[0] if role in ("p_p", "p_n") else role) >= HEADER_SAYS
         out[role] = odds if told else min(odds, SURE - 1.0)
     return out
 

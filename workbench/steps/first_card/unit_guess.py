@@ -23,7 +23,7 @@ EPOCHS = {"s": (1e9, 3e9), "ms": (1e12, 3e12), "us": (1e15, 3e15), "ns": (1e18, 
 AGREES = 0.1  # relative error up to which a logged velocity is the position's derivative in SI
 SAME_RATE = 0.03  # the same, within which it makes sure of a unit
 SHORTEST_PERIOD = 1e-12  # s; what a clock ticks faster is none
-TELLS_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
+GIVES_MASS = 0.9  # share of a force that its law explains, from which the mass in it counts
 MOST_LOST = 8.0  # log-probability that one disagreement costs
 OFF_RATE = 0.05  # relative error from which clock and velocity contradict each other
 TICKS: Mapping[str, tuple[tuple[float, float], ...]] = {  # ticks a second, and what counts so
@@ -145,7 +145,7 @@ def _plausible(
         newton = factor(units["F"])
         F = roles.columns["F"]
         total += near("force", float(np.quantile(np.abs(F.x), 0.99)) * newton, machine)
-        if roles.kind == "force" and roles.law.share > TELLS_MASS:
+        if roles.kind == "force" and roles.law.share > GIVES_MASS:
             m = abs(roles.law.m) * newton / (length / (h * columns.grid) ** 2)
             total += 0.5 * near("mass", m, machine)
     return total

@@ -68,7 +68,7 @@ class DrawnMachines:
 def drawn_machines(
     model: Model, rng: np.random.Generator, count: int, drift: Mapping[str, float] | None = None
 ) -> DrawnMachines:
-    """So many machines, drawn from the errors of the model's parameters, and by `drift_seen`."""
+    """So many machines, drawn from the errors of the model's parameters, and by `drift_found`."""
     drift = dict(drift or {})
     errors, walk = rng.spawn(2)
     plants = drawn_plants(model, errors, count)
@@ -83,7 +83,7 @@ def drawn_machines(
     return DrawnMachines(model, plants, drift)
 
 
-def drift_seen(models: Sequence[Mapping[str, Estimate]]) -> dict[str, float]:
+def drift_found(models: Sequence[Mapping[str, Estimate]]) -> dict[str, float]:
     """By how much each of the nine has changed from one active model to the next: the relative
     deviation of a step, what the models themselves are unsure of taken off; only those that have.
 

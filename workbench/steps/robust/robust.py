@@ -43,7 +43,7 @@ USUAL_PROBABILITY = 0.95
 class RobustAsked:
     """What is asked over the machines: so many drawn, on what share of them each limit has to hold.
 
-    staircase: largest on a slow ramp [m], None for any. drift: see `drift_seen`.
+    staircase: largest on a slow ramp [m], None for any. drift: see `drift_found`.
     """
 
     draws: int = USUAL_DRAWS

@@ -13,7 +13,7 @@ from identification.estimation.structure_fit import FittedStructure, fitted_stru
 from identification.log import Rig
 from identification.tracing.free_run import rivals as module
 from identification.tracing.free_run.backward_elimination import Setting
-from identification.tracing.free_run.rivals import equal_rivals, told_apart
+from identification.tracing.free_run.rivals import discriminated, equal_rivals
 from identification.tracing.regression.stepwise import Choice, Step, choose
 from identification.tracing.result import Dependence
 from identification.tracing.verdict import rivals_of, verdict_of
@@ -52,7 +52,7 @@ def test_the_run_has_a_say(
     setting, choice, after = found
     assert [one.effect.key for one in equal_rivals(choice.steps[0])] == ["twin"]
     monkeypatch.setattr(module, "fitted", leaving(misfit))
-    told = told_apart(choice, after, setting)
+    told = discriminated(choice, after, setting)
     assert verdict_of(told, NOTHING, ()) == verdict
     (rival,) = rivals_of(told, ())
     assert ("leaves more in the run" in rival.why_not) == (verdict == "effect")
@@ -64,5 +64,5 @@ def test_a_run_that_is_not_followed_has_none(
     setting, choice, after = found
     monkeypatch.setattr(module, "fitted", leaving(50.0))
     for less in (replace(after, misfit=2.0), replace(after, imposed=True)):
-        steps: tuple[Step, ...] = told_apart(choice, less, setting).steps
+        steps: tuple[Step, ...] = discriminated(choice, less, setting).steps
         assert not steps[0].apart

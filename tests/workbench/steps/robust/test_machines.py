@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from identification.model.estimates import Estimate
 from tests.chain import TABLES, model_of
-from workbench.steps.robust.machines import drawn_machines, drift_seen
+from workbench.steps.robust.machines import drawn_machines, drift_found
 
 MODEL = model_of(TABLES["paper_table2"], k_a=35.0, spread=0.02)
 
@@ -40,14 +40,14 @@ def test_the_same_seed_draws_the_same_machines() -> None:
 
 def test_drift_is_the_mean_square_of_the_steps() -> None:
     steps = np.log([11.0 / 10.0, 12.5 / 11.0])
-    found = drift_seen(in_force(10.0, 11.0, 12.5))
+    found = drift_found(in_force(10.0, 11.0, 12.5))
     assert found == {"F_cp": pytest.approx(float(np.sqrt(np.mean(steps**2))))}
 
 
 def test_what_the_models_are_unsure_of_is_no_drift() -> None:
-    assert drift_seen(in_force(10.0, 10.2, 10.0, sd=0.3)) == {}
-    told = drift_seen(in_force(10.0, 12.0, sd=0.3))["F_cp"]
-    assert 0.0 < told < drift_seen(in_force(10.0, 12.0))["F_cp"]
+    assert drift_found(in_force(10.0, 10.2, 10.0, sd=0.3)) == {}
+    told = drift_found(in_force(10.0, 12.0, sd=0.3))["F_cp"]
+    assert 0.0 < told < drift_found(in_force(10.0, 12.0))["F_cp"]
 
 
 @pytest.mark.parametrize(
@@ -61,14 +61,14 @@ def test_what_the_models_are_unsure_of_is_no_drift() -> None:
     ],
 )
 def test_models_that_cannot_be_compared_tell_no_drift(models: list[dict[str, Estimate]]) -> None:
-    assert drift_seen(models) == {}
+    assert drift_found(models) == {}
 
 
 @given(st.lists(st.floats(0.5, 50.0), min_size=2, max_size=6))
 def test_drift_does_not_depend_on_the_unit(values: list[float]) -> None:
-    found = drift_seen(in_force(*values))
+    found = drift_found(in_force(*values))
     scaled = [
         {"F_cp": replace(one["F_cp"], value=1e3 * (one["F_cp"].value or 0.0), unit="mN")}
         for one in in_force(*values)
     ]
-    assert drift_seen(scaled) == pytest.approx(found)
+    assert drift_found(scaled) == pytest.approx(found)

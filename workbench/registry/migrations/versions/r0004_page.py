@@ -5,7 +5,7 @@ import json
 import sqlalchemy as sa
 from alembic import op
 
-from workbench.registry.at_a_glance import Trend, glance, state_of, with_log
+from workbench.registry.machine_summary import Trend, most_moved, state_of, with_log
 from workbench.registry.page_tables import PAGE_APPEND_ONLY
 from workbench.registry.tables import Base, UtcTime
 from workbench.registry.triggers import keep_append_only
@@ -19,7 +19,7 @@ TABLES = (*PAGE_APPEND_ONLY, "task", "machine_now", "machine_trend")
 
 
 def upgrade() -> None:
-    """Make the tables, their triggers, and a glance of every machine that is there.
+    """Make the tables, their triggers, and a summary of every machine that is there.
 
     The tables as they are today: who changes one later writes it out here as it was.
     """
@@ -51,7 +51,7 @@ def _fill() -> None:
         for verdict, text in connection.execute(results, {"m": machine}):
             evidence = json.loads(text)
             state, trend = state_of(verdict, evidence), with_log(trend, evidence)
-            moved, by = glance(evidence)
+            moved, by = most_moved(evidence)
         last = json.dumps(trend[moved]) if moved in trend else None
         values = {"machine": machine, "state": state, "logs": count, "moved": moved}
         insert = sa.insert(now).values(

@@ -21,14 +21,14 @@ from identification.signals.differentiate import Motion, differentiate
 from identification.signals.sampling import samples
 from identification.velocity.fit import fit
 from identification.velocity.record import recorded
-from identification.velocity.told import told, units
-from workbench.documents.model import Told
+from identification.velocity.valve_estimates import units, valve_estimates
+from workbench.documents.model import Identifiable
+from workbench.steps.identifiable_by_log import Ways, identifiable_by_log, ways_of
 from workbench.steps.surrounding_lines import surrounding_lines
-from workbench.steps.told_by_log import Ways, told_by, ways_of
 
 
 @dataclass(frozen=True, eq=False)
-class RunsTell:
+class RunsIdentifiability:
     """What the motion of the runs identifies, or the reason why nothing.
 
     motion: of the longest run; effects: by how many deviations of the noise each effect would show
@@ -37,17 +37,17 @@ class RunsTell:
 
     motion: Motion | None = None
     ways: Ways | None = None
-    told: tuple[Told, ...] = ()
+    told: tuple[Identifiable, ...] = ()
     reason: str = ""
     remarks: tuple[str, ...] = ()
     effects: Mapping[str, float] | None = None
     surroundings: Surroundings = NO_SURROUNDINGS
 
 
-def runs_tell(
+def identifiability_of_runs(
     runs: Sequence[Log], rig: Rig, drive: Drive | None = None, *, effects: bool = False,
     fit: KarnoppFit | None = None,
-) -> RunsTell:  # fmt: skip
+) -> RunsIdentifiability:  # fmt: skip
     """Motion, directions and what they identify of each parameter, of at least one run.
 
     drive: what the fit is asked to be driven by; effects: also which effects the runs could show;
@@ -56,7 +56,7 @@ def runs_tell(
     log = max(runs, key=len)
     motion = differentiate(log["y"], log.h)
     if rig.kind == "velocity":
-        return _valve_tells(runs, rig, motion)
+        return _identifiability_of_valve(runs, rig, motion)
     try:
         if rig.kind == "motor" and not rig.force_per_command:  # forces in units of the command
             runs = [run.with_signals(F=run["u"]) for run in runs]
@@ -67,27 +67,29 @@ def runs_tell(
         recorded = recorded_logs(runs, rig, drive)
         m = max(float(first_estimate(one.log, held=recorded.held).nine[0]) for one in recorded.logs)
     except (BadLog, NotIdentifiable) as error:
-        return RunsTell(motion, reason=str(error))
+        return RunsIdentifiability(motion, reason=str(error))
     events = [breakaways(one, m) for one in recorded.logs]
     rests = [rest_stretches(one, samples(MEAN, one.log.h)) for one in recorded.logs]
     ways = ways_of(recorded.logs, events, rests)
-    seen = told_by(recorded, ways, look.fit, open_run=look.open)
+    seen = identifiable_by_log(recorded, ways, look.fit, open_run=look.open)
     shown = None
     if effects and not led_by_rig(recorded):
         shown = tellable_effects(recorded, built_in())
     said = surrounding_lines(around, rig)
-    return RunsTell(motion, ways, seen, remarks=said, effects=shown, surroundings=around)
+    return RunsIdentifiability(motion, ways, seen, remarks=said, effects=shown, surroundings=around)
 
 
-def _valve_tells(runs: Sequence[Log], rig: Rig, motion: Motion) -> RunsTell:
+def _identifiability_of_valve(runs: Sequence[Log], rig: Rig, motion: Motion) -> RunsIdentifiability:
     """The same of a rig whose velocity follows the command, by its fit, which is quick."""
     try:
         record = recorded(runs)
-        found = told(record, fit(record), units(rig.motion, rig.command_unit))
+        found = valve_estimates(record, fit(record), units(rig.motion, rig.command_unit))
     except NotIdentifiable as error:
-        return RunsTell(motion, reason=str(error))
+        return RunsIdentifiability(motion, reason=str(error))
     half = {n: NORMAL_95 * e.sd / abs(e.value) for n, e in found.items() if e.value and e.sd}
-    return RunsTell(
+    return RunsIdentifiability(
         motion,
-        told=tuple(Told(n, e.known, e.reason or "", within=half.get(n)) for n, e in found.items()),
+        told=tuple(
+            Identifiable(n, e.known, e.reason or "", within=half.get(n)) for n, e in found.items()
+        ),
     )

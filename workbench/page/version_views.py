@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 from identification.errors import UserError
 
-LOOKS_OF: "Mapping[str, Look]" = {"rst": "line", "pid": "dashed", "p-pi": "dotted"}
+STYLES_OF: "Mapping[str, LineStyle]" = {"rst": "line", "pid": "dashed", "p-pi": "dotted"}
 
 if TYPE_CHECKING:
     from workbench.documents.design import Design
-    from workbench.report.chart import Colour, Look
+    from workbench.report.chart import Colour, LineStyle
 
 EXPORTS = {
     "c": "C99",
@@ -70,7 +70,7 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
             for name, one in found.controllers.items():
                 t, y = linear_step(found, one)
                 colour: Colour = "reference" if place else "model"
-                look = LOOKS_OF[name]
+                look = STYLES_OF[name]
                 lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
             if found.recommendation:
                 said.append(f"version {number}: {found.recommendation.why}")

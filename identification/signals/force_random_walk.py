@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from scipy.stats import chi2
 
 from identification.arrays import Array
-from identification.thresholds import SURE_OF_WALK
+from identification.thresholds import SURE_OF_RANDOM_WALK
 
 # Of the filter, that are tried beside 0: beyond 1 where a step of the walk shows in two samples, as
 # where the command is taken between its samples.
@@ -24,7 +24,7 @@ COUNTED = 3000  # values as which a log counts: with more, a correlation of no a
 LEAST_COMPARED = 60  # samples, from which anything is estimated
 
 
-def force_walk(F: Array, y: Array, impulse: Array, h: float, apart: float) -> float:
+def force_random_walk(F: Array, y: Array, impulse: Array, h: float, apart: float) -> float:
     """Standard deviation [N] of the walk's step in one sample of h [s], 0 where none shows.
 
     F [N], y [m] (smoothed: its noise times k2 may be far more than the force's), impulse [V s]
@@ -52,7 +52,7 @@ def force_walk(F: Array, y: Array, impulse: Array, h: float, apart: float) -> fl
 
 def shows(gained: float) -> bool:
     """Whether a walk that gains so much (twice the log-likelihood) is more than chance."""
-    return gained > SURE_OF_WALK
+    return gained > SURE_OF_RANDOM_WALK
 
 
 def _filtered(x: Array, X: Array, gain: float) -> Array:

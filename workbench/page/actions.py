@@ -12,10 +12,10 @@ from starlette.responses import Response
 from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
-from workbench.page import version_looks
+from workbench.page import version_views
 from workbench.page.dropped import card_of, keep_files, log_of, refuse_machine
 from workbench.page.pages import go, part, registry_of
-from workbench.page.version_looks import EXPORTS
+from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import Visitor, changing, form_of, reading
 from workbench.page.work import result_file
 from workbench.registry.access import audit
@@ -81,7 +81,7 @@ def export(request: Request, _visitor: Visitor) -> Response:
     machine, number = request.path_params["machine"], request.path_params["number"]
     registry = registry_of(request)
     design = registry.document(registry.version(machine, number), "design")
-    files = request.app.state.helpers(version_looks.export_files, json.dumps(design), target)
+    files = request.app.state.helpers(version_views.export_files, json.dumps(design), target)
     packed = io.BytesIO()
     with zipfile.ZipFile(packed, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -102,7 +102,7 @@ def _text(request: Request, name: str) -> str:
     return found
 
 
-DEED_ROUTES = [
+ACTION_ROUTES = [
     Route("/work/{task:int}/keep", changing(keep), methods=["POST"]),
     Route("/machine/{machine}/promote", changing(promote), methods=["POST"]),
     Route("/machine/{machine}/rollback", changing(rollback), methods=["POST"]),

@@ -17,7 +17,7 @@ from identification.signals.differentiate import Motion, differentiate, low_pass
 from identification.signals.one_way import ONE_WAY_WHY, is_one_way
 from identification.signals.relations import FEWEST_MOVING, derivative, moving
 
-TELLING_RATE = 50.0  # Hz, below which starts and stops lie between two samples
+INFORMATIVE_RATE = 50.0  # Hz, below which starts and stops lie between two samples
 NEARLY_ONE_WAY = 0.05  # of the motion, that goes the other way at most
 NO_WORK = 0.03  # of the work that a force exchanges with a body, that it does on the whole at least
 ALL_OF_PLACE = 0.97  # of a force, that place explains where it only bears a weight or a spring
@@ -39,7 +39,7 @@ class _Moved:
     name: str
 
 
-def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
+def hardly_identifiable(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
     """A line for each thing that the runs will hardly identify; nothing where there is no run."""
     if not runs:
         return ()
@@ -49,9 +49,9 @@ def hardly_tells(runs: Sequence[Log], rig: Rig) -> tuple[str, ...]:
 
 def _of_rate(log: Log) -> Iterator[str]:
     rate = 1.0 / log.h
-    if rate < 0.999 * TELLING_RATE:
+    if rate < 0.999 * INFORMATIVE_RATE:
         yield (
-            f"sampled at {rate:.3g} Hz, slower than {TELLING_RATE:g} Hz: starts and stops lie"
+            f"sampled at {rate:.3g} Hz, slower than {INFORMATIVE_RATE:g} Hz: starts and stops lie"
             " between two samples, so bands and breakaway forces are hardly identifiable; log"
             " faster"
         )

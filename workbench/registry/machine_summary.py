@@ -37,7 +37,7 @@ def state_of(verdict: str, evidence: Mapping[str, Any]) -> MachineCondition:
     return _BY_VERDICT.get(verdict, "not_judged")
 
 
-def glance(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
+def most_moved(evidence: Mapping[str, Any]) -> tuple[str | None, float | None]:
     """The parameter that moved most, with its relative change; None where the log gave none.
 
     That is the one whose change is largest beyond its own 95 % interval; where all lie within
@@ -105,7 +105,7 @@ def glance_judged(
     """The newest log has its result."""
     row = session.get_one(MachineNowRow, machine)
     row.state = state_of(verdict, evidence)
-    name, change = glance(evidence)
+    name, change = most_moved(evidence)
     if name is not None:
         kept = session.get_one(MachineTrendRow, machine)
         trend = with_log(json.loads(kept.trend), evidence)

@@ -8,7 +8,7 @@ from scipy.stats import t as student
 
 from identification.arrays import BoolArray
 from identification.errors import NotIdentifiable
-from identification.estimation.estimates import told_estimate
+from identification.estimation.estimates import reported_estimate
 from identification.model.estimates import NORMAL_95, Estimate
 from identification.thresholds import EVENTS_NEEDED
 from identification.velocity.fit import WIDEST_ZONE, ValveFit, bounds_of
@@ -29,7 +29,9 @@ def units(motion: str, command_unit: str) -> Mapping[str, str]:
     }  # fmt: skip
 
 
-def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[str, Estimate]:
+def valve_estimates(
+    record: Record, found: ValveFit, unit: Mapping[str, str]
+) -> Mapping[str, Estimate]:
     """Each number of the plain model with its 95 % interval, or the reason why it is not
     identified.
 
@@ -56,7 +58,7 @@ def told(record: Record, found: ValveFit, unit: Mapping[str, str]) -> Mapping[st
             zero = "at its bound: not significantly different from 0"
             out[name] = Estimate(None, unit[name], reason=zero, assumed=0.0)
             continue
-        out[name] = told_estimate(values[name], unit[name], spread, bounds=low, beside=size)
+        out[name] = reported_estimate(values[name], unit[name], spread, bounds=low, beside=size)
     if out["g_p"].value is None and out["g_n"].value is None:
         first = f"{record.runs[0].name}: "
         why = str(out["g_p"].reason).removeprefix(first)
@@ -114,7 +116,7 @@ def _silent(name: str, record: Record, valve: Valve) -> str | None:
     return None
 
 
-def told_beside(
+def estimates_beside(
     found: ValveFit, names: Sequence[str], unit: Mapping[str, str]
 ) -> dict[str, Estimate]:
     """The numbers `names` that a richer structure has beside the plain model's, likewise."""
@@ -122,7 +124,7 @@ def told_beside(
     wide = float(student.ppf(0.975, max(found.clusters - 1, 1))) / NORMAL_95
     values = asdict(found.valve)
     return {
-        name: told_estimate(
+        name: reported_estimate(
             values[name], unit.get(name, "1"), sd[name] * wide if np.isfinite(sd[name]) else None
         )
         for name in names

@@ -15,7 +15,7 @@ from identification.experiment.identifiability import Tellable, identifiability
 from identification.model.estimates import Estimate, KarnoppFit
 from identification.model.karnopp import NAMES
 from identification.thresholds import EVENTS_NEEDED
-from workbench.documents.model import Told
+from workbench.documents.model import Identifiable
 
 QUICK_SPEED, SLOW_SPEED = 0.95, 0.05  # quantiles of the speeds of a direction
 MEND = {
@@ -102,9 +102,9 @@ def _reversals(d: Array) -> int:
     return int(np.count_nonzero(sure[1:] != sure[:-1]))
 
 
-def told_by(
+def identifiable_by_log(
     recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, *, open_run: bool = False
-) -> tuple[Told, ...]:
+) -> tuple[Identifiable, ...]:
     """Whether each of the nine, and of the actuator's parameters, is identified by a fit of the
     logs.
 
@@ -116,38 +116,42 @@ def told_by(
     for name in NAMES:
         found = fit.estimates.get(name)
         if found is None:
-            out.append(Told(name, False, "fixed at a value that does not matter for this log"))
+            out.append(
+                Identifiable(name, False, "fixed at a value that does not matter for this log")
+            )
         elif open_run and name not in FIVE:
             out.append(_if_followed(name, recorded, ways, fit, found))
         elif found.value is not None:
-            out.append(_told(name, found, fit, ways, run.get(name), led=led))
+            out.append(_identifiable(name, found, fit, ways, run.get(name), led=led))
         else:  # a path that a rig leads has no breakaways, however it is run
             lacks = None if led else silent_reason(name, ways.events, recorded.name)
-            out.append(_not_told(name, found, recorded.name, lacks))
+            out.append(_not_identifiable(name, found, recorded.name, lacks))
     if fit.actuator is not None and "k1" in fit.estimates:
         for name in ("k1", "k2"):
             one = fit.estimates[name]
             why = one.reason or "the force follows the command as a linear actuator's"
-            out.append(Told(name, one.value is not None, why))
+            out.append(Identifiable(name, one.value is not None, why))
     elif commanded(recorded.plain) and not recorded.held:
         why = "the force does not follow the command as a linear actuator's"
-        out += [Told(name, False, why) for name in ("k1", "k2")]
+        out += [Identifiable(name, False, why) for name in ("k1", "k2")]
     elif not recorded.held:
-        out += [Told(name, False, "no command is logged", MEND["k"]) for name in ("k1", "k2")]
+        out += [
+            Identifiable(name, False, "no command is logged", MEND["k"]) for name in ("k1", "k2")
+        ]
     return tuple(out)
 
 
-def _told(
+def _identifiable(
     name: str, found: Estimate, fit: KarnoppFit, ways: Ways, run: Tellable | None, *, led: bool
-) -> Told:
+) -> Identifiable:
     """By what a parameter is identified, and within what share of it."""
     half = _half(found)
     if fit.imposed:
         which = "the force equation" if led else "the equation of motion alone"
-        return Told(name, True, f"to {half:.1%} by {which}", within=half)
+        return Identifiable(name, True, f"to {half:.1%} by {which}", within=half)
     within = run.within if run is not None and run.can else half
     why = f"{_events(name, ways, fit)}; within {within:.1%} of it by the free run"
-    return Told(name, True, why, within=within)
+    return Identifiable(name, True, why, within=within)
 
 
 def _half(found: Estimate) -> float:
@@ -174,15 +178,15 @@ def _events(name: str, ways: Ways, fit: KarnoppFit) -> str:
 
 def _if_followed(
     name: str, recorded: RecordedLogs, ways: Ways, fit: KarnoppFit, found: Estimate
-) -> Told:
+) -> Identifiable:
     """What only a run identifies that may be followed: no promise, where the log has the events."""
     lacks = silent_reason(name, ways.events, recorded.name)
     if lacks is not None:
-        return _not_told(name, found, recorded.name, lacks)
-    return Told(name, False, _events(name, ways, fit), MEND[name[:3]], only_if=OPEN)
+        return _not_identifiable(name, found, recorded.name, lacks)
+    return Identifiable(name, False, _events(name, ways, fit), MEND[name[:3]], only_if=OPEN)
 
 
-def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
+def _not_identifiable(name: str, found: Estimate, log: str, lacks: str | None) -> Identifiable:
     """Why a parameter is not identified, and what run would identify it; lacks: what the measured
     motion has too little of, which says more than how a fit came out."""
     said = (lacks or found.reason or "not identifiable from this log").removeprefix(f"{log}: ")
@@ -192,4 +196,4 @@ def _not_told(name: str, found: Estimate, log: str, lacks: str | None) -> Told:
     key = name if name in MEND else name[:3]
     if not add and found.at_most is None:
         add = MEND[key]
-    return Told(name, False, why, "" if add.startswith("see ") else add)
+    return Identifiable(name, False, why, "" if add.startswith("see ") else add)

@@ -17,7 +17,7 @@ from workbench.page.dropped import without_path
 
 if TYPE_CHECKING:
     from identification.arrays import Array
-    from workbench.documents.model import Told
+    from workbench.documents.model import Identifiable
     from workbench.logs.unknown import UnknownLog
     from workbench.steps.first_card.proposal import Proposal
 
@@ -26,7 +26,7 @@ FIRST_POINTS = 8000  # of each column's line, every peak kept
 LOGS_REMEMBERED = 1
 
 
-class BadLook(UserError):
+class BadView(UserError):
     """What is wrong with a log or its card, without the server's folders in it."""
 
 
@@ -53,7 +53,7 @@ def warm() -> None:
 
 
 def refuse_no_log(path: Path) -> None:
-    """Raises BadLook where the file's first bytes are of something else than its name says."""
+    """Raises BadView where the file's first bytes are of something else than its name says."""
     from workbench.cards.card_tables import FileSpec
     from workbench.logs.formats import checked_format
 
@@ -82,12 +82,12 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 
 def proposal(path: Path) -> "Proposal":
     """The card that `init` proposes, and what is hardly identifiable from the log; raises
-    BadLook."""
-    from workbench.steps.first_card.looked_over import looked_over
+    BadView."""
+    from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
 
     with _without(path):
-        return looked_over(proposed(path))
+        return checked_proposal(proposed(path))
 
 
 def headers(path: Path) -> list[tuple[str, str | int, str]]:
@@ -104,19 +104,19 @@ def card_refused(card: Path, path: Path) -> str:
 
 
 def doctor_chart(path: Path, card: Path) -> str:
-    """The doctor's picture, as HTML; raises BadLook."""
+    """The doctor's picture, as HTML; raises BadView."""
     from workbench.cards.card import load_card
     from workbench.report.chart import chart_html
     from workbench.report.doctor_chart import doctor_charts
-    from workbench.steps.doctor import looked
+    from workbench.steps.doctor import checked_log
 
     with _without(path, card):
-        found = looked(path, load_card(card, with_recipe=False))
+        found = checked_log(path, load_card(card, with_recipe=False))
     return "".join(str(chart_html(chart)) for chart in doctor_charts(found))
 
 
 def doctor_words(path: Path, card: Path) -> DoctorFound:
-    """The doctor's words; raises BadLook."""
+    """The doctor's words; raises BadView."""
     from workbench.cards.card import load_card
     from workbench.report.doctor import doctor_view
     from workbench.steps.doctor import examine
@@ -128,7 +128,7 @@ def doctor_words(path: Path, card: Path) -> DoctorFound:
     return DoctorFound(found.verdict, tuple(lines), told)
 
 
-def _said_of(one: "Told") -> str:
+def _said_of(one: "Identifiable") -> str:
     """Why a parameter is identifiable, on what that depends, or what run would identify it."""
     if one.only_if:
         return f"only if {one.only_if}"
@@ -142,11 +142,11 @@ def _unknown(path: Path) -> "UnknownLog":
 
 @contextmanager
 def _without(*paths: Path) -> Iterator[None]:
-    """Within the block an error of the user becomes BadLook, without the folders of these files."""
+    """Within the block an error of the user becomes BadView, without the folders of these files."""
     try:
         yield
     except UserError as error:
-        raise BadLook(without_path(str(error), paths)) from None
+        raise BadView(without_path(str(error), paths)) from None
 
 
 @lru_cache(maxsize=LOGS_REMEMBERED)
