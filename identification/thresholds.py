@@ -52,9 +52,7 @@ ROUGH_LEFT = 0.05  # the same, on machines that no model follows down to the noi
 IMPOSED_LEFT = 0.3  # the same, with prescribed motion
 # (the next three by what they mean; no bench has chosen them yet)
 SHOWN_FROM = 2.0  # times the sensors' square, that an error on the test logs is to be spoken of
-MAIN_EFFECTS_LEAVE = (
-    0.5  # share left at most of what was missing there, by effects that are reported first
-)
+MAIN_EFFECTS_LEAVE = 0.5  # share left at most of what was missing there, by effects reported first
 OTHER_LAW = 0.05  # the same, that depends on an effect's own signals: the law is another one
 HIDES = 0.1  # of the force, left where it is more than friction too: nothing can be said of either
 STRUCTURED = 0.3  # square in noise units, from which what is left is structure

@@ -25,7 +25,7 @@ from identification.estimation.regression.equation_rows import (
     mechanical,
     motion_log,
 )
-from identification.estimation.regression.motion_rows import rows_and_windows
+from identification.estimation.regression.motion_rows import OF_EQUATION, rows_and_windows
 from identification.estimation.regression.weighted_rows import (
     BLOCKS,
     OVERLAP,
@@ -299,9 +299,12 @@ def _lag(found: _Squares, used: Sequence[int]) -> Size:
     every = np.ones(len(found.force), dtype=bool)
     left, theta = found.left(every, used)
     best = int(np.argmin(left))
-    without = float(left[int(np.argmin(np.abs(found.lags)))])
+    none = int(np.argmin(np.abs(found.lags)))
+    without = float(left[none])
     if best in (0, len(left) - 1) or theta[0, best] <= 0.0:
         return NOT_SHOWN
+    if without <= OF_EQUATION**2 * float(np.sum(found.force[:, none])):
+        return NOT_SHOWN  # in what the equation errs itself, a lag and inertia look alike
     lag = _lowest(found.lags, left)
     if not apart(lag) or not explains(without, float(left[best])):
         return NOT_SHOWN

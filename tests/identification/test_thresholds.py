@@ -326,7 +326,7 @@ def test_least_share() -> None:
     assert rivals(125.0, 125.0) == 1
 
 
-def test_luck_in_gain() -> None:
+def test_chance_in_gain() -> None:
     """A rival that gains hardly less explains as much, but for luck."""
     assert rivals(200.0, 208.0) == 1
     assert rivals(200.0, 212.5) == 0
@@ -445,7 +445,7 @@ def test_shown_from() -> None:
     assert left == pytest.approx(0.5)
 
 
-def test_headline() -> None:
+def test_main_effects_leave() -> None:
     """Effects that explain most of what was missing are told first."""
     assert is_headline(0.4)
     assert not is_headline(0.625)
@@ -626,7 +626,7 @@ def test_actuator_share() -> None:
     assert leaves_much(0.025, 100.0)
 
 
-def test_sure_of_walk() -> None:
+def test_sure_of_random_walk() -> None:
     """A force that walks off its command by less than chance does not walk."""
     assert not shows(16.0)
     assert shows(25.0)
@@ -731,7 +731,7 @@ def test_replaced_gains() -> None:
     assert wrong(18.75)
 
 
-def test_residual_walks() -> None:
+def test_residual_drifts() -> None:
     """Sums of what a run leaves that are so sure to be more than noise make it walk."""
     noise = np.random.default_rng(3).standard_normal(6000)
     assert walk_size([noise]) == 0.0
@@ -832,7 +832,7 @@ def contradicted_at(*lengths: int) -> list[BadSamples]:
     ]
 
 
-def test_places_set_aside() -> None:
+def test_places_excluded() -> None:
     """A run that contradicts a log in more places than these is a wrong model."""
     logs = [seen(made(3))]
     logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
@@ -841,7 +841,7 @@ def test_places_set_aside() -> None:
     assert not are_few(contradicted_at(1, 1, 1, 1, 1, 1), logs)
 
 
-def test_share_set_aside() -> None:
+def test_share_excluded() -> None:
     """Nor is more of a log than this share set aside for it."""
     logs = [seen(made(3))]
     logs = [replace(logs[0], log=replace(logs[0].log, name="a"))]
@@ -906,7 +906,7 @@ def test_other_way() -> None:
     assert not is_one_way(0.03) and not is_one_way(0.5)
 
 
-def test_lucky_windows() -> None:
+def test_chance_windows() -> None:
     """Of twenty windows three may be lost to luck, and no more."""
     assert mean_loss(*lost_windows(20, 3)) < 1.5 and mean_loss(*lost_windows(20, 4)) > 2.0
 

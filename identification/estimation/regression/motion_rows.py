@@ -123,7 +123,7 @@ def _bent_by_noise(made: Sequence[MotionRows], logs: Sequence[MotionLog]) -> flo
     every = stacked([one.rows for one in made])
     mass = float(solve_rows(every).theta[0])
     inertia = abs(mass) * square**0.5 / max(float(np.linalg.norm(every.b)), 1e-300)
-    return inertia * noise / max(square, 1e-300)
+    return float(inertia * noise / max(square, 1e-300))
 
 
 def _share_left(rows: Sequence[Rows]) -> float:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.random_plants import KINDS, drawn, logged
 from identification.effects._library import built_in
 from identification.estimation.fit import fit_plant
 from identification.estimation.surroundings import lag_estimate, surroundings, widened_friction
@@ -84,6 +85,14 @@ def test_a_weight_larger_than_friction_is_taken_out(force: float) -> None:
 def test_nothing_is_found_where_there_is_nothing(seed: int) -> None:
     assert surroundings([made(seed)], MOTOR).none
     assert surroundings([made_log(table(1), seed, seconds=8.0)], Rig("force")).none
+
+
+def test_inertia_that_is_small_beside_damping_is_no_lag() -> None:
+    """m/F_v of 9 ms and a lag of 9 ms differ by less than the equation errs itself."""
+    machine, run = drawn(211, KINDS)
+    log = logged(machine, run, 211)[0]
+    rig = Rig("motor", force_per_command=machine.k1)
+    assert surroundings([log], rig).lag == Size()
 
 
 def test_motion_one_way_tells_no_constant_force() -> None:

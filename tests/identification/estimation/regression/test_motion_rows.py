@@ -124,3 +124,20 @@ def test_viscous_friction_takes_no_coulomb_friction_below_nothing() -> None:
     assert fit.estimates["F_vp"].value is None and fit.estimates["F_vn"].value is None
     assert (fit.friction.F_vp, fit.friction.F_vn) == (0.0, 0.0)
     assert min(fit.friction.F_cp, fit.friction.F_cn) > 1.0  # the level at these speeds
+
+
+def test_noise_of_the_position_costs_no_mass() -> None:
+    """Narrow windows fit the force as well, but their accelerations are half noise."""
+    log = swinging((1.0, 200.0, 200.0, 0.0, 0.0), hz=2.0, noise_y=4e-5)
+    one = moved(log)
+    narrow = solve_rows(rows_of_width(one, HALF_WIDTHS[0], NONE).rows).theta
+    assert narrow[0] < 0.9
+    assert by_least_squares(log)[0] == pytest.approx(1.0, abs=0.03)
+
+
+def test_a_log_of_few_samples_has_windows_of_few() -> None:
+    whole = swinging((1.0, 4.0, 3.0, 8.0, 6.0), hz=1.5)
+    slow = Log("slow", {name: x[::20] for name, x in whole.signals.items()})
+    (made,) = rows_and_windows([moved(slow)], NONE)
+    assert made.windows.length == 2 * HALF_WIDTHS[0]
+    assert by_least_squares(slow)[:3] == pytest.approx([1.0, 4.0, 3.0], rel=0.02)
