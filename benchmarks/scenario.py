@@ -191,7 +191,7 @@ def line(one: Told) -> str:
 
 def picture(told: list[Told], path: Path) -> None:
     """The timeline as a PNG: F_cp true and in force, and what was made of each log."""
-    from workbench.report.figures import MODEL, OTHER, REFERENCE, figure, label, style
+    from workbench.report.chart_figure import MODEL, OTHER, REFERENCE, figure, label, style
 
     looks = {
         "none": ("o", OTHER, "nothing has changed"),

@@ -1,5 +1,6 @@
 """Files that a user names: what never ends, and what is too large, is refused before it is read."""
 
+import hashlib
 import stat
 from pathlib import Path
 
@@ -53,6 +54,12 @@ def refuse_larger(path: Path, most: int, what: str, wrong: type[UserError]) -> N
             f"{path}: has {size / 1e6:.4g} MB, {what} at most {most / 1e6:g} MB; give another file,"
             " or a part of it"
         )
+
+
+def sha256_of(path: Path) -> str:
+    """The SHA-256 of the file's bytes, as hexadecimal digits; raises OSError."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def shipped_cards() -> dict[str, Path]:

@@ -2,17 +2,16 @@
 
 import cmath
 import math
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
 from workbench.files import shipped_cards
-from workbench.screen import verbose_option
-
-Command = TypeVar("Command", bound=Callable[..., Any])
+from workbench.screen import debug_option, verbose_option
+from workbench.signature import argument, option
 
 
 class Finite(click.FloatRange):
@@ -46,116 +45,6 @@ def complete_card(_ctx: click.Context, _param: click.Parameter, begun: str) -> l
     return names or [CompletionItem(begun, type="file")]
 
 
-BUDGET = 120.0  # s, after which a fit or a trace ends with the best so far
-
-
-def budget_option(command: Command) -> Command:
-    """The option `--budget` of a fit or a trace [s]."""
-    return click.option(
-        "--budget",
-        type=SECONDS_ABOVE_0,
-        default=BUDGET,
-        show_default=True,
-        metavar="SECONDS",
-        help="End after so long with the best so far; the first Ctrl-C does the same.",
-    )(command)
-
-
-def card_option(command: Command) -> Command:
-    """The option `--card`, the card of all logs; given twice it is a usage error."""
-    return click.option(
-        "--card",
-        multiple=True,
-        required=True,
-        callback=_the_only,
-        shell_complete=complete_card,
-        help="Path of the card, or the name of a shipped one.",
-    )(command)
-
-
-def present_card_option(command: Command) -> Command:
-    """The option `--card` of commands that read a model, for another present controller."""
-    return click.option(
-        "--card",
-        shell_complete=complete_card,
-        help="Card whose [controller] is shown as the present one, in place of the model's.",
-    )(command)
-
-
-def motion_limits(command: Command) -> Command:
-    """What a loop's motion must keep: `standstill`, `tracking`, `overshoot`, `force`."""
-    options = (
-        ("--standstill", 0.05, "Largest error at standstill, relative to the step."),
-        ("--tracking", 0.15, "Largest rms error along the smooth reference, relative to its"
-         " amplitude."),
-        ("--overshoot", 0.1, "Largest overshoot, relative to the step."),
-        ("--force", 1.2, "Largest force, relative to the largest in the logs of the machine's"
-         " model."),
-    )  # fmt: skip
-    for name, usual, said in reversed(options):
-        command = click.option(name, type=POSITIVE, default=usual, show_default=True, help=said)(
-            command
-        )
-    return command
-
-
-def effects_option(command: Command) -> Command:
-    """The option `--effects`, folders of effects of the user's own, as `effects`: see
-    `workbench.cards.own_effects`."""
-    return click.option(
-        "--effects",
-        multiple=True,
-        metavar="FOLDER",
-        type=click.Path(path_type=Path),
-        help="Folder of your own effects, one a file; may be given several times. Its Python is"
-        " run: give only folders that you trust.",
-    )(command)
-
-
-def refuse_for_velocity(*options: str) -> None:
-    """Raises a usage error where one of these options, by the names of their values, is given: they
-    have no meaning for a rig whose velocity follows the command."""
-    context = click.get_current_context()
-    for option in context.command.params:
-        given = context.get_parameter_source(option.name or "")
-        if option.name in options and given is click.core.ParameterSource.COMMANDLINE:
-            raise click.UsageError(
-                f'{option.opts[0]} has no meaning for a rig of kind = "velocity"; leave it out.',
-                context,
-            )
-
-
-def registry_option(command: Command) -> Command:
-    """The option `--registry`, where the registry is, as `where`."""
-    return click.option(
-        "--registry",
-        "where",
-        metavar="FILE|URL",
-        help="SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
-    )(command)
-
-
-def machines_option(command: Command) -> Command:
-    """The option `--machines` of what serves the page: the folder of all machines."""
-    return click.option(
-        "--machines",
-        type=click.Path(path_type=Path),
-        default=Path("machines"),
-        metavar="FOLDER",
-        show_default=True,
-        help="Folder of the machines, as of 'watch'; dropped logs lie in it too.",
-    )(command)
-
-
-def events_options(command: Command) -> Command:
-    """The options `--json`, as `as_json`, `--verbose` and `--debug` of commands that report events
-    as JSON."""
-    debug = click.option("--debug", is_flag=True, expose_value=False, hidden=True)
-    return click.option(
-        "--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON."
-    )(verbose_option(debug(command)))
-
-
 def _the_only(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
     if len(values) > 1:
         raise click.UsageError(
@@ -164,6 +53,79 @@ def _the_only(ctx: click.Context, param: click.Parameter, values: tuple[str, ...
             ctx,
         )
     return values[0]
+
+
+BUDGET = 120.0  # s, after which a fit or a trace ends with the best so far
+# Options that several commands have, as defaults of their parameters.
+BUDGET_OPTION = option(
+    "End after so long with the best so far; the first Ctrl-C does the same.",
+    type=SECONDS_ABOVE_0, default=BUDGET, metavar="SECONDS",
+)  # fmt: skip
+CARD_OPTION = option(  # the card of all logs; given twice it is a usage error
+    "Path of the card, or the name of a shipped one.",
+    multiple=True, required=True, callback=_the_only, shell_complete=complete_card,
+)  # fmt: skip
+PRESENT_CARD_OPTION = option(  # of commands that read a model, for another present controller
+    "Card whose [controller] is shown as the present one, in place of the model's.",
+    shell_complete=complete_card,
+)
+EFFECTS_OPTION = option(  # folders of the user's own effects: `workbench.cards.own_effects`
+    "Folder of your own effects, one a file; may be given several times. Its Python is run: give"
+    " only folders that you trust.",
+    metavar="FOLDER",
+)
+SEED_OPTION = option("", type=click.IntRange(min=0), default=0)
+REGISTRY_OPTION = option(
+    "SQLite file or postgresql://...  [default: WORKBENCH_REGISTRY, or registry.db]",
+    "--registry", metavar="FILE|URL",
+)  # fmt: skip
+MACHINES_OPTION = option(  # of what serves the page: the folder of all machines
+    "Folder of the machines, as of 'watch'; dropped logs lie in it too.",
+    default=Path("machines"), metavar="FOLDER",
+)  # fmt: skip
+EVENTS_OPTION = option(  # of commands that report events as JSON
+    "Accepted as everywhere; events are JSON.", "--json", beside=(verbose_option, debug_option)
+)
+MODEL_ARGUMENT = argument("MODEL")
+LOG_ARGUMENT = argument("LOG", shell_complete=complete_file)
+LOGS_ARGUMENT = argument("LOG...", required=True, shell_complete=complete_file)
+# What a loop must keep.
+MODULUS_OPTION = option("Least modulus margin.", type=POSITIVE, default=0.5)
+DELAY_OPTION = option("Least delay margin, in samples.", type=POSITIVE, default=2.0)
+STANDSTILL_OPTION = option(
+    "Largest error at standstill, relative to the step.", type=POSITIVE, default=0.05
+)
+TRACKING_OPTION = option(
+    "Largest rms error along the smooth reference, relative to its amplitude.",
+    type=POSITIVE, default=0.15,
+)  # fmt: skip
+OVERSHOOT_OPTION = option("Largest overshoot, relative to the step.", type=POSITIVE, default=0.1)
+FORCE_OPTION = option(
+    "Largest force, relative to the largest in the logs of the machine's model.",
+    type=POSITIVE, default=1.2,
+)  # fmt: skip
+
+
+def given_options(*options: str) -> Iterator[click.Parameter]:
+    """Those of these options, by the names of their values, that the running command is given."""
+    context = click.get_current_context()
+    for one in context.command.params:
+        source = context.get_parameter_source(one.name or "")
+        if one.name in options and source is click.core.ParameterSource.COMMANDLINE:
+            yield one
+
+
+def refuse_given(why: str, *options: str) -> None:
+    """Raises a usage error where one of these options is given; why: it may not be, and what to do
+    (`{}` stands for the option)."""
+    for one in given_options(*options):
+        raise click.UsageError(why.format(one.opts[0]))
+
+
+def refuse_for_velocity(*options: str) -> None:
+    """Raises a usage error where one of these options, by the names of their values, is given: they
+    have no meaning for a rig whose velocity follows the command."""
+    refuse_given('{} has no meaning for a rig of kind = "velocity"; leave it out.', *options)
 
 
 def parse_orders(text: str | None) -> tuple[int, int, int] | None:

@@ -13,21 +13,24 @@ from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import fields, is_dataclass
 from datetime import datetime
 from pathlib import Path
-from types import TracebackType
 from typing import Any, Protocol, Self, TypeVar
 
 import click
 
 from identification.errors import UserError
 from workbench.ending import Step, refused_with
-from workbench.screen import SCREEN_LINES, SCREEN_WIDTH, Screen, listed, screen
+from workbench.screen import SCREEN_LINES, SCREEN_WIDTH, Screen, debug_option, listed, screen
 from workbench.screen import Row as Row
 from workbench.screen import as_text as as_text
 from workbench.screen import is_verbose as is_verbose
 from workbench.screen import table as table
 from workbench.screen import verbose_option as verbose_option
+from workbench.signature import decorated, option
 
 Command = TypeVar("Command", bound=Callable[..., Any])
+# Options of every command, as defaults of their parameters; the first brings --verbose.
+JSON_OPTION = option("Print the result as JSON.", "--json", beside=(verbose_option, debug_option))
+OUT_OPTION = option("Folder for the results.  [default: runs/<time>-<command>]", metavar="DIR")
 MOST_OF_A_STEP = 6  # lines that a command to type next may have on one screen
 
 
@@ -87,12 +90,7 @@ class OutputFolder:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
         try:
             if kind is None:
                 self._publish()
@@ -186,20 +184,8 @@ def write_whole(path: Path, text: str, option: str) -> None:
 def output_options(command: Command) -> Command:
     """The options of every command: `as_json: bool` (--json), `out: Path | None` (--out), and
     --verbose."""
-    options = (
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
-        verbose_option,
-        click.option(
-            "--out",
-            type=click.Path(path_type=Path),
-            metavar="DIR",
-            help="Folder for the results.  [default: runs/<time>-<command>]",
-        ),
-        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
+    with_out = decorated(command, "out", OUT_OPTION, Path | None)
+    return decorated(with_out, "as_json", JSON_OPTION, bool)
 
 
 def strict(value: object) -> object:

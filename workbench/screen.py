@@ -29,6 +29,11 @@ def verbose_option(command: Command) -> Command:
     )(command)  # fmt: skip
 
 
+def debug_option(command: Command) -> Command:
+    """The option `--debug` of every command, which `workbench.cli` looks for."""
+    return click.option("--debug", is_flag=True, expose_value=False, hidden=True)(command)
+
+
 def _whole(ctx: click.Context, _param: click.Parameter, value: bool) -> None:
     if value:
         ctx.meta[VERBOSE_GIVEN] = True

@@ -14,7 +14,7 @@ from identification.model.karnopp import Karnopp, friction
 from identification.model.plant import Actuator, Plant
 from identification.simulation.free_run import FreeRun, free_run
 from identification.simulation.karnopp_step import SLIP_N, SLIP_P, STUCK
-from workbench.report.figures import MEASURED, MODEL, figure, label, style
+from workbench.report.chart_figure import MEASURED, MODEL, figure, label, style
 
 TABLE_2 = Karnopp(3.5, 16.97, 18.13, 289.0, 287.4, 0.009, -0.01, 20.76, -21.8)  # the paper's
 K1, K2 = 19530.0, 10405.0  # of its simulated actuator

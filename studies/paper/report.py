@@ -12,7 +12,7 @@ from studies.paper.measures import Case
 from studies.paper.sensitivity import Sensitivity
 from studies.paper.study import Study
 from studies.paper.svg import inline, picture
-from workbench.report.figures import (
+from workbench.report.chart_figure import (
     BAND,
     MEASURED,
     MODEL,

@@ -5,7 +5,7 @@ import re
 from html import escape
 from typing import TYPE_CHECKING, Any
 
-from workbench.report.figures import BAND, GREY, MODEL, OTHER, REFERENCE
+from workbench.report.chart_figure import BAND, GREY, MODEL, OTHER, REFERENCE
 from workbench.report.templating import safe
 
 if TYPE_CHECKING:

@@ -49,8 +49,8 @@ from workbench.steps.drift import Tested as OneTested
 from workbench.steps.experiment.planned import Experiment, Promised, Safety
 from workbench.steps.first_card.proposal import proposed
 from workbench.steps.installation import check_installation
-from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.loop_figures import COMPENSATED, PRESENT, Limits, LoopFigures
+from workbench.steps.loop_motion import LimitCycle
 from workbench.steps.predict import Predicted
 from workbench.steps.response import respond
 from workbench.steps.robust.outcomes import MEASURES, Outcomes

@@ -6,11 +6,11 @@ workbench/cards/card_faults.py.
 
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
@@ -33,6 +33,7 @@ NEEDED_SIGNALS: Mapping[str, tuple[str, ...]] = {
 }
 OFFERED_FOR_VELOCITY = "doctor, identify, trace, predict, design and validate"
 
+Value = TypeVar("Value")
 
 _OWN_COLUMN_SIGNALS = ("t", "y", "F", "p_p", "p_n", "u")
 
@@ -95,11 +96,11 @@ def card_from(
     try:
         parsed = CardFile.model_validate(raw)
         signals = parsed.signals or (_recipe_signals(parsed.rig) if parsed.recipe else {})
-        rigs = {"": _rig(path, parsed.rig, signals)}
+        rigs = {"": _of(path, parsed.rig.value, signals)}
         for number, entry in enumerate(parsed.files):
             if entry.rig:
                 merged = CardFile.model_validate({**raw, "rig": {**raw["rig"], **entry.rig}}).rig
-                rigs[entry.name] = _rig(path, merged, signals)
+                rigs[entry.name] = _of(path, merged.value, signals)
                 _need_signals(path, merged, parsed.signals, f"[files.{number}.rig]")
         wanted = parsed.recipe if with_recipe else None
         rig = rigs[""]
@@ -124,28 +125,15 @@ def card_from(
         split=MappingProxyType(parsed.split),
         recipe=recipe,
         rigs=MappingProxyType(rigs),
-        controller=_controller(path, parsed, rigs[""]),
-        limits=_limits(path, parsed, rigs[""]),
+        controller=_of(path, parsed.controller.value, rig) if parsed.controller else None,
+        limits=MappingProxyType(_of(path, parsed.limits.value, rig) if parsed.limits else {}),
     )
 
 
-def _rig(path: Path, section: RigSection, signals: Mapping[str, SignalSpec]) -> Rig:
+def _of(path: Path, value: Callable[..., Value], *given: Any) -> Value:
+    """The value of a table; raises BadCard with the card's path before what is wrong with it."""
     try:
-        return section.value(signals)
-    except BadCard as error:
-        raise BadCard(f"{path}: {error}") from None
-
-
-def _limits(path: Path, parsed: CardFile, rig: Rig) -> Mapping[str, tuple[float, float]]:
-    try:
-        return MappingProxyType({} if parsed.limits is None else parsed.limits.value(rig))
-    except BadCard as error:
-        raise BadCard(f"{path}: {error}") from None
-
-
-def _controller(path: Path, parsed: CardFile, rig: Rig) -> CardController | None:
-    try:
-        return None if parsed.controller is None else parsed.controller.value(rig)
+        return value(*given)
     except BadCard as error:
         raise BadCard(f"{path}: {error}") from None
 

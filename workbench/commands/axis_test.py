@@ -6,8 +6,9 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench.ending import StatusCommand, Step, step
-from workbench.options import card_option, complete_file
-from workbench.output import output_options, results
+from workbench.options import CARD_OPTION, LOG_ARGUMENT, SEED_OPTION
+from workbench.output import JSON_OPTION, OUT_OPTION, results
+from workbench.signature import by_signature, option
 
 if TYPE_CHECKING:
     from workbench.steps.axis_test import AxisTest
@@ -19,28 +20,21 @@ if TYPE_CHECKING:
     refusal="yellow or red, or nothing is identifiable from the log; the first line says why",
     epilog="Example: workbench axis-test run1.csv --card bench-a/card.toml --registry registry.db",
 )
-@click.argument("log", metavar="LOG", shell_complete=complete_file)
-@card_option
-@click.option(
-    "--registry",
-    "where",
-    metavar="FILE|URL",
-    help="SQLite file or postgresql://... whose last 30 logs of the machine give its limits.",
-)
-@click.option(
-    "--machine", metavar="NAME", help="The machine's name in the registry.  [default: the card's]"
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@output_options
+@by_signature
 def command(
-    log: str,
-    card: str,
-    where: str | None,
-    machine: str | None,
-    seed: int,
-    as_json: bool,
-    out: Path | None,
-) -> int:
+    log: str = LOG_ARGUMENT,
+    card: str = CARD_OPTION,
+    where: str | None = option(
+        "SQLite file or postgresql://... whose last 30 logs of the machine give its limits.",
+        "--registry", metavar="FILE|URL",
+    ),
+    machine: str | None = option(
+        "The machine's name in the registry.  [default: the card's]", metavar="NAME"
+    ),
+    seed: int = SEED_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> int:  # fmt: skip
     """Test an axis by one log: friction and breakaway each way, mass, constant force, backlash.
 
     Each number has its limits, of the card's [limits], else the mean +- 3 sd of the machine's last

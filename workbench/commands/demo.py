@@ -7,7 +7,8 @@ import click
 
 from workbench.course import Course, moving
 from workbench.ending import StatusCommand
-from workbench.output import emit, output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
+from workbench.signature import by_signature, option
 from workbench.steps.stages import TRACE_STAGES
 
 RECIPE = "demo"
@@ -20,12 +21,15 @@ DEMO_STAGES["designing"] = (0.85, 1.0)
     refusal="the effect is not found, or the recommended controller does not meet the limits",
     epilog="Example: workbench demo --out demo",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True,
-    help="Of the search and the simulated check; the log is of the recipe's own seed.",
-)  # fmt: skip
-@output_options
-def command(seed: int, as_json: bool, out: Path | None) -> int:
+@by_signature
+def command(
+    seed: int = option(
+        "Of the search and the simulated check; the log is of the recipe's own seed.",
+        type=click.IntRange(min=0), default=0,
+    ),
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> int:  # fmt: skip
     """Run the whole chain on a shipped recipe and write a report.
 
     Simulates two runs of the paper's rig (table 2) with an effect that is declared nowhere but in

@@ -9,7 +9,8 @@ import click
 
 from workbench.ending import StatusCommand, step
 from workbench.options import complete_card, complete_file
-from workbench.output import emit, output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.steps.doctor import Examined
@@ -21,26 +22,21 @@ if TYPE_CHECKING:
     " does not work",
     epilog="Example: workbench doctor run1.csv --card card.toml --out check",
 )
-@click.argument("log", required=False, shell_complete=complete_file)
-@click.option(
-    "--card",
-    shell_complete=complete_card,
-    help="Path of the card, or the name of a shipped one.",
-)
-@click.option(
-    "--registry",
-    "where",
-    metavar="FILE|URL",
-    help="Registry to be asked, without LOG.  [default: WORKBENCH_REGISTRY, if set]",
-)
-@click.option(
-    "--effects-shown", is_flag=True,
-    help="Also which effects of the library the log could show (takes longer).",
-)  # fmt: skip
-@output_options
+@by_signature
 def command(
-    log: str | None, card: str | None, where: str | None, effects_shown: bool, as_json: bool,
-    out: Path | None,
+    log: str | None = argument(shell_complete=complete_file),
+    card: str | None = option(
+        "Path of the card, or the name of a shipped one.", shell_complete=complete_card
+    ),
+    where: str | None = option(
+        "Registry to be asked, without LOG.  [default: WORKBENCH_REGISTRY, if set]",
+        "--registry", metavar="FILE|URL",
+    ),
+    effects_shown: bool = option(
+        "Also which effects of the library the log could show (takes longer)."
+    ),
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
 ) -> int:  # fmt: skip
     """Check a log before any fit: clock, sensors, bad samples, motion, and what is identifiable.
 

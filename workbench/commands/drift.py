@@ -5,8 +5,16 @@ from pathlib import Path
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import POSITIVE, card_option, complete_file, effects_option
-from workbench.output import output_options, progress, results
+from workbench.options import (
+    CARD_OPTION,
+    EFFECTS_OPTION,
+    LOGS_ARGUMENT,
+    MODEL_ARGUMENT,
+    POSITIVE,
+    SEED_OPTION,
+)
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import by_signature, option
 
 
 @click.command(
@@ -16,53 +24,31 @@ from workbench.output import output_options, progress, results
     refusal="drift, a changed structure, or no log from which anything is identifiable",
     epilog="Example: workbench drift model/model.json day2.csv --card card.toml --state state.json",
 )
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
-@card_option
-@click.option(
-    "--state",
-    "state_file",
-    type=click.Path(path_type=Path, dir_okay=False),
-    metavar="FILE",
-    help="File that carries the test from log to log; made where there is none.",
-)
-@click.option(
-    "--margin",
-    type=POSITIVE,
-    default=2.0,
-    show_default=True,
-    help="Change of a parameter that does not matter [%].",
-)
-@click.option(
-    "--variation",
-    type=POSITIVE,
-    default=1.0,
-    show_default=True,
-    help="Standard deviation of a parameter from log to log [%], until the logs show it.",
-)
-@click.option(
-    "--run-length",
-    type=POSITIVE,
-    default=1000.0,
-    show_default=True,
-    help="Logs without drift up to a false alarm, on average, at least.",
-)
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@effects_option
-@output_options
+@by_signature
 def command(
-    model_file: Path,
-    logs: tuple[str, ...],
-    card: str,
-    state_file: Path | None,
-    margin: float,
-    variation: float,
-    run_length: float,
-    seed: int,
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
-) -> int:
+    model_file: Path = MODEL_ARGUMENT,
+    logs: tuple[str, ...] = LOGS_ARGUMENT,
+    card: str = CARD_OPTION,
+    state_file: Path | None = option(
+        "File that carries the test from log to log; made where there is none.",
+        "--state", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    ),
+    margin: float = option(
+        "Change of a parameter that does not matter [%].", type=POSITIVE, default=2.0
+    ),
+    variation: float = option(
+        "Standard deviation of a parameter from log to log [%], until the logs show it.",
+        type=POSITIVE, default=1.0,
+    ),
+    run_length: float = option(
+        "Logs without drift up to a false alarm, on average, at least.",
+        type=POSITIVE, default=1000.0,
+    ),
+    seed: int = SEED_OPTION,
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> int:  # fmt: skip
     """Test new logs against the active model: has the machine changed, and in which parameters?
 
     Every log is tested alone and, with those before it, by their mean, which finds what changes

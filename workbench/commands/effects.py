@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from workbench.ending import StatusGroup, step
-from workbench.options import effects_option
-from workbench.output import emit, progress, verbose_option
+from workbench.options import EFFECTS_OPTION
+from workbench.output import JSON_OPTION, emit, progress
+from workbench.signature import argument, by_signature
 
 if TYPE_CHECKING:
     from identification.effects._base import Effect
@@ -24,12 +25,12 @@ def command() -> None:
 
 
 @command.command("list", epilog="Example: workbench effects list stribeck")
-@click.argument("keys", nargs=-1, metavar="[KEY]...")
-@effects_option
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@verbose_option
-@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
-def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool) -> None:
+@by_signature
+def list_effects(
+    keys: tuple[str, ...] = argument("[KEY]..."),
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+) -> None:
     """List the effects, a line each; with --verbose equation, parameters with units, source.
 
     KEY: those to be shown, with all of this; by default every effect.
@@ -45,11 +46,8 @@ def list_effects(keys: tuple[str, ...], effects: tuple[Path, ...], as_json: bool
 @command.command(
     refusal="an effect breaks a rule", epilog="Example: workbench effects check my_effects"
 )
-@click.argument("folder", type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@verbose_option
-@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
-def check(folder: Path, as_json: bool) -> int:
+@by_signature
+def check(folder: Path = argument(), as_json: bool = JSON_OPTION) -> int:
     """Check your own effects by the rules that the shipped ones are held to.
 
     FOLDER holds one effect a file, declared as EFFECT ('python -c "import

@@ -1,15 +1,66 @@
 """`workbench experiment`: a model -> the run to make next, as CSV, JSON and a page."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 
 from workbench.course import running
 from workbench.ending import StatusCommand
-from workbench.options import POSITIVE, Finite, effects_option, present_card_option
-from workbench.output import output_options, results
+from workbench.options import (
+    EFFECTS_OPTION,
+    MODEL_ARGUMENT,
+    POSITIVE,
+    PRESENT_CARD_OPTION,
+    SEED_OPTION,
+    Finite,
+)
+from workbench.output import JSON_OPTION, OUT_OPTION, results
+from workbench.signature import by_fields, option
 
 SEARCH_SECONDS = 30.0
+
+
+@dataclass(frozen=True)
+class ExperimentOptions:
+    """What the command line says of an experiment."""
+
+    model_file: Path = MODEL_ARGUMENT
+    design_file: Path | None = option(
+        "A design whose recommended controller moves the machine.  [default: its present one]",
+        "--design", metavar="DESIGN",
+    )  # fmt: skip
+    parameters: str | None = option(
+        "Parameters to be identified, as m,F_cp,dv_p.  [default: all]", metavar="NAME,..."
+    )
+    stroke: tuple[float, float] | None = option(
+        "Positions between which it may move [m, rad].  [default: the card's, or the logs']",
+        type=(Finite(), Finite()), metavar="LOW HIGH",
+    )  # fmt: skip
+    speed: float | None = option(
+        "Largest speed [m/s, rad/s].  [default: 1.5 times the logs']", type=POSITIVE
+    )
+    force: float | None = option(
+        "Largest force [N, N m].  [default: 1.2 times the logs']", type=POSITIVE
+    )
+    limit: float | None = option("Largest command.  [default: any]", "--command", type=POSITIVE)
+    seconds: float = option(
+        "How long the run lasts [s].", "--time", type=Finite(min=2, max=600), default=20.0
+    )
+    trace_file: Path | None = option(
+        "trace.json whose rivals (or, of an unknown effect, all of the library) the run is to"
+        " discriminate.",
+        "--rivals", metavar="TRACE",
+    )  # fmt: skip
+    budget: float = option(
+        "End the search after so long with the best so far; the first Ctrl-C does the same.",
+        type=POSITIVE, default=SEARCH_SECONDS, metavar="SECONDS",
+    )  # fmt: skip
+    seed: int = SEED_OPTION
+    card: str | None = PRESENT_CARD_OPTION
+    effects: tuple[Path, ...] = EFFECTS_OPTION
+    as_json: bool = JSON_OPTION
+    out: Path | None = OUT_OPTION
 
 
 @click.command(
@@ -17,60 +68,8 @@ SEARCH_SECONDS = 30.0
     refusal="a simulated machine, drawn from the model's uncertainty, exceeds a limit",
     epilog="Example: workbench experiment runs/.../model.json --stroke -0.1 0.1 --time 20",
 )
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.option(
-    "--design", "design_file", type=click.Path(path_type=Path), metavar="DESIGN",
-    help="A design whose recommended controller moves the machine.  [default: its present one]",
-)  # fmt: skip
-@click.option(
-    "--parameters", metavar="NAME,...",
-    help="Parameters to be identified, as m,F_cp,dv_p.  [default: all]",
-)  # fmt: skip
-@click.option(
-    "--stroke", type=(Finite(), Finite()), metavar="LOW HIGH",
-    help="Positions between which it may move [m, rad].  [default: the card's, or the logs']",
-)  # fmt: skip
-@click.option(
-    "--speed", type=POSITIVE, help="Largest speed [m/s, rad/s].  [default: 1.5 times the logs']"
-)
-@click.option(
-    "--force", type=POSITIVE, help="Largest force [N, N m].  [default: 1.2 times the logs']"
-)
-@click.option("--command", "limit", type=POSITIVE, help="Largest command.  [default: any]")
-@click.option(
-    "--time", "seconds", type=Finite(min=2, max=600), default=20.0, show_default=True,
-    help="How long the run lasts [s].",
-)  # fmt: skip
-@click.option(
-    "--rivals", "trace_file", type=click.Path(path_type=Path), metavar="TRACE",
-    help="trace.json whose rivals (or, of an unknown effect, all of the library) the run is to"
-    " discriminate.",
-)  # fmt: skip
-@click.option(
-    "--budget", type=POSITIVE, default=SEARCH_SECONDS, show_default=True, metavar="SECONDS",
-    help="End the search after so long with the best so far; the first Ctrl-C does the same.",
-)  # fmt: skip
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@present_card_option
-@effects_option
-@output_options
-def command(
-    model_file: Path,
-    design_file: Path | None,
-    parameters: str | None,
-    stroke: tuple[float, float] | None,
-    speed: float | None,
-    force: float | None,
-    limit: float | None,
-    seconds: float,
-    trace_file: Path | None,
-    budget: float,
-    seed: int,
-    card: str | None,
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
-) -> int:
+@by_fields(ExperimentOptions)
+def command(given: ExperimentOptions) -> int:
     """Find the run to make next: the reference, within the machine's limits, that is most
     informative.
 
@@ -88,17 +87,22 @@ def command(
     from workbench.steps.experiment.rivals import read_rivals
     from workbench.steps.present import with_card
 
-    known = library(effects)
-    model = with_card(read_model(model_file, known), card)
-    design = read_design(design_file) if design_file else None
-    names = tuple(name.strip() for name in (parameters or "").split(",") if name.strip())
-    rivals = read_rivals(trace_file, model, known) if trace_file else ()
-    wanted = Wanted(names, stroke, speed, force, limit, seconds, seed, rivals)
-    with results("experiment", out) as folder:
+    known, model_file = library(given.effects), given.model_file
+    model = with_card(read_model(model_file, known), given.card)
+    design = read_design(given.design_file) if given.design_file else None
+    parts = (given.parameters or "").split(",")
+    names = tuple(name.strip() for name in parts if name.strip())
+    rivals = read_rivals(given.trace_file, model, known) if given.trace_file else ()
+    wanted = Wanted(
+        names, given.stroke, given.speed, given.force, given.limit, given.seconds, given.seed,
+        rivals,
+    )  # fmt: skip
+    as_json, budget = given.as_json, given.budget
+    with results("experiment", given.out) as folder:
         with running("experiment", EXPERIMENT_STAGES, as_json=as_json, budget=budget) as course:
             found = experiment(model, wanted, design, course.report, course.keep_going)
         view = experiment_view(found)
         view.write(folder)
-    then = after_experiment(found, model_file, design_file)
+    then = after_experiment(found, model_file, given.design_file)
     show(view, folder.final, as_json, then)
     return 0 if then is None else 1

@@ -3,55 +3,61 @@
 import os
 import secrets
 import socket
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from workbench.ending import StatusCommand, Step, step
-from workbench.options import POSITIVE, registry_option
-from workbench.output import dumps, emit, progress, verbose_option
+from workbench.options import POSITIVE, REGISTRY_OPTION, SEED_OPTION
+from workbench.output import JSON_OPTION, dumps, emit, progress
+from workbench.signature import argument, by_fields, option
 
 if TYPE_CHECKING:
     from workbench.fleet.recording import Recorder
     from workbench.fleet.run import Report
     from workbench.screen import Screen
 
-Command = TypeVar("Command", bound=Callable[..., Any])
 MOST_BAD = 20  # results to look at on one screen; --verbose and --json have the first 1000
 
 
-def fleet_options(command: Command) -> Command:
-    """The options of the command, by the names of its arguments."""
-    options = (
-        click.option("--card", help="Card of all machines: a path, or the name of a shipped one.  "
-                     "[default: the nearest card.toml at or above each log]"),
-        click.option("--cluster", "address", metavar="ADDRESS", help="Scheduler of a Dask cluster, "
-                     "as tcp://host:8786.  [default: processes of this computer]"),
-        click.option("--workers", type=click.IntRange(min=1), metavar="N",
-                     help="Processes of this computer.  [default: one a core]"),
-        click.option("--attempts", type=click.IntRange(min=1), default=3, show_default=True,
-                     help="Workers that may die of a log before it has failed; a cluster at an "
-                     "ADDRESS has a setting of its own."),
-        click.option("--timeout", type=POSITIVE, default=30.0, show_default=True, metavar="S",
-                     help="Wait this long for a cluster's answer."),
-        registry_option,
-        click.option("--no-registry", is_flag=True, help="Write Parquet only."),
-        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
-        click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-                     default=Path("fleet"), show_default=True,
-                     help="Folder of the results; the same again goes on there."),
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
-        verbose_option,
-        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
+@dataclass(frozen=True)
+class FleetOptions:
+    """What the command line says of a fleet."""
+
+    logs: str = argument("LOGS")
+    card: str | None = option(
+        "Card of all machines: a path, or the name of a shipped one.  [default: the nearest"
+        " card.toml at or above each log]"
+    )
+    address: str | None = option(
+        "Scheduler of a Dask cluster, as tcp://host:8786.  [default: processes of this computer]",
+        "--cluster", metavar="ADDRESS",
     )  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
+    workers: int | None = option(
+        "Processes of this computer.  [default: one a core]",
+        type=click.IntRange(min=1), metavar="N",
+    )  # fmt: skip
+    attempts: int = option(
+        "Workers that may die of a log before it has failed; a cluster at an ADDRESS has a setting"
+        " of its own.",
+        type=click.IntRange(min=1), default=3,
+    )  # fmt: skip
+    timeout: float = option(
+        "Wait this long for a cluster's answer.", type=POSITIVE, default=30.0, metavar="S"
+    )
+    where: str | None = REGISTRY_OPTION
+    no_registry: bool = option("Write Parquet only.")
+    seed: int = SEED_OPTION
+    out: Path = option(
+        "Folder of the results; the same again goes on there.",
+        default=Path("fleet"), metavar="DIR",
+    )  # fmt: skip
+    as_json: bool = JSON_OPTION
 
 
 @click.command(
@@ -59,21 +65,8 @@ def fleet_options(command: Command) -> Command:
     refusal="some logs were refused, failed, give an alarm or are left to a later run",
     epilog="Example: workbench fleet logs --card card.toml --out fleet --workers 2",
 )
-@click.argument("logs", metavar="LOGS")
-@fleet_options
-def command(
-    logs: str,
-    card: str | None,
-    address: str | None,
-    workers: int | None,
-    attempts: int,
-    timeout: float,
-    where: str | None,
-    no_registry: bool,
-    seed: int,
-    out: Path,
-    as_json: bool,
-) -> int:
+@by_fields(FleetOptions)
+def command(given: FleetOptions) -> int:
     """Identify the logs of many machines, or test them against the active models.
 
     LOGS is a folder, a file, a pattern or any fsspec URL of Parquet logs, <machine>/*.parquet or
@@ -86,24 +79,24 @@ def command(
     from workbench.fleet.run import FleetRun, FleetSettings
     from workbench.fleet.store import ResultStore
 
-    if address is not None and workers is not None:
+    if given.address is not None and given.workers is not None:
         raise click.UsageError(
             "--workers is for processes of this computer; leave one of both out."
         )
-    text = None if card is None else _card_text(card)
+    logs, out, where = given.logs, given.out, None if given.no_registry else (given.where or "")
+    text = None if given.card is None else _card_text(given.card)
     found = find_logs(logs, leave_out=out)
     with ExitStack() as held:
         store = held.enter_context(ResultStore(out))
-        recorder = held.enter_context(_recorder(None if no_registry else (where or "")))
-        cluster = held.enter_context(_cluster(address, workers, attempts, timeout))
-        advance = held.enter_context(progress("fleet", float(len(found)), as_json=as_json))
-        settings = FleetSettings(logs, text, seed)
+        recorder = held.enter_context(_recorder(where))
+        cluster = held.enter_context(_cluster(given))
+        advance = held.enter_context(progress("fleet", float(len(found)), as_json=given.as_json))
+        settings = FleetSettings(logs, text, given.seed)
         done = FleetRun(cluster, store, recorder, settings, clock, advance=advance)(found)
     result = {**asdict(done), "bad": [_bad(one) for one in done.bad], "out": out}
     (out / "summary.json").write_text(dumps(result) + "\n", encoding="utf-8")
-    registry = None if no_registry else where
-    then = after_fleet(done, logs, card, registry, in_registry=not no_registry)
-    emit(result, as_json, lambda: fleet_view(done, out), then)
+    then = after_fleet(done, logs, given.card, where, in_registry=not given.no_registry)
+    emit(result, given.as_json, lambda: fleet_view(done, out), then)
     return 0 if then is None else 1
 
 
@@ -187,12 +180,12 @@ def _recorder(where: str | None) -> "Iterator[Recorder]":
         yield InRegistry(registry, owner, clock)
 
 
-def _cluster(address: str | None, workers: int | None, attempts: int, timeout: float) -> Any:
+def _cluster(given: FleetOptions) -> Any:
     from workbench.fleet.cluster import cluster_at, local_cluster
 
-    if address is not None:
-        return cluster_at(address, timeout)
-    return local_cluster(workers or _cores(), attempts)
+    if given.address is not None:
+        return cluster_at(given.address, given.timeout)
+    return local_cluster(given.workers or _cores(), given.attempts)
 
 
 def _cores() -> int:

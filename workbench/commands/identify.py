@@ -9,13 +9,15 @@ import click
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand
 from workbench.options import (
+    BUDGET_OPTION,
+    CARD_OPTION,
+    LOGS_ARGUMENT,
     POSITIVE,
-    budget_option,
-    card_option,
-    complete_file,
+    SEED_OPTION,
     refuse_for_velocity,
 )
-from workbench.output import output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import by_signature, option
 from workbench.steps.stages import IDENTIFY_STAGES
 
 
@@ -24,36 +26,26 @@ from workbench.steps.stages import IDENTIFY_STAGES
     refusal="nothing is identifiable from the logs",
     epilog="Example: workbench identify run1.csv run2.csv --card bench-a/card.toml",
 )
-@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
-@card_option
-@click.option(
-    "--drive",
-    type=click.Choice(["force", "command"]),
-    help="What drives the fitted run.  [default: the command where it explains the force]",
-)
-@click.option("--orders", metavar="NA,NB,NK", help="Orders of the ARX plant.  [default: chosen]")
-@click.option(
-    "--design-period",
-    type=POSITIVE,
-    metavar="S",
-    help="Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
-)
-@budget_option
-@click.option("--posterior", is_flag=True, help="Sample the posterior of the parameters too.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@output_options
+@by_signature
 def command(
-    logs: tuple[str, ...],
-    card: str,
-    drive: Literal["force", "command"] | None,
-    orders: str | None,
-    design_period: float | None,
-    budget: float,
-    posterior: bool,
-    seed: int,
-    as_json: bool,
-    out: Path | None,
-) -> None:
+    logs: tuple[str, ...] = LOGS_ARGUMENT,
+    card: str = CARD_OPTION,
+    drive: Literal["force", "command"] | None = option(
+        "What drives the fitted run.  [default: the command where it explains the force]"
+    ),
+    orders: str | None = option(
+        "Orders of the ARX plant.  [default: chosen]", metavar="NA,NB,NK"
+    ),
+    design_period: float | None = option(
+        "Sampling period of the ARX plant [s].  [default: 0.01, or the log's if longer]",
+        type=POSITIVE, metavar="S",
+    ),
+    budget: float = BUDGET_OPTION,
+    posterior: bool = option("Sample the posterior of the parameters too."),
+    seed: int = SEED_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> None:  # fmt: skip
     """Find friction, plant and actuator of a machine from its logs.
 
     Writes model.json (every parameter with its 95 % interval, or why it is not identifiable)

@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 import click
 
 from workbench.ending import StatusCommand
-from workbench.output import emit, progress, verbose_option, write_whole
+from workbench.output import emit, progress, write_whole
+from workbench.screen import debug_option, verbose_option
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.steps.first_card.proposal import Proposal
@@ -17,23 +19,19 @@ CARD = "card.toml"
 
 
 @click.command(cls=StatusCommand, epilog="Example: workbench init run1.csv --out bench-a/card.toml")
-@click.argument("log", type=click.Path(path_type=Path))
-@click.option(
-    "--out",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="The card, or a folder for it.  [default: card.toml]",
-)
-@click.option("--name", help="Name of the machine.  [default: that of the log]")
-@click.option("--axis", metavar="NAME", help="Which of several axes or joints in the log.")
-@click.option("--force", is_flag=True, help="Replace a card that is there.")
-@click.option("--yes", is_flag=True, help="Ask nothing; take the guesses.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON; ask nothing.")
-@verbose_option
-@click.option("--debug", is_flag=True, expose_value=False, hidden=True)
+@by_signature
 def command(
-    log: Path, out: Path | None, name: str | None, axis: str | None,
-    force: bool, yes: bool, as_json: bool,
+    log: Path = argument(),
+    out: Path | None = option(
+        "The card, or a folder for it.  [default: card.toml]", metavar="FILE"
+    ),
+    name: str | None = option("Name of the machine.  [default: that of the log]"),
+    axis: str | None = option("Which of several axes or joints in the log.", metavar="NAME"),
+    force: bool = option("Replace a card that is there."),
+    yes: bool = option("Ask nothing; take the guesses."),
+    as_json: bool = option(
+        "Print the result as JSON; ask nothing.", "--json", beside=(verbose_option, debug_option)
+    ),
 ) -> None:  # fmt: skip
     """Propose a card for a log that has none: which column is what, in which unit, and the rig.
 

@@ -7,41 +7,35 @@ import click
 
 from workbench.ending import StatusCommand
 from workbench.options import (
+    CARD_OPTION,
+    EFFECTS_OPTION,
+    LOG_ARGUMENT,
+    MODEL_ARGUMENT,
     POSITIVE,
-    card_option,
-    complete_file,
-    effects_option,
     refuse_for_velocity,
 )
-from workbench.output import output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import by_signature, option
 
 
 @click.command(
     cls=StatusCommand,
     epilog="Example: workbench predict runs/.../model.json run3.csv --card bench-a",
 )
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("log", metavar="LOG", shell_complete=complete_file)
-@card_option
-@click.option(
-    "--window", type=POSITIVE, metavar="S", help="Restart from the measured state every S."
-)
-@click.option(
-    "--drive",
-    type=click.Choice(["force", "command"]),
-    help="What drives the run.  [default: the command where the model has an actuator]",
-)
-@effects_option
-@output_options
+@by_signature
 def command(
-    model_file: Path,
-    log: str,
-    card: str,
-    window: float | None,
-    drive: Literal["force", "command"] | None,
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
+    model_file: Path = MODEL_ARGUMENT,
+    log: str = LOG_ARGUMENT,
+    card: str = CARD_OPTION,
+    window: float | None = option(
+        "Restart from the measured state every S.", type=POSITIVE, metavar="S"
+    ),
+    drive: Literal["force", "command"] | None = option(
+        "What drives the run.  [default: the command where the model has an actuator]"
+    ),
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
 ) -> None:
     """Predict force and position of a log by a model and its effects; nothing is fitted on it.
 

@@ -2,51 +2,32 @@
 
 import getpass
 import json
-from collections.abc import Callable
 from dataclasses import asdict
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING
 
 import click
 
 from workbench.ending import StatusGroup
-from workbench.options import effects_option, registry_option
-from workbench.output import emit, results, verbose_option
+from workbench.options import EFFECTS_OPTION, MODEL_ARGUMENT, REGISTRY_OPTION
+from workbench.output import JSON_OPTION, emit, results
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
     from workbench.registry.values import Decision, Version
-
-Command = TypeVar("Command", bound=Callable[..., Any])
-KINDS = ("model", "design", "validation")
-
-
-def registry_options(command: Command) -> Command:
-    """The options of every registry command: `where` (--registry) and `as_json` (--json)."""
-    options = (
-        registry_option,
-        click.option("--json", "as_json", is_flag=True, help="Print the result as JSON."),
-        verbose_option,
-        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
-    )
-    for option in reversed(options):
-        command = option(command)
-    return command
-
-
-def decision_options(command: Command) -> Command:
-    """Why and by whom: `reason` (--reason) and `by` (--by)."""
-    by = click.option("--by", metavar="NAME", help="Who decides.  [default: you]")
-    why = click.option("--reason", required=True, metavar="TEXT", callback=_given,
-                       help="Why; it is recorded.")  # fmt: skip
-    return why(by(command))
 
 
 def _given(ctx: click.Context, param: click.Parameter, value: str) -> str:
     if not value.strip():
         raise click.UsageError("--reason is empty; say why in a few words.", ctx)
     return value.strip()
+
+
+MACHINE_ARGUMENT = argument()
+BY_OPTION = option("Who decides.  [default: you]", metavar="NAME")
+REASON_OPTION = option("Why; it is recorded.", required=True, metavar="TEXT", callback=_given)
 
 
 @click.group(cls=StatusGroup, epilog="Example: workbench registry show bench-a --json")
@@ -59,8 +40,8 @@ def command() -> None:
 
 
 @command.command("list", epilog="Example: workbench registry list --registry fleet.db")
-@registry_options
-def list_machines(where: str | None, as_json: bool) -> None:
+@by_signature
+def list_machines(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
     """List the machines, the active version of each, and how many logs wait."""
     from workbench.registry.views import list_view
 
@@ -70,13 +51,13 @@ def list_machines(where: str | None, as_json: bool) -> None:
 
 
 @command.command(epilog="Example: workbench registry show bench-a 2 --out version2")
-@click.argument("machine")
-@click.argument("number", type=click.IntRange(min=1), required=False)
-@click.option("--out", type=click.Path(path_type=Path), metavar="DIR",
-              help="Write the files of the version too.")  # fmt: skip
-@registry_options
+@by_signature
 def show(
-    machine: str, number: int | None, out: Path | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    number: int | None = argument(type=click.IntRange(min=1)),
+    out: Path | None = option("Write the files of the version too.", metavar="DIR"),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show a machine: the active version, every decision with its reason, every log's result.
 
@@ -98,12 +79,13 @@ def show(
 
 
 @command.command(epilog="Example: workbench registry diff bench-a 1 2")
-@click.argument("machine")
-@click.argument("first", type=click.IntRange(min=1), required=False)
-@click.argument("second", type=click.IntRange(min=1), required=False)
-@registry_options
+@by_signature
 def diff(
-    machine: str, first: int | None, second: int | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    first: int | None = argument(type=click.IntRange(min=1)),
+    second: int | None = argument(type=click.IntRange(min=1)),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Show the parameters of two versions side by side, with units and 95 % intervals.
 
@@ -120,7 +102,7 @@ def diff(
                 f"{machine}: no version before {after.number}; name two versions to compare"
             )
         before = found.version(machine, first if first is not None else after.number - 1)
-        lines = difference(_documents(found, before), _documents(found, after))
+        lines = difference(found.documents(before), found.documents(after))
     names = (f"version {before.number}", f"version {after.number}")
     result = {"machine": machine, "versions": [before, after], "parameters": lines}
     emit(result, as_json, lambda: difference_view(lines, names))
@@ -129,27 +111,18 @@ def diff(
 @command.command(
     epilog="Example: workbench registry add bench-a model.json design.json --promote --reason first"
 )
-@click.argument("machine")
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("design_file", metavar="[DESIGN]", required=False,
-                type=click.Path(path_type=Path))  # fmt: skip
-@click.option("--validation", type=click.Path(path_type=Path), metavar="FILE",
-              help="validation.json of the design.")  # fmt: skip
-@click.option("--promote", is_flag=True, help="Make it the active version as well.")
-@effects_option
-@decision_options
-@registry_options
+@by_signature
 def add(
-    machine: str,
-    model_file: Path,
-    design_file: Path | None,
-    validation: Path | None,
-    promote: bool,
-    effects: tuple[Path, ...],
-    reason: str,
-    by: str | None,
-    where: str | None,
-    as_json: bool,
+    machine: str = MACHINE_ARGUMENT,
+    model_file: Path = MODEL_ARGUMENT,
+    design_file: Path | None = argument("[DESIGN]"),
+    validation: Path | None = option("validation.json of the design.", metavar="FILE"),
+    promote: bool = option("Make it the active version as well."),
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Add a model, with its design, as a new version of a machine; a new machine is made.
 
@@ -182,12 +155,14 @@ def add(
 
 
 @command.command(epilog="Example: workbench registry promote bench-a 2 --reason 'tried on Monday'")
-@click.argument("machine")
-@click.argument("number", type=click.IntRange(min=1))
-@decision_options
-@registry_options
+@by_signature
 def promote(
-    machine: str, number: int, reason: str, by: str | None, where: str | None, as_json: bool
+    machine: str = MACHINE_ARGUMENT,
+    number: int = argument(type=click.IntRange(min=1)),
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Activate a version of a machine."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
@@ -197,10 +172,14 @@ def promote(
 
 
 @command.command(epilog="Example: workbench registry rollback bench-a --reason 'it hunts'")
-@click.argument("machine")
-@decision_options
-@registry_options
-def rollback(machine: str, reason: str, by: str | None, where: str | None, as_json: bool) -> None:
+@by_signature
+def rollback(
+    machine: str = MACHINE_ARGUMENT,
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
+) -> None:
     """Activate the version before the present one; again goes one further back."""
     who, now = by or getpass.getuser(), datetime.now(UTC)
     with _open(where) as found:
@@ -209,17 +188,14 @@ def rollback(machine: str, reason: str, by: str | None, where: str | None, as_js
 
 
 @command.command(epilog="Example: workbench registry retry bench-a --reason 'card corrected'")
-@click.argument("machine")
-@click.argument("logs", nargs=-1, metavar="[LOG...]")
-@decision_options
-@registry_options
+@by_signature
 def retry(
-    machine: str,
-    logs: tuple[str, ...],
-    reason: str,
-    by: str | None,
-    where: str | None,
-    as_json: bool,
+    machine: str = MACHINE_ARGUMENT,
+    logs: tuple[str, ...] = argument("[LOG...]"),
+    reason: str = REASON_OPTION,
+    by: str | None = BY_OPTION,
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
 ) -> None:
     """Have logs tested again by the next pass; their earlier results stay on record.
 
@@ -252,16 +228,9 @@ def _version(found: "Registry", machine: str, number: int | None) -> "Version":
     return version
 
 
-def _documents(found: "Registry", version: "Version") -> dict[str, dict[str, Any] | None]:
-    return {
-        kind: found.document(version, kind) if getattr(version, kind) else None  # type: ignore[arg-type]
-        for kind in KINDS
-    }
-
-
 def _write(found: "Registry", version: "Version", out: Path) -> None:
     with results("registry", out) as folder:
-        for kind, document in _documents(found, version).items():
+        for kind, document in found.documents(version).items():
             if document is not None:
                 folder.write_text(f"{kind}.json", json.dumps(document, indent=2) + "\n")
 

@@ -1,13 +1,14 @@
 """`workbench reidentify`: one pass over the machines that have new logs."""
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from workbench.ending import StatusCommand, Step, step
-from workbench.jobs.options import JobOptions, job_options, worker
-from workbench.output import emit, next_step, verbose_option
+from workbench.jobs.options import JobOptions, worker
+from workbench.output import JSON_OPTION, emit, next_step
+from workbench.signature import by_fields, by_signature
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery
@@ -22,10 +23,9 @@ MOST_LINES = 6  # of one screen on machines left for later, and on alarms
     refusal="an alarm: drift, another structure, an excluded log",
     epilog="Example: workbench reidentify machines --registry fleet.db",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print the result as JSON.")
-@verbose_option
-@job_options
-def command(as_json: bool, **given: Any) -> int:
+@by_signature
+@by_fields(JobOptions)
+def command(given: JobOptions, as_json: bool = JSON_OPTION) -> int:
     """Test each new log of each machine once; where friction has drifted, re-tune.
 
     ROOT holds a folder a machine: ROOT/<machine>/card.toml and ROOT/<machine>/logs/*. A new log is
@@ -38,10 +38,10 @@ def command(as_json: bool, **given: Any) -> int:
     has not taken an alarm. Such an alarm is tried again by later passes, less and less often, and
     given up after a day.
     """
-    with worker(JobOptions(**given)) as found:
+    with worker(given) as found:
         done = found.once()
     judged, alarms = done.judged, done.alarms
-    then = after_pass(judged, given["where"])
+    then = after_pass(judged, given.where)
     emit({**vars(judged), "alarms": alarms}, as_json, lambda: pass_view(judged), then)
     errors = [f"{name}: {line}" for name, line in judged.failed.items()]
     if alarms is not None and (alarms.waiting or alarms.given_up):

@@ -9,13 +9,15 @@ import click
 from workbench.course import running
 from workbench.ending import StatusCommand
 from workbench.options import (
+    BUDGET_OPTION,
+    CARD_OPTION,
+    EFFECTS_OPTION,
+    LOGS_ARGUMENT,
     POSITIVE,
-    budget_option,
-    card_option,
-    complete_file,
-    effects_option,
+    SEED_OPTION,
 )
-from workbench.output import output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import by_signature, option
 from workbench.steps.stages import IDENTIFY_STAGES
 
 if TYPE_CHECKING:
@@ -28,33 +30,25 @@ if TYPE_CHECKING:
     refusal="the logs show the machine at no frequency",
     epilog="Example: workbench response run1.csv run2.csv --card bench-a --model model.json",
 )
-@click.argument("logs", nargs=-1, required=True, metavar="LOG...", shell_complete=complete_file)
-@card_option
-@click.option(
-    "--model", "model_file", type=click.Path(path_type=Path), metavar="MODEL",
-    help="model.json whose friction is subtracted.  [default: identified from the logs]",
-)  # fmt: skip
-@click.option("--friction-left-in", is_flag=True, help="Subtract nothing from the force.")
-@click.option(
-    "--lowest", type=POSITIVE, metavar="HZ",
-    help="Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",
-)  # fmt: skip
-@budget_option
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@effects_option
-@output_options
+@by_signature
 def command(
-    logs: tuple[str, ...],
-    card: str,
-    model_file: Path | None,
-    friction_left_in: bool,
-    lowest: float | None,
-    budget: float,
-    seed: int,
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
-) -> None:
+    logs: tuple[str, ...] = LOGS_ARGUMENT,
+    card: str = CARD_OPTION,
+    model_file: Path | None = option(
+        "model.json whose friction is subtracted.  [default: identified from the logs]",
+        "--model", metavar="MODEL",
+    ),
+    friction_left_in: bool = option("Subtract nothing from the force."),
+    lowest: float | None = option(
+        "Lowest frequency wanted: the lower, the fewer averages.  [default: by the logs' length]",
+        type=POSITIVE, metavar="HZ",
+    ),
+    budget: float = BUDGET_OPTION,
+    seed: int = SEED_OPTION,
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> None:  # fmt: skip
     """Show a machine over frequency: plant, controller and open loop, resonances, margins.
 
     Friction and whatever else of the model is not linear is taken off the force first, and the

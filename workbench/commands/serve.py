@@ -1,14 +1,66 @@
 """`workbench serve`: the page of a maintenance team, its servers and its workers."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import Finite, events_options, machines_option, registry_option
+from workbench.options import EVENTS_OPTION, MACHINES_OPTION, POSITIVE, REGISTRY_OPTION
+from workbench.signature import by_fields, option
 
 MEGA = 1e6
+
+
+def _prefix(ctx: click.Context, param: click.Parameter, value: str) -> str:
+    text = value.rstrip("/")
+    if text and (
+        not text.startswith("/")
+        or "//" in text
+        or not text.isascii()
+        or any(c in text for c in " ?#%\\\"'<>")
+    ):
+        raise click.UsageError(f"--prefix {value!r}: a path needed, as /servo.", ctx)
+    return text
+
+
+@dataclass(frozen=True)
+class ServeOptions:
+    """What the command line says of the page."""
+
+    where: str | None = REGISTRY_OPTION
+    machines: Path = MACHINES_OPTION
+    host: str = option("Address to bind to.", default="127.0.0.1")
+    port: int = option("", type=click.IntRange(0, 65535), default=8000)
+    names: tuple[str, ...] = option(
+        "Name under which the page is asked for, beside localhost; may be repeated.",
+        "--name", metavar="HOST",
+    )  # fmt: skip
+    prefix: str = option(
+        "Path below which a proxy serves the page.",
+        default="", show_default=False, metavar="/PATH", callback=_prefix,
+    )  # fmt: skip
+    reading: Literal["open", "token"] | None = option(
+        "Who may read.  [default: open on the loopback, else token]"
+    )
+    secure: bool = option("The proxy speaks https: send cookies by it alone.")
+    silent_days: float = option(
+        "A machine without a log for so long counts as not heard from.",
+        type=POSITIVE, default=7.0, metavar="D",
+    )  # fmt: skip
+    most_megabytes: float = option(
+        "Largest log that may be dropped.", type=POSITIVE, default=200.0, metavar="MB"
+    )
+    servers: int = option(
+        "Processes that answer.", type=click.IntRange(1, 64), default=2, metavar="N"
+    )
+    workers: int = option(
+        "Processes that identify and trace; more by 'workbench work'.",
+        type=click.IntRange(0, 64), default=1, metavar="N",
+    )  # fmt: skip
+    as_json: bool = EVENTS_OPTION
 
 
 @click.command(
@@ -16,78 +68,8 @@ MEGA = 1e6
     done="stopped",
     epilog="Example: workbench serve --registry fleet.db --machines machines",
 )
-@registry_option
-@machines_option
-@click.option("--host", default="127.0.0.1", show_default=True, help="Address to bind to.")
-@click.option("--port", type=click.IntRange(0, 65535), default=8000, show_default=True)
-@click.option(
-    "--name",
-    "names",
-    multiple=True,
-    metavar="HOST",
-    help="Name under which the page is asked for, beside localhost; may be repeated.",
-)
-@click.option(
-    "--prefix",
-    default="",
-    metavar="/PATH",
-    callback=lambda *a: _prefix(*a),
-    help="Path below which a proxy serves the page.",
-)
-@click.option(
-    "--reading",
-    type=click.Choice(["open", "token"]),
-    help="Who may read.  [default: open on the loopback, else token]",
-)
-@click.option("--secure", is_flag=True, help="The proxy speaks https: send cookies by it alone.")
-@click.option(
-    "--silent-days",
-    type=Finite(min=0, min_open=True),
-    default=7.0,
-    show_default=True,
-    metavar="D",
-    help="A machine without a log for so long counts as not heard from.",
-)
-@click.option(
-    "--most-megabytes",
-    type=Finite(min=0, min_open=True),
-    default=200.0,
-    show_default=True,
-    metavar="MB",
-    help="Largest log that may be dropped.",
-)
-@click.option(
-    "--servers",
-    type=click.IntRange(1, 64),
-    default=2,
-    show_default=True,
-    metavar="N",
-    help="Processes that answer.",
-)
-@click.option(
-    "--workers",
-    type=click.IntRange(0, 64),
-    default=1,
-    show_default=True,
-    metavar="N",
-    help="Processes that identify and trace; more by 'workbench work'.",
-)
-@events_options
-def command(
-    where: str | None,
-    machines: Path,
-    host: str,
-    port: int,
-    names: tuple[str, ...],
-    prefix: str,
-    reading: str | None,
-    secure: bool,
-    silent_days: float,
-    most_megabytes: float,
-    servers: int,
-    workers: int,
-    as_json: bool,
-) -> int:
+@by_fields(ServeOptions)
+def command(given: ServeOptions) -> int:
     """Serve the page: the fleet, each machine, and a place to drop a log.
 
     It binds to the loopback unless --host says otherwise. Reading is open or needs a token;
@@ -102,31 +84,19 @@ def command(
     from workbench.page.settings import LOOPBACK, PageSettings
     from workbench.registry.database import location
 
-    open_reading = host in LOOPBACK if reading is None else reading == "open"
+    local = given.host in LOOPBACK
     settings = PageSettings(
-        where=location(where),
-        machines=str(machines.absolute()),
-        host=host,
-        port=port,
-        prefix=prefix,
-        names=names,
-        open_reading=open_reading,
-        silent_days=silent_days,
-        most_bytes=round(most_megabytes * MEGA),
-        secure=secure,
-        servers=servers,
-        workers=workers,
+        where=location(given.where),
+        machines=str(given.machines.absolute()),
+        host=given.host,
+        port=given.port,
+        prefix=given.prefix,
+        names=given.names,
+        open_reading=local if given.reading is None else given.reading == "open",
+        silent_days=given.silent_days,
+        most_bytes=round(given.most_megabytes * MEGA),
+        secure=given.secure,
+        servers=given.servers,
+        workers=given.workers,
     )
     return serve(settings, reporter(sys.stderr, "serve"))
-
-
-def _prefix(ctx: click.Context, param: click.Parameter, value: str) -> str:
-    text = value.rstrip("/")
-    if text and (
-        not text.startswith("/")
-        or "//" in text
-        or not text.isascii()
-        or any(c in text for c in " ?#%\\\"'<>")
-    ):
-        raise click.UsageError(f"--prefix {value!r}: a path needed, as /servo.", ctx)
-    return text

@@ -6,31 +6,22 @@ from typing import Literal
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import effects_option
-from workbench.output import emit, output_options, progress, results
+from workbench.options import EFFECTS_OPTION
+from workbench.output import JSON_OPTION, OUT_OPTION, emit, progress, results
+from workbench.signature import argument, by_signature, option
 
 
 @click.command(
     cls=StatusCommand, epilog="Example: workbench simulate paper_table1 --seed 3 --format parquet"
 )
-@click.argument("card_name", metavar="CARD")
-@click.option("--seed", type=click.IntRange(min=0), help="Instead of the recipe's.")
-@click.option(
-    "--format",
-    "form",
-    type=click.Choice(["csv", "parquet"]),
-    default="csv",
-    show_default=True,
-)
-@effects_option
-@output_options
+@by_signature
 def command(
-    card_name: str,
-    seed: int | None,
-    form: Literal["csv", "parquet"],
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
+    card_name: str = argument("CARD"),
+    seed: int | None = option("Instead of the recipe's.", type=click.IntRange(min=0)),
+    form: Literal["csv", "parquet"] = option("", "--format", default="csv"),
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
 ) -> None:
     """Make the log of a recipe, its truth beside it.
 

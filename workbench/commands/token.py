@@ -2,13 +2,14 @@
 
 import getpass
 from datetime import UTC, datetime
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.commands.registry import registry_options
 from workbench.ending import StatusGroup
-from workbench.output import emit
+from workbench.options import REGISTRY_OPTION
+from workbench.output import JSON_OPTION, emit
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.registry.store import Registry
@@ -24,24 +25,28 @@ def command() -> None:
 
 
 @command.command("add", epilog="Example: workbench token add anna --role change")
-@click.argument("name")
-@click.option("--role", type=click.Choice(["read", "change"]), default="read", show_default=True)
-@click.option("--by", metavar="NAME", help="Who makes it.  [default: you]")
-@registry_options
-def add_token(name: str, role: str, by: str | None, where: str | None, as_json: bool) -> None:
+@by_signature
+def add_token(
+    name: str = argument(),
+    role: Literal["read", "change"] = option("", default="read"),
+    by: str | None = option("Who makes it.  [default: you]", metavar="NAME"),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
+) -> None:
     """Make a token and show it, this once."""
-    from workbench.registry.access import Access, Role
+    from workbench.registry.access import Access
 
-    wanted: Role = "change" if role == "change" else "read"
     with _open(where) as found:
-        secret = Access(found.database).add(name, wanted, by=by or getpass.getuser(), now=_now())
+        secret = Access(found.database).add(
+            name, role, by=by or getpass.getuser(), now=datetime.now(UTC)
+        )
     shown = f"{secret}\nThe token of {name} ({role}); it is shown only now and stored nowhere."
     emit({"name": name, "role": role, "token": secret}, as_json, lambda: shown)
 
 
 @command.command("list", epilog="Example: workbench token list --json")
-@registry_options
-def list_tokens(where: str | None, as_json: bool) -> None:
+@by_signature
+def list_tokens(where: str | None = REGISTRY_OPTION, as_json: bool = JSON_OPTION) -> None:
     """List the tokens by name, role and who made them; not the tokens themselves."""
     from workbench.registry.access import Access
     from workbench.registry.views import moment
@@ -60,15 +65,18 @@ def list_tokens(where: str | None, as_json: bool) -> None:
 
 
 @command.command("revoke", epilog="Example: workbench token revoke anna")
-@click.argument("name")
-@click.option("--by", metavar="NAME", help="Who revokes it.  [default: you]")
-@registry_options
-def revoke_token(name: str, by: str | None, where: str | None, as_json: bool) -> None:
+@by_signature
+def revoke_token(
+    name: str = argument(),
+    by: str | None = option("Who revokes it.  [default: you]", metavar="NAME"),
+    where: str | None = REGISTRY_OPTION,
+    as_json: bool = JSON_OPTION,
+) -> None:
     """Take a token no more; its name stays taken."""
     from workbench.registry.access import Access
 
     with _open(where) as found:
-        Access(found.database).revoke(name, by=by or getpass.getuser(), now=_now())
+        Access(found.database).revoke(name, by=by or getpass.getuser(), now=datetime.now(UTC))
     emit({"name": name, "revoked": True}, as_json, lambda: f"{name}: revoked")
 
 
@@ -77,7 +85,3 @@ def _open(where: str | None) -> "Registry":
     from workbench.registry.store import Registry
 
     return Registry(location(where))
-
-
-def _now() -> datetime:
-    return datetime.now(UTC)

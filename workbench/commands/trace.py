@@ -8,13 +8,15 @@ import click
 from workbench.course import Course, watched
 from workbench.ending import StatusCommand
 from workbench.options import (
-    budget_option,
-    card_option,
+    BUDGET_OPTION,
+    CARD_OPTION,
+    EFFECTS_OPTION,
+    SEED_OPTION,
     complete_file,
-    effects_option,
     refuse_for_velocity,
 )
-from workbench.output import output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import argument, by_signature, option
 from workbench.steps.stages import TRACE_STAGES
 
 
@@ -24,30 +26,20 @@ from workbench.steps.stages import TRACE_STAGES
     refusal="too little slides",
     epilog="Example: workbench trace day1.csv day2.csv --test day3.csv --card bench-a/card.toml",
 )
-@click.argument("logs", nargs=-1, metavar="[LOG...]", shell_complete=complete_file)
-@click.option(
-    "--test",
-    "tests",
-    multiple=True,
-    metavar="LOG",
-    shell_complete=complete_file,
-    help="Held-out log, used by neither fit nor model selection; may be given several times.",
-)
-@card_option
-@effects_option
-@budget_option
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@output_options
+@by_signature
 def command(
-    logs: tuple[str, ...],
-    tests: tuple[str, ...],
-    card: str,
-    effects: tuple[Path, ...],
-    budget: float,
-    seed: int,
-    as_json: bool,
-    out: Path | None,
-) -> None:
+    logs: tuple[str, ...] = argument("[LOG...]", shell_complete=complete_file),
+    tests: tuple[str, ...] = option(
+        "Held-out log, used by neither fit nor model selection; may be given several times.",
+        "--test", metavar="LOG", shell_complete=complete_file,
+    ),
+    card: str = CARD_OPTION,
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    budget: float = BUDGET_OPTION,
+    seed: int = SEED_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
+) -> None:  # fmt: skip
     """Find the physical effect that the model of a machine lacks, and what it is worth.
 
     Writes trace.json (verdict, errors before and after, effects, rivals), model.json with the

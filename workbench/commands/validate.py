@@ -7,13 +7,20 @@ import click
 
 from workbench.ending import StatusCommand
 from workbench.options import (
-    POSITIVE,
-    effects_option,
-    motion_limits,
-    present_card_option,
+    DELAY_OPTION,
+    EFFECTS_OPTION,
+    FORCE_OPTION,
+    MODEL_ARGUMENT,
+    MODULUS_OPTION,
+    OVERSHOOT_OPTION,
+    PRESENT_CARD_OPTION,
+    SEED_OPTION,
+    STANDSTILL_OPTION,
+    TRACKING_OPTION,
     refuse_for_velocity,
 )
-from workbench.output import output_options, progress, results
+from workbench.output import JSON_OPTION, OUT_OPTION, progress, results
+from workbench.signature import argument, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.steps.loop_figures import Limits
@@ -24,41 +31,24 @@ if TYPE_CHECKING:
     refusal="the recommended controller does not meet the limits on every plant",
     epilog="Example: workbench validate runs/.../model.json runs/.../design.json",
 )
-@click.argument("model_file", metavar="MODEL", type=click.Path(path_type=Path))
-@click.argument("design_file", metavar="DESIGN", type=click.Path(path_type=Path))
-@click.option(
-    "--plant",
-    "plant_file",
-    type=click.Path(path_type=Path),
-    metavar="MODEL",
-    help="Another machine on which the design has to work too.",
-)
-@click.option(
-    "--modulus", type=POSITIVE, default=0.5, show_default=True, help="Least modulus margin."
-)
-@click.option(
-    "--delay", type=POSITIVE, default=2.0, show_default=True, help="Least delay margin, in samples."
-)
-@motion_limits
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-@present_card_option
-@effects_option
-@output_options
+@by_signature
 def command(
-    model_file: Path,
-    design_file: Path,
-    plant_file: Path | None,
-    modulus: float,
-    delay: float,
-    standstill: float,
-    tracking: float,
-    overshoot: float,
-    force: float,
-    seed: int,
-    card: str | None,
-    effects: tuple[Path, ...],
-    as_json: bool,
-    out: Path | None,
+    model_file: Path = MODEL_ARGUMENT,
+    design_file: Path = argument("DESIGN"),
+    plant_file: Path | None = option(
+        "Another machine on which the design has to work too.", "--plant", metavar="MODEL"
+    ),
+    modulus: float = MODULUS_OPTION,
+    delay: float = DELAY_OPTION,
+    standstill: float = STANDSTILL_OPTION,
+    tracking: float = TRACKING_OPTION,
+    overshoot: float = OVERSHOOT_OPTION,
+    force: float = FORCE_OPTION,
+    seed: int = SEED_OPTION,
+    card: str | None = PRESENT_CARD_OPTION,
+    effects: tuple[Path, ...] = EFFECTS_OPTION,
+    as_json: bool = JSON_OPTION,
+    out: Path | None = OUT_OPTION,
 ) -> int:
     """Check a design on a plant in simulation: margins, steps, a smooth reference, limit cycles.
 

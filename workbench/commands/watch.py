@@ -5,13 +5,14 @@ import threading
 import traceback
 from contextlib import ExitStack
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
 from workbench.ending import StatusCommand
-from workbench.jobs.options import JobOptions, clock, job_options, worker
-from workbench.output import verbose_option
+from workbench.jobs.options import JobOptions, clock, worker
+from workbench.options import EVENTS_OPTION
+from workbench.signature import by_fields, by_signature, option
 
 if TYPE_CHECKING:
     from workbench.jobs.options import Worker
@@ -22,15 +23,19 @@ if TYPE_CHECKING:
     done="stopped",
     epilog="Example: workbench watch machines --cron '0 * * * *' --port 9400",
 )
-@click.option("--cron", default="*/5 * * * *", show_default=True, metavar="EXPR",
-              help="When to pass, beside every change of a log file.")  # fmt: skip
-@click.option("--port", type=click.IntRange(1, 65535), metavar="N",
-              help="Serve Prometheus metrics by HTTP.")  # fmt: skip
-@click.option("--address", default="127.0.0.1", show_default=True, help="Where to serve them.")
-@click.option("--json", "as_json", is_flag=True, help="Accepted as everywhere; events are JSON.")
-@verbose_option
-@job_options
-def command(cron: str, port: int | None, address: str, as_json: bool, **given: Any) -> None:
+@by_signature
+@by_fields(JobOptions)
+def command(
+    given: JobOptions,
+    cron: str = option(
+        "When to pass, beside every change of a log file.", default="*/5 * * * *", metavar="EXPR"
+    ),
+    port: int | None = option(
+        "Serve Prometheus metrics by HTTP.", type=click.IntRange(1, 65535), metavar="N"
+    ),
+    address: str = option("Where to serve them.", default="127.0.0.1"),
+    as_json: bool = EVENTS_OPTION,
+) -> None:
     """Do what 'workbench reidentify' does on a schedule, and soon after a log file appears.
 
     ROOT as there. Ends on SIGTERM or Ctrl-C after the log in hand. A registry that is away is
@@ -38,24 +43,24 @@ def command(cron: str, port: int | None, address: str, as_json: bool, **given: A
     """
     from workbench.jobs.watching import watch_machines
 
-    options, stop = JobOptions(**given), threading.Event()
+    stop = threading.Event()
     with ExitStack() as held:
-        found = held.enter_context(worker(options, stop.is_set))
+        found = held.enter_context(worker(given, stop.is_set))
         if port is not None:
             held.enter_context(_served(found, address, port))
         for number in (signal.SIGTERM, signal.SIGINT):
             before = signal.signal(number, lambda _number, _frame: stop.set())
             held.callback(signal.signal, number, before)
-        found.report("watching", root=str(options.root), cron=cron, port=port)
+        found.report("watching", root=str(given.root), cron=cron, port=port)
         watch_machines(
-            options.root,
+            given.root,
             lambda: _once(found),
             cron=cron,
-            settle=timedelta(seconds=options.settle),
+            settle=timedelta(seconds=given.settle),
             clock=clock,
             stop=stop,
             report=found.report,
-            marker=options.marker,
+            marker=given.marker,
         )
         found.report("stopped")
 

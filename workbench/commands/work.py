@@ -6,7 +6,8 @@ from pathlib import Path
 import click
 
 from workbench.ending import StatusCommand
-from workbench.options import events_options, machines_option, registry_option
+from workbench.options import EVENTS_OPTION, MACHINES_OPTION, REGISTRY_OPTION
+from workbench.signature import by_signature, option
 
 
 @click.command(
@@ -14,11 +15,13 @@ from workbench.options import events_options, machines_option, registry_option
     done="stopped, or, with --once, no task waits",
     epilog="Example: workbench work --registry postgresql://... --machines /srv/machines",
 )
-@registry_option
-@machines_option
-@click.option("--once", is_flag=True, help="End when no task waits.")
-@events_options
-def command(where: str | None, machines: Path, once: bool, as_json: bool) -> None:
+@by_signature
+def command(
+    where: str | None = REGISTRY_OPTION,
+    machines: Path = MACHINES_OPTION,
+    once: bool = option("End when no task waits."),
+    as_json: bool = EVENTS_OPTION,
+) -> None:
     """Identify and trace the logs that were dropped on the page, one after the other.
 
     Any number may run, on any machine that sees the registry and the folder. Ends on Ctrl-C or

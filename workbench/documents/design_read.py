@@ -40,11 +40,12 @@ from workbench.documents.drive import (
     present_of,
 )
 from workbench.documents.model import used
-from workbench.documents.reading import read_result
+from workbench.documents.reading import Stored, read_result
 
 
-def read_design(path: Path) -> Design:
-    """The design in the file `path`, in SI; raises BadModel in one line where it is none."""
+def read_design(path: Path | Stored) -> Design:
+    """The design in the file `path`, or stored, in SI; raises BadModel in one line where it is
+    none."""
     written = read_result(path, DesignFile, DESIGN_SCHEMA)
     units = units_of(written)
     try:

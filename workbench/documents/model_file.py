@@ -15,7 +15,7 @@ from workbench.cards.parameter_units import all_converted, friction_units, in_un
 from workbench.documents.contradictions import refuse_changed_units
 from workbench.documents.model import Model, ModelFile, fields_of
 from workbench.documents.plain import as_number, plain
-from workbench.documents.reading import read_result
+from workbench.documents.reading import Stored, read_result
 
 MODEL_SCHEMA = "model/1"
 
@@ -39,8 +39,8 @@ def model_document(model: Model) -> dict[str, Any]:
     return {"schema": document.pop("schema"), **document}
 
 
-def read_model(path: Path, library: Library | None = None) -> Model:
-    """The model in the file `path`; raises BadModel in one line where it is none.
+def read_model(path: Path | Stored, library: Library | None = None) -> Model:
+    """The model in the file `path`, or stored; raises BadModel in one line where it is none.
 
     library: the effects that it may name, by default all but a user's own files.
     """

@@ -4,7 +4,7 @@ import json
 import math
 import types
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin, get_type_hints
 
@@ -19,8 +19,19 @@ UNKNOWN_KEY = "unexpected_keyword_argument"  # as pydantic calls it
 MOST_DIGITS = 30  # of a whole number in a result
 
 
-def read_result(path: Path, kind: type[Value], schema: str) -> Value:
-    """The result of dataclass `kind` in the JSON file `path`.
+@dataclass(frozen=True)
+class Stored:
+    """A result that is no file but held in a registry, and what messages call it by."""
+
+    name: str
+    content: Mapping[str, Any]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+def read_result(path: Path | Stored, kind: type[Value], schema: str) -> Value:
+    """The result of dataclass `kind` in the JSON file `path`, or of one that is stored.
 
     Raises BadModel, one line: file, key, what was found and needed; an unknown key comes with the
     nearest right one.
@@ -59,21 +70,8 @@ def read_document(path: Path, schema: str | None = None) -> dict[str, Any]:
     return raw
 
 
-def _read_json(path: Path) -> object:
-    refuse_special(path, BadModel)
-    refuse_larger(path, RESULT_BYTES, "a result", BadModel)
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        wrong = broken_link(path) or "no such file; give the path of a result"
-        raise BadModel(f"{path}: {wrong}") from None
-    except IsADirectoryError:
-        raise BadModel(f"{path}: is a directory; give the JSON file in it") from None
-    except UnicodeDecodeError:
-        raise BadModel(f"{path}: is not UTF-8 text, so no JSON; give a result file") from None
-    except OSError as error:
-        wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
-        raise BadModel(f"{path}: {wrong}") from None
+def _read_json(path: Path | Stored) -> object:
+    text = json.dumps(path.content) if isinstance(path, Stored) else _text(path)
     try:
         return json.loads(
             text, parse_constant=_refuse_constant, parse_float=_finite, parse_int=_whole
@@ -88,6 +86,23 @@ def _read_json(path: Path) -> object:
         ) from None
     except ValueError as error:
         raise BadModel(f"{path}: {error}") from None
+
+
+def _text(path: Path) -> str:
+    refuse_special(path, BadModel)
+    refuse_larger(path, RESULT_BYTES, "a result", BadModel)
+    try:
+        return path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        wrong = broken_link(path) or "no such file; give the path of a result"
+        raise BadModel(f"{path}: {wrong}") from None
+    except IsADirectoryError:
+        raise BadModel(f"{path}: is a directory; give the JSON file in it") from None
+    except UnicodeDecodeError:
+        raise BadModel(f"{path}: is not UTF-8 text, so no JSON; give a result file") from None
+    except OSError as error:
+        wrong = broken_link(path) or f"cannot be read ({error.strerror}); check its rights"
+        raise BadModel(f"{path}: {wrong}") from None
 
 
 def _refuse_constant(name: str) -> float:

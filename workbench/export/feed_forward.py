@@ -20,7 +20,7 @@ from workbench.export.compensation import (
 )
 from workbench.export.filled import filled, rows
 from workbench.export.friction_formats import both_ways
-from workbench.export.st_syntax import st_syntax
+from workbench.export.structured_text import st_syntax
 
 FEED_FORWARD_POINTS = 20  # of the friction curve, each way
 

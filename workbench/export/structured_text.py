@@ -1,12 +1,57 @@
-"""A controller as a function block of IEC 61131-3, in Structured Text."""
+"""A controller as function blocks of IEC 61131-3, in Structured Text and in PLCopen XML."""
 
 from dataclasses import dataclass
+from datetime import datetime
+from importlib.metadata import version
 
 from design.program import Kind, State
-from workbench.export.exported import Exported
+from workbench.export.exported import Exported, Precision
 from workbench.export.filled import filled, lead_of, rows, title_of
-from workbench.export.st_syntax import StructuredText, st_syntax
-from workbench.export.syntax import INDENT
+from workbench.export.syntax import INDENT, Syntax, braced
+
+# Words of the standard, and operators of its Instruction List, that a name here may meet.
+RESERVED = ("s", "n", "d", "l", "p", "t", "in", "to", "by", "of", "on", "step", "limit", "mod")
+OWN = "_1"  # behind such a name
+
+
+@dataclass(frozen=True)
+class StructuredText(Syntax):
+    """Structured Text with the plain elements of every edition."""
+
+    def number(self, value: float) -> str:
+        digits, _, power = repr(self.rounded(value)).upper().partition("E")
+        mantissa = digits if "." in digits else digits + ".0"
+        return f"{mantissa}E{int(power)}" if power else mantissa
+
+    def assigned(self, target: str, value: str) -> str:
+        return f"{target} := {value};"
+
+    def chosen(self, condition: str, then: list[str], otherwise: list[str]) -> list[str]:
+        head = [f"IF {condition} THEN", *braced(then)]
+        return [*head, "END_IF;"] if not otherwise else [
+            *head, "ELSE", *braced(otherwise), "END_IF;"
+        ]  # fmt: skip
+
+    def repeated(self, index: str, count: int, body: list[str]) -> list[str]:
+        return [f"FOR {index} := 0 TO {count - 1} DO", *braced(body), "END_FOR;"]
+
+    def remark(self, text: str) -> str:
+        return f"(* {text.replace('*)', '* )')} *)"
+
+
+def st_syntax(precision: Precision) -> StructuredText:
+    """Structured Text in LREAL or REAL."""
+    return StructuredText(
+        precision=precision,
+        symbols={
+            "+": "+", "-": "-", "*": "*", "/": "/", "negative": "-", "not": "NOT ",
+            "and": "AND", "or": "OR", "==": "=", "!=": "<>", "<": "<", "<=": "<=", ">": ">",
+            ">=": ">=",
+        },
+        functions={"min": "MIN", "max": "MAX", "abs": "ABS"},
+        names={"r": "r_ref", **{word: word + OWN for word in RESERVED}},
+    )  # fmt: skip
+
 
 AT_POSITION_1 = (
     "_at_1"  # behind a state's name: its entries where the machine has stood at position 1
@@ -168,3 +213,22 @@ def _test(what: Exported, st: StructuredText) -> Block:
         (Declared("block", f"FB_{program.name}", ""), Declared("k", types["integer"], "")),
         body,
     )
+
+
+ELEMENTARY = ("BOOL", "DINT", "REAL", "LREAL")
+
+
+def plcopen_file(what: Exported, now: datetime) -> dict[str, str]:
+    """A project (TC6, version 2.01) with the controller's block and the one that tests it."""
+    text = filled(
+        "project.xml",
+        markup=True,
+        title=title_of(what),
+        lead=lead_of(what),
+        name=what.program.name,
+        version=version("servo-workbench"),
+        now=now.isoformat(timespec="seconds"),
+        elementary=ELEMENTARY,
+        blocks=blocks(what),
+    )
+    return {f"{what.program.name}.xml": text}

@@ -8,8 +8,7 @@ from workbench.export.c import c_files
 from workbench.export.data import json_file, mat_file
 from workbench.export.exported import Exported
 from workbench.export.fmu import fmu_file
-from workbench.export.plcopen import plcopen_file
-from workbench.export.structured_text import st_file
+from workbench.export.structured_text import plcopen_file, st_file
 
 
 def writers(now: datetime) -> Mapping[str, Callable[[Exported], Mapping[str, Any]]]:

@@ -1,10 +1,9 @@
 """A fleet's results in the registry: each log once, by its fingerprint, whoever else writes."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import PurePosixPath
-from typing import Any, Protocol
+from typing import Protocol
 
 from workbench.fleet.values import Item, LogFile, Result
 from workbench.jobs.lease import Clock, Patience
@@ -59,14 +58,10 @@ class InRegistry:
         version = retry(registry.in_force, log.machine)
         if version is None:
             return Item(url, log, card, seed)
-        documents: dict[str, Mapping[str, Any]] = {
-            kind: retry(registry.document, version, kind)
-            for kind in ("model", "design")
-            if getattr(version, kind) is not None
-        }
+        documents = retry(registry.documents, version)
         previous = retry(Queue(registry.database).last_evidence, version)
         return Item(
-            url, log, card, seed, version, documents["model"], documents.get("design"), previous
+            url, log, card, seed, version, documents["model"], documents["design"], previous
         )
 
     def record(self, result: Result) -> bool:

@@ -26,6 +26,7 @@ if TYPE_CHECKING:
 class PredictResult(Result):
     """What a model says of a log, and how far off it is."""
 
+    _command = "predict"
     found: Predicted
     rotary: bool = False
 
@@ -41,15 +42,12 @@ class PredictResult(Result):
 
         return prediction_view(self.found, self.rotary)
 
-    @property
-    def _command(self) -> str:
-        return "predict"
-
 
 @dataclass(frozen=True, repr=False)
 class ResponseResult(Result):
     """A machine over frequency: plant, controller and open loop with bands, resonances, margins."""
 
+    _command = "response"
     found: Responded
 
     @property
@@ -76,15 +74,12 @@ class ResponseResult(Result):
 
         return response_view(self.found)
 
-    @property
-    def _command(self) -> str:
-        return "response"
-
 
 @dataclass(frozen=True, repr=False)
 class DriftResult(Result):
     """Whether a machine has changed since its model, log by log."""
 
+    _command = "drift"
     found: Drifted
     model_name: str
 
@@ -98,15 +93,12 @@ class DriftResult(Result):
 
         return drift_view(self.found, self.model_name)
 
-    @property
-    def _command(self) -> str:
-        return "drift"
-
 
 @dataclass(frozen=True, repr=False)
 class AxisTestResult(Result):
     """An axis by one log: its light, its numbers and their limits."""
 
+    _command = "axis-test"
     found: AxisTest
 
     @property
@@ -123,10 +115,6 @@ class AxisTestResult(Result):
         from workbench.report.axis_test import axis_view
 
         return axis_view(self.found)
-
-    @property
-    def _command(self) -> str:
-        return "axis-test"
 
 
 @dataclass(frozen=True, repr=False)

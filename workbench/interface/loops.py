@@ -33,6 +33,7 @@ class ControlLoop(NamedTuple):
 class DesignResult(Result):
     """What `design` made for a model: an RST and a PID with their margins, and the compensator."""
 
+    _command = "design"
     design: Design
     model: Model
 
@@ -62,15 +63,12 @@ class DesignResult(Result):
 
         return design_view(self.design, self.model.rotary)
 
-    @property
-    def _command(self) -> str:
-        return "design"
-
 
 @dataclass(frozen=True, repr=False)
 class RobustResult(Result):
     """A design chosen over the machines drawn from a model, and what it promises of them."""
 
+    _command = "design"
     found: Robust
     model: Model
 
@@ -96,15 +94,12 @@ class RobustResult(Result):
 
         return robust_view(self.found, self.model.rotary)
 
-    @property
-    def _command(self) -> str:
-        return "design"
-
 
 @dataclass(frozen=True, repr=False)
 class ValidateResult(Result):
     """What `validate` saw of a design in the simulated loop."""
 
+    _command = "validate"
     found: Validation
     traces: Mapping[tuple[str, str], Traces]
     rotary: bool = False
@@ -119,15 +114,12 @@ class ValidateResult(Result):
 
         return validation_view(self.found, self.traces, self.rotary)
 
-    @property
-    def _command(self) -> str:
-        return "validate"
-
 
 @dataclass(frozen=True, repr=False)
 class ExperimentResult(Result):
     """The run to make next, and what it promises."""
 
+    _command = "experiment"
     found: Experiment
 
     @property
@@ -142,7 +134,3 @@ class ExperimentResult(Result):
         from workbench.report.experiment import experiment_view
 
         return experiment_view(self.found)
-
-    @property
-    def _command(self) -> str:
-        return "experiment"

@@ -70,6 +70,7 @@ class _OfModel(Result):
 class IdentifyResult(_OfModel):
     """What `identify` found: the model, and the fit that it comes from."""
 
+    _command = "identify"
     found: Identified
 
     @property
@@ -101,15 +102,12 @@ class IdentifyResult(_OfModel):
 
         return identified_view(self.found)
 
-    @property
-    def _command(self) -> str:
-        return "identify"
-
 
 @dataclass(frozen=True, repr=False)
 class TraceResult(_OfModel):
     """What `trace` found: verdict, effects, errors before and after, and the model with them."""
 
+    _command = "trace"
     found: Traced
 
     @property
@@ -145,10 +143,6 @@ class TraceResult(_OfModel):
         from workbench.report.trace import traced_view
 
         return traced_view(self.found)
-
-    @property
-    def _command(self) -> str:
-        return "trace"
 
 
 def _arviz() -> Any:

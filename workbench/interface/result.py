@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from workbench.interface.inputs import PathLike
 from workbench.output import OutputFolder, dumps
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 class Result(ABC):
     """What every result can: show itself as text and HTML, draw, and write the command's files."""
 
+    _command: ClassVar[str]
+
     @abstractmethod
     def _made(self) -> "View":
         """How the result is shown."""
@@ -31,10 +33,6 @@ class Result(ABC):
     @cached_property
     def _view(self) -> "View":
         return self._made()
-
-    @property
-    @abstractmethod
-    def _command(self) -> str: ...
 
     @property
     def document(self) -> Mapping[str, Any]:

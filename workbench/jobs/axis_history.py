@@ -1,16 +1,13 @@
 """What the registry has of a machine for its axis test: its last logs, and its active model."""
 
-import json
-from collections.abc import Mapping, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 
 from identification.model.estimates import Estimate
 from workbench.documents.model import Model
 from workbench.documents.model_file import read_model
+from workbench.documents.reading import Stored
 from workbench.jobs.drift_by_chart import drift_by_chart
 from workbench.jobs.drift_verdict import Reading
 from workbench.logs.sources import Sources
@@ -43,7 +40,7 @@ def earlier_of(registry: Registry, machine: str, sources: Sources, seed: int = 0
         )
     if state.in_force is None:
         return Earlier(machine, values, None, None, said)
-    model = _read(registry.document(state.in_force, "model"))
+    model = read_model(Stored("model.json", registry.document(state.in_force, "model")))
     estimates, remarks = None, list[str]()
     further = [key.replace("_", " ") for key in model.effects if not _held(key)]
     if further:
@@ -87,11 +84,3 @@ def _held(key: str) -> bool:
     """Whether the equation of motion holds an effect, the first or a further one of its kind."""
     name, _, number = key.rpartition("_")
     return key in HELD_BY_EQUATION or (name in HELD_BY_EQUATION and number.isdigit())
-
-
-def _read(document: Mapping[str, Any]) -> Model:
-    """The model of a document, read as from its file."""
-    with TemporaryDirectory(prefix="workbench-") as name:
-        path = Path(name) / "model.json"
-        path.write_text(json.dumps(document), encoding="utf-8")
-        return read_model(path)

@@ -12,23 +12,13 @@ from typing import Any
 
 import numpy as np
 
-from identification.arrays import Array
 from identification.errors import BadModel
 from identification.log import Log
 from identification.model.estimates import Drive
 from workbench.documents.design import Design
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import loop_period, run_loop
-from workbench.steps.loop_figures import (
-    DWELLS,
-    SHORTEST_DWELL,
-    SMOOTH_SHARE,
-    SMOOTH_SPEED,
-    STEP_SHARE,
-    slowest,
-    tested_of,
-    travel,
-)
+from workbench.steps.loop_figures import common_reference, tested_of
 from workbench.steps.predict import default_drive, predict
 from workbench.steps.validate import validate
 
@@ -246,17 +236,3 @@ def tracking(
     with np.errstate(over="ignore", invalid="ignore"):
         rms = float(np.sqrt(np.mean((run.r - run.y) ** 2)))
     return Tracking(rms if np.isfinite(rms) else None, checked.figures[name]["model"].missed)
-
-
-def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Array:
-    """Steps and then a smooth motion [m] at the period h [s], the same motion for every design."""
-    low, high = machine.travel
-    step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
-    dwell = max(
-        max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
-    )
-    w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
-    levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
-    t = h * np.arange(round(2.5 * 2 * np.pi / w / h), dtype=np.float64)
-    rise = np.clip(t * w / np.pi, 0.0, 1.0)
-    return np.concatenate([levels, amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)])

@@ -10,14 +10,14 @@ import numpy as np
 from pydantic import TypeAdapter, ValidationError
 from scipy.stats import norm
 
-from identification.drift.drift_result import DriftTest, Shift
+from identification.drift.drift_result import Shift
 from identification.drift.mewma import DriftState
 from identification.errors import BadModel
 from workbench.documents.model import Model
 from workbench.jobs.drift_verdict import Drift, Moved, Reading
 from workbench.logs.sources import Sources
 from workbench.output import dumps, strict
-from workbench.report.drift_tables import detectable_sentence
+from workbench.report.drift_tables import reason_sentence
 from workbench.steps.drift import Drifted, Stream, detectable_sizes, drift_of, model_key
 
 
@@ -35,7 +35,7 @@ def drift_by_chart(
     statistics = [one for one in (worst.single, worst.mean) if one is not None]
     return Drift(
         verdict=found.verdict,
-        reason="; ".join(filter(None, (worst.reason or _said(worst), _seen(worst, found)))),
+        reason=reason_sentence(worst, found.settings.to_be_seen),
         moved=tuple(_moved(one) for one in worst.moved),
         p_value=min((one.p_value for one in statistics), default=None),
         state=_plain(found),
@@ -43,21 +43,6 @@ def drift_by_chart(
         could_have_seen=detectable_sizes(worst),
         parameters=tuple(_reading(one) for one in worst.shifts.values()),
     )
-
-
-def _said(test: DriftTest) -> str:
-    if not test.found_by:
-        return "no parameter has moved"
-    by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
-    moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
-    if test.unsure:
-        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
-    return f"moved{by}: {', '.join(moved)}"
-
-
-def _seen(test: DriftTest, found: Drifted) -> str:
-    """Without an alarm, what could have been seen."""
-    return "" if test.found_by else detectable_sentence(test, found.settings.to_be_seen)
 
 
 def _state(state: Mapping[str, Any]) -> DriftState:

@@ -1,10 +1,7 @@
 """What a worker makes of a log: drift test, then the chain anew, or the trace, and the contest."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -13,11 +10,11 @@ from identification.effects._library import Library
 from identification.errors import BadLog, BadModel, BadSpecification, NotIdentifiable, UserError
 from identification.log import Log
 from workbench.cards.own_effects import library as installed
-from workbench.documents.design import Design
 from workbench.documents.design_file import design_document
 from workbench.documents.design_read import read_design
 from workbench.documents.model import Model
 from workbench.documents.model_file import model_document, read_model
+from workbench.documents.reading import Stored
 from workbench.jobs.challenge import Contender, Terms, challenge, contest_document
 from workbench.jobs.drift_by_chart import drift_by_chart
 from workbench.jobs.drift_verdict import Drift, DriftJudge
@@ -212,22 +209,12 @@ def _summary(traced: Traced) -> dict[str, Any]:
 
 def _contender(task: Task, library: Library | None) -> Contender:
     """The active model and design, read as from their files."""
-    with TemporaryDirectory(prefix="workbench-") as name:
-        folder = Path(name)
-        try:
-            found: Model = read_model(_written(folder / "model.json", task.model), library)
-            made: Design | None = None
-            if task.design is not None:
-                made = read_design(_written(folder / "design.json", task.design))
-        except BadModel as error:
-            said = str(error).replace(f"{folder}/", "")
-            raise BadModel(f"{task.machine}: active version: {said}") from None
+    try:
+        found = read_model(Stored("model.json", task.model or {}), library)
+        made = None if task.design is None else read_design(Stored("design.json", task.design))
+    except BadModel as error:
+        raise BadModel(f"{task.machine}: active version: {error}") from None
     return Contender(found, made)
-
-
-def _written(path: Path, document: Mapping[str, Any] | None) -> Path:
-    path.write_text(json.dumps(document), encoding="utf-8")
-    return path
 
 
 def _without_state(found: Drift) -> dict[str, Any]:

@@ -9,74 +9,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from workbench.options import SECONDS, SECONDS_ABOVE_0, Finite, effects_option, registry_option
+from workbench.options import (
+    EFFECTS_OPTION,
+    REGISTRY_OPTION,
+    SECONDS,
+    SECONDS_ABOVE_0,
+    SEED_OPTION,
+    Finite,
+)
+from workbench.signature import argument, option
 
 if TYPE_CHECKING:
     from workbench.jobs.alarms import Delivery, Webhook
     from workbench.jobs.lease import Clock
     from workbench.jobs.metrics import MachineFigures
     from workbench.jobs.passes import PassReport, Report
-    from workbench.registry.order import Order
     from workbench.registry.store import Registry
-
-Command = TypeVar("Command", bound=Callable[..., Any])
-
-
-@dataclass(frozen=True)
-class JobOptions:
-    """What the command line says; times in s, margin relative."""
-
-    root: Path
-    where: str | None
-    first: bool
-    settle: float
-    lease: float
-    patience: float
-    margin: float
-    seed: int
-    webhook: str | None
-    metrics: Path | None
-    effects: tuple[Path, ...]
-    order: "Order"
-    marker: str | None
-
-
-def job_options(command: Command) -> Command:
-    """ROOT and the options of `JobOptions`, by the names of its fields."""
-    options = (
-        click.argument("root", type=click.Path(path_type=Path)),
-        registry_option,
-        click.option("--first", is_flag=True,
-                     help="Give a machine without a model its first from its first log."),
-        click.option("--settle", type=SECONDS, default=10.0, show_default=True,
-                     metavar="S", help="Take a file that has not changed for this long."),
-        click.option("--marker", metavar="SUFFIX", callback=_suffix,
-                     help="Take a file once one named <file>SUFFIX lies beside it, as .done; "
-                     "for writers that pause for longer than --settle."),
-        click.option("--order", type=click.Choice(["time-or-name", "time"]),
-                     default="time-or-name", show_default=True,
-                     help="What makes a log older than another, so that its model does not become "
-                     "active: the file's time, or also the numbers in its name."),
-        click.option("--lease", type=SECONDS_ABOVE_0, default=120.0, show_default=True, metavar="S",
-                     help="Take a silent worker's machine over after this long."),
-        click.option("--patience", type=SECONDS, default=60.0, show_default=True,
-                     metavar="S", help="Wait this long for a database that is away."),
-        click.option("--margin", type=Finite(0, 1, max_open=True), default=0.1,
-                     show_default=True, help="Relative fall of a held-out error that wins."),
-        click.option("--webhook", metavar="URL", help="Send alarms there, as JSON by POST."),
-        click.option("--metrics", type=click.Path(path_type=Path), metavar="FILE",
-                     help="Write Prometheus metrics there after each pass."),
-        click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True),
-        effects_option,
-        click.option("--debug", is_flag=True, expose_value=False, hidden=True),
-    )  # fmt: skip
-    for option in reversed(options):
-        command = option(command)
-    return command
 
 
 def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> str | None:
@@ -85,6 +37,43 @@ def _suffix(ctx: click.Context, param: click.Parameter, value: str | None) -> st
             f"--marker {value!r}: the end of a file's name needed, as .done.", ctx
         )
     return value
+
+
+@dataclass(frozen=True)
+class JobOptions:
+    """What the command line says, each field as its option; times in s, margin relative."""
+
+    root: Path = argument()
+    where: str | None = REGISTRY_OPTION
+    first: bool = option("Give a machine without a model its first from its first log.")
+    settle: float = option(
+        "Take a file that has not changed for this long.", type=SECONDS, default=10.0, metavar="S"
+    )
+    marker: str | None = option(
+        "Take a file once one named <file>SUFFIX lies beside it, as .done; for writers that pause"
+        " for longer than --settle.",
+        metavar="SUFFIX", callback=_suffix,
+    )  # fmt: skip
+    order: Literal["time-or-name", "time"] = option(
+        "What makes a log older than another, so that its model does not become active: the"
+        " file's time, or also the numbers in its name.",
+        default="time-or-name",
+    )
+    lease: float = option(
+        "Take a silent worker's machine over after this long.",
+        type=SECONDS_ABOVE_0, default=120.0, metavar="S",
+    )  # fmt: skip
+    patience: float = option(
+        "Wait this long for a database that is away.", type=SECONDS, default=60.0, metavar="S"
+    )
+    margin: float = option(
+        "Relative fall of a held-out error that wins.",
+        type=Finite(0, 1, max_open=True), default=0.1,
+    )  # fmt: skip
+    webhook: str | None = option("Send alarms there, as JSON by POST.", metavar="URL")
+    metrics: Path | None = option("Write Prometheus metrics there after each pass.", metavar="FILE")
+    seed: int = SEED_OPTION
+    effects: tuple[Path, ...] = EFFECTS_OPTION
 
 
 @dataclass(frozen=True)

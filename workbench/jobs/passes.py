@@ -260,11 +260,7 @@ class Pass:
     def _task(self, folder: MachineFolder, path: Path, log: SeenLog) -> Task:
         retry, registry, queue = self._settings.patience, self._registry, self._queue
         version = retry(registry.in_force, folder.name)
-        documents = {
-            kind: retry(registry.document, version, kind)
-            for kind in ("model", "design")
-            if version is not None and getattr(version, kind) is not None
-        }
+        documents = {} if version is None else retry(registry.documents, version)
         # What was found of the machine as it is now says nothing of a log from before.
         newer = retry(queue.newer_behind, folder.name, log, self._settings.order)
         after = None if version is None or newer else retry(queue.last_evidence, version)

@@ -5,7 +5,6 @@ nobody has it open for writing, as far as the system tells, and it has not chang
 where the writer leaves a marker beside each finished file ("run1.csv.done"), when that is there.
 """
 
-import hashlib
 import os
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
@@ -13,7 +12,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from identification.errors import UserError
-from workbench.files import CARD_FILE, LOGS
+from workbench.files import CARD_FILE, LOGS, sha256_of
 from workbench.logs.runs import shown_name
 from workbench.registry.values import SeenLog
 
@@ -168,8 +167,7 @@ def _seen(path: Path, before: os.stat_result, known: Known) -> SeenLog | None:
     digest = known.get((name, size, mtime))
     if digest is None:
         try:
-            with path.open("rb") as file:
-                digest = hashlib.file_digest(file, "sha256").hexdigest()
+            digest = sha256_of(path)
         except FileNotFoundError:
             return None
     found = SeenLog(digest, name, size, mtime)

@@ -1,6 +1,5 @@
 """Where cards and data are: shipped cards by name, log files on disk, else from their source."""
 
-import hashlib
 import os
 from pathlib import Path
 
@@ -8,7 +7,7 @@ from identification.errors import BadCard, BadLog
 from workbench.cards.card import Card
 from workbench.cards.card_tables import FileEntry
 from workbench.cards.nearest import nearest
-from workbench.files import CARD_FILE, refuse_special, shipped_cards
+from workbench.files import CARD_FILE, refuse_special, sha256_of, shipped_cards
 from workbench.links import broken_link
 
 DATA_VARIABLE = "WORKBENCH_DATA"
@@ -77,8 +76,7 @@ def _nearest(path: Path, card: Card) -> str:
 def _verified(path: Path, entry: FileEntry | None) -> Path:
     if entry is None or entry.sha256 is None:
         return path
-    with path.open("rb") as file:
-        found = hashlib.file_digest(file, "sha256").hexdigest()
+    found = sha256_of(path)
     if found != entry.sha256:
         raise BadLog(
             f"{path}: sha256 {found[:12]}... is not the card's {entry.sha256[:12]}...; "

@@ -1,10 +1,9 @@
 """Log files read by their card: canonical signals in SI, the applied force F_e among them."""
 
-import hashlib
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -27,19 +26,6 @@ from workbench.logs.times import seconds
 
 _CANONICAL = frozenset({"t", "r", "y", "p_p", "p_n", "F", "u"})
 _CLOCK = re.compile(r"\d+:\d\d|\d{4}[-/]\d\d?[-/]\d\d?")
-
-
-@dataclass(frozen=True)
-class Fingerprint:
-    """What identifies a log file: name, sha256 of its bytes, rows read from it."""
-
-    file: str
-    sha256: str
-    rows: int
-
-    def as_json(self) -> dict[str, str | int]:
-        """The fingerprint as results carry it."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -91,13 +77,6 @@ def runs_of(table: Table, path: Path, card: Card) -> Prepared:
 
 def _repaired(raw: _Raw, path: Path, card: Card) -> Repaired:
     return repair(raw.log, raw.first_row, rotary=card.rig(path.name).motion == "rotary")
-
-
-def fingerprint(path: Path, log: Log) -> Fingerprint:
-    """Name, sha256 and rows of the file from which `log` was read."""
-    with path.open("rb") as file:
-        digest = hashlib.file_digest(file, "sha256")
-    return Fingerprint(shown_name(path), digest.hexdigest(), len(log))
 
 
 def shown_name(path: Path) -> str:

@@ -11,8 +11,9 @@ from identification.log import Log, Rig
 from identification.signals.bad_samples import BadSamples
 from workbench.cards.card import Card, load_card
 from workbench.documents.plausible import log_remarks
+from workbench.files import sha256_of
 from workbench.logs.fetch import card_path, find_data
-from workbench.logs.runs import fingerprint, read_runs, runs_of
+from workbench.logs.runs import read_runs, runs_of, shown_name
 from workbench.logs.table import Table
 
 
@@ -107,8 +108,7 @@ def sources_of(logs: Sequence[str | Recorded], card: Card, *, velocity: bool = F
 def _source(log: str | Recorded, path: Path, run: Log, period: float | None) -> Source:
     if isinstance(log, Recorded):
         return Source(run, log.name, log.sha256, len(run), period)
-    found = fingerprint(path, run)
-    return Source(run, found.file, found.sha256, found.rows, period)
+    return Source(run, shown_name(path), sha256_of(path), len(run), period)
 
 
 def _discriminated(source: Source, path: Path) -> Source:

@@ -13,16 +13,14 @@ from starlette.routing import Route
 
 from workbench.files import REPORT_FILE
 from workbench.page import version_views
-from workbench.page.dropped import card_of, log_of
-from workbench.page.kept import keep_files, refuse_machine
-from workbench.page.pages import go, part
+from workbench.page.dropped import card_of, keep_files, log_of, refuse_machine
+from workbench.page.pages import go, part, registry_of
 from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import Visitor, changing, form_of, reading
 from workbench.page.work import result_file
 from workbench.registry.access import audit
 from workbench.registry.bench import Bench
 from workbench.registry.errors import BadRegistry
-from workbench.registry.store import Registry
 from workbench.registry.values import Candidate
 
 LONGEST_REASON = 500
@@ -30,7 +28,7 @@ LONGEST_REASON = 500
 
 def keep(request: Request, visitor: Visitor) -> Response:
     """Keep what came of a dropped log as a machine with an active version."""
-    settings, registry = request.app.state.settings, _registry(request)
+    settings, registry = request.app.state.settings, registry_of(request)
     task = Bench(registry.database).task(request.path_params["task"])
     machine, reason = _text(request, "machine"), _text(request, "reason")
     log, card = log_of(settings.root, task.upload), card_of(settings.root, task.upload)
@@ -58,7 +56,7 @@ def promote(request: Request, visitor: Visitor) -> Response:
     machine, number = request.path_params["machine"], _text(request, "number")
     if not number.isascii() or not number.isdigit():
         raise HTTPException(400, "Which version? Choose one.")
-    reason, now, registry = _text(request, "reason"), datetime.now(UTC), _registry(request)
+    reason, now, registry = _text(request, "reason"), datetime.now(UTC), registry_of(request)
     registry.promote(machine, int(number), reason=reason, by=visitor.name, now=now)
     detail = f"version {number}: {reason}"
     audit(registry.database, "promoted", machine, detail, by=visitor.name, now=now)
@@ -68,7 +66,7 @@ def promote(request: Request, visitor: Visitor) -> Response:
 def rollback(request: Request, visitor: Visitor) -> Response:
     """Activate the version before."""
     machine, reason = request.path_params["machine"], _text(request, "reason")
-    now, registry = datetime.now(UTC), _registry(request)
+    now, registry = datetime.now(UTC), registry_of(request)
     decision = registry.rollback(machine, reason=reason, by=visitor.name, now=now)
     detail = f"version {decision.number}: {reason}"
     audit(registry.database, "rolled_back", machine, detail, by=visitor.name, now=now)
@@ -81,7 +79,7 @@ def export(request: Request, _visitor: Visitor) -> Response:
     if target not in EXPORTS:
         raise HTTPException(404, f"The target is one of {', '.join(EXPORTS)}.")
     machine, number = request.path_params["machine"], request.path_params["number"]
-    registry = _registry(request)
+    registry = registry_of(request)
     design = registry.document(registry.version(machine, number), "design")
     files = request.app.state.helpers(version_views.export_files, json.dumps(design), target)
     packed = io.BytesIO()
@@ -95,11 +93,6 @@ def export(request: Request, _visitor: Visitor) -> Response:
 
 def _read(request: Request, kind: str) -> Any:
     return json.loads(result_file(request, f"{kind}.json").read_text("utf-8"))
-
-
-def _registry(request: Request) -> Registry:
-    found: Registry = request.app.state.registry
-    return found
 
 
 def _text(request: Request, name: str) -> str:

@@ -1,7 +1,7 @@
 """What stands before every request: its host, its path below a prefix, its size; and what goes
 with every answer, so that no browser runs what is not ours."""
 
-from collections.abc import Awaitable, Callable, MutableMapping
+from collections.abc import MutableMapping
 from typing import Any
 
 from starlette.datastructures import Headers, MutableHeaders
@@ -25,7 +25,6 @@ SAFE_HEADERS = {
 }
 FORM_BYTES = 100_000  # of a form without a file
 UPLOAD_PATH = "/drop"
-Answer = Callable[[Scope, Receive, Send], Awaitable[None]]
 
 
 class Guard:

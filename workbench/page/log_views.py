@@ -3,6 +3,8 @@
 Each takes paths and texts and gives plain values; errors of the user are `UserError`.
 """
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -51,14 +53,12 @@ def warm() -> None:
 
 
 def refuse_no_log(path: Path) -> None:
-    """Raises BadLook where the file's first bytes are of something else than its name says."""
+    """Raises BadView where the file's first bytes are of something else than its name says."""
     from workbench.cards.card_tables import FileSpec
     from workbench.logs.formats import checked_format
 
-    try:
+    with _without(path):
         checked_format(path, FileSpec())
-    except UserError as error:
-        raise BadView(without_path(str(error), [path])) from None
 
 
 def columns_chart(path: Path, file: str) -> tuple[str, int]:
@@ -82,14 +82,12 @@ def columns_chart(path: Path, file: str) -> tuple[str, int]:
 
 def proposal(path: Path) -> "Proposal":
     """The card that `init` proposes, and what is hardly identifiable from the log; raises
-    BadLook."""
+    BadView."""
     from workbench.steps.first_card.checked_proposal import checked_proposal
     from workbench.steps.first_card.proposal import proposed
 
-    try:
+    with _without(path):
         return checked_proposal(proposed(path))
-    except UserError as error:
-        raise BadView(without_path(str(error), [path])) from None
 
 
 def headers(path: Path) -> list[tuple[str, str | int, str]]:
@@ -106,29 +104,25 @@ def card_refused(card: Path, path: Path) -> str:
 
 
 def doctor_chart(path: Path, card: Path) -> str:
-    """The doctor's picture, as HTML; raises BadLook."""
+    """The doctor's picture, as HTML; raises BadView."""
     from workbench.cards.card import load_card
     from workbench.report.chart import chart_html
     from workbench.report.doctor_chart import doctor_charts
     from workbench.steps.doctor import checked_log
 
-    try:
+    with _without(path, card):
         found = checked_log(path, load_card(card, with_recipe=False))
-    except UserError as error:
-        raise BadView(without_path(str(error), [path, card])) from None
     return "".join(str(chart_html(chart)) for chart in doctor_charts(found))
 
 
 def doctor_words(path: Path, card: Path) -> DoctorFound:
-    """The doctor's words; raises BadLook."""
+    """The doctor's words; raises BadView."""
     from workbench.cards.card import load_card
     from workbench.report.doctor import doctor_view
     from workbench.steps.doctor import examine
 
-    try:
+    with _without(path, card):
         found = examine(path, load_card(card, with_recipe=False))
-    except UserError as error:
-        raise BadView(without_path(str(error), [path, card])) from None
     lines = without_path(doctor_view(found, None).text(), [path, card]).splitlines()
     told = tuple((one.name, one.can, _said_of(one)) for one in found.told)
     return DoctorFound(found.verdict, tuple(lines), told)
@@ -142,10 +136,17 @@ def _said_of(one: "Identifiable") -> str:
 
 
 def _unknown(path: Path) -> "UnknownLog":
-    try:
+    with _without(path):
         return _read(path, path.stat().st_mtime_ns)
+
+
+@contextmanager
+def _without(*paths: Path) -> Iterator[None]:
+    """Within the block an error of the user becomes BadView, without the folders of these files."""
+    try:
+        yield
     except UserError as error:
-        raise BadView(without_path(str(error), [path])) from None
+        raise BadView(without_path(str(error), paths)) from None
 
 
 @lru_cache(maxsize=LOGS_REMEMBERED)

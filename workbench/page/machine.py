@@ -3,7 +3,7 @@
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import get_args
 
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
@@ -14,25 +14,23 @@ from identification.errors import UserError
 from workbench.page import version_views
 from workbench.page.answer_cache import briefly
 from workbench.page.machine_charts import parameter_charts
-from workbench.page.pages import show
+from workbench.page.pages import registry_of, show
 from workbench.page.version_views import EXPORTS
 from workbench.page.visitors import Visitor, reading
 from workbench.page.work import report_response
 from workbench.registry.axis_past import newest_lights
 from workbench.registry.difference import difference
 from workbench.registry.results import TestedLog, condition, last_logs, log_count
-from workbench.registry.store import Registry
-from workbench.registry.values import ALARMING, Kind, Version
+from workbench.registry.values import ALARMING, Kind
 from workbench.report.chart import chart_html
 
 LAST_LOGS, MORE_LOGS = 60, 1000
-DOCUMENT_KINDS: tuple[Kind, ...] = ("model", "design", "validation")
 LAST_CHANGES = 200
 
 
 def machine(request: Request, visitor: Visitor) -> Response:
     """The page of a machine."""
-    registry, name = _registry(request), request.path_params["machine"]
+    registry, name = registry_of(request), request.path_params["machine"]
     state = registry.machine(name)
     versions = registry.versions(name)
     last = MORE_LOGS if request.query_params.get("logs") == "all" else LAST_LOGS
@@ -52,12 +50,12 @@ def machine(request: Request, visitor: Visitor) -> Response:
 
 def compare(request: Request, visitor: Visitor) -> Response:
     """Two versions side by side: every number, the margins, the step responses."""
-    registry, name = _registry(request), request.path_params["machine"]
+    registry, name = registry_of(request), request.path_params["machine"]
     numbers = [request.query_params.get(key, "") for key in ("a", "b")]
     if not all(text.isascii() and text.isdigit() for text in numbers):
         raise HTTPException(400, "Choose two versions.")
     versions = [registry.version(name, int(text)) for text in numbers]
-    before, after = (_documents(registry, one) for one in versions)
+    before, after = (registry.documents(one) for one in versions)
     designs = [
         (one.number, json.dumps(found["design"]))
         for one, found in zip(versions, (before, after), strict=True)
@@ -73,7 +71,7 @@ def compare(request: Request, visitor: Visitor) -> Response:
 
 def report(request: Request, _visitor: Visitor) -> Response:
     """The report of a version's design."""
-    registry = _registry(request)
+    registry = registry_of(request)
     version = registry.version(request.path_params["machine"], request.path_params["number"])
     design = json.dumps(registry.document(version, "design"))
     return report_response(request.app.state.helpers(version_views.design_page, design))
@@ -81,7 +79,7 @@ def report(request: Request, _visitor: Visitor) -> Response:
 
 def kept_report(request: Request, _visitor: Visitor) -> Response:
     """A report in the machine's folder."""
-    _registry(request).machine(request.path_params["machine"])
+    registry_of(request).machine(request.path_params["machine"])
     for path in _reports(request):
         if path.name == request.path_params["file"]:
             return report_response(path.read_text("utf-8"))
@@ -90,8 +88,8 @@ def kept_report(request: Request, _visitor: Visitor) -> Response:
 
 def document(request: Request, _visitor: Visitor) -> Response:
     """A version's document as it is."""
-    registry, kind = _registry(request), request.path_params["kind"]
-    if kind not in DOCUMENT_KINDS:
+    registry, kind = registry_of(request), request.path_params["kind"]
+    if kind not in get_args(Kind):
         raise HTTPException(404, "No such document.")
     number = request.path_params["number"]
     version = registry.version(request.path_params["machine"], number)
@@ -111,24 +109,12 @@ def _charts(logs: Sequence[TestedLog]) -> str:
     return "".join(str(chart_html(one)) for one in parameter_charts(shown))
 
 
-def _documents(registry: Registry, version: Version) -> dict[str, dict[str, Any] | None]:
-    return {
-        kind: registry.document(version, kind) if getattr(version, kind) else None
-        for kind in DOCUMENT_KINDS
-    }
-
-
 def _reports(request: Request) -> list[Path]:
     root: Path = request.app.state.settings.root
     name = request.path_params["machine"]
     if name in (".", "..") or "/" in name or "\0" in name:
         return []
     return sorted((root / name / "reports").glob("*.html"))
-
-
-def _registry(request: Request) -> Registry:
-    found: Registry = request.app.state.registry
-    return found
 
 
 MACHINE_ROUTES = [

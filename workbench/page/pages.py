@@ -13,6 +13,7 @@ from starlette.requests import Request
 from starlette.responses import HTMLResponse, RedirectResponse, Response
 
 from workbench.page.visitors import Visitor
+from workbench.registry.store import Registry
 
 STATE_WORDS = {
     "in_tune": "in tune",
@@ -36,6 +37,12 @@ def show(
         visitor=visitor, url=lambda path, **query: address_of(prefix, path, query), **values,
     )  # fmt: skip
     return HTMLResponse(text, status)
+
+
+def registry_of(request: Request) -> Registry:
+    """The registry that the page is of."""
+    found: Registry = request.app.state.registry
+    return found
 
 
 def go(request: Request, path: str, **query: Any) -> Response:

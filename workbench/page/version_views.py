@@ -1,12 +1,9 @@
 """What the page asks of a version's documents, as functions that run in a process of their own."""
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
 from identification.errors import UserError
@@ -42,8 +39,7 @@ def export_files(design: str, target: str) -> dict[str, bytes]:
     from workbench.export.exported import exported
     from workbench.export.targets import writers
 
-    with _read(design) as found:
-        made = writers(datetime.now(UTC))[target](exported(found))
+    made = writers(datetime.now(UTC))[target](exported(_read(design)))
     return {
         name: content.encode("utf-8") if isinstance(content, str) else bytes(content)
         for name, content in made.items()
@@ -54,8 +50,8 @@ def design_page(design: str) -> str:
     """The report of a design's document."""
     from workbench.report.reports import design_view
 
-    with _read(design) as found:
-        return design_view(found, found.motion == "rotary").page()
+    found = _read(design)
+    return design_view(found, found.motion == "rotary").page()
 
 
 def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
@@ -69,15 +65,15 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     said: list[str] = []
     for place, (number, text) in enumerate(designs):
         try:
-            with _read(text) as found:
-                rows += [(f"version {number}", *row) for row in margins_table(found).whole]
-                for name, one in found.controllers.items():
-                    t, y = linear_step(found, one)
-                    colour: Colour = "reference" if place else "model"
-                    look = STYLES_OF[name]
-                    lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
-                if found.recommendation:
-                    said.append(f"version {number}: {found.recommendation.why}")
+            found = _read(text)
+            rows += [(f"version {number}", *row) for row in margins_table(found).whole]
+            for name, one in found.controllers.items():
+                t, y = linear_step(found, one)
+                colour: Colour = "reference" if place else "model"
+                look = STYLES_OF[name]
+                lines.append(Line(f"{number}: {name.upper()}", t, y, colour, look))
+            if found.recommendation:
+                said.append(f"version {number}: {found.recommendation.why}")
         except UserError as error:
             said.append(f"version {number}: {error}")
     if not lines:
@@ -87,15 +83,9 @@ def loops(designs: Sequence[tuple[int, str]]) -> LoopsFound:
     return LoopsFound(("", *DESIGN_HEAD), rows, str(chart_html(chart)), said)
 
 
-@contextmanager
-def _read(text: str) -> "Iterator[Design]":
-    """The design, read as from its file; its messages without the file's folder."""
+def _read(text: str) -> "Design":
+    """The design of a document as text, read as from its file; raises UserError."""
     from workbench.documents.design_read import read_design
+    from workbench.documents.reading import Stored
 
-    with TemporaryDirectory(prefix="workbench-") as name:
-        path = Path(name) / "design.json"
-        path.write_text(json.dumps(json.loads(text)), encoding="utf-8")
-        try:
-            yield read_design(path)
-        except UserError as error:
-            raise type(error)(str(error).replace(f"{name}/", "")) from None
+    return read_design(Stored("design.json", json.loads(text)))

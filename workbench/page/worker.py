@@ -57,7 +57,7 @@ def run_worker(settings: PageSettings, report: Report, *, once: bool = False) ->
         report("worker_ready", owner=owner)
         while True:
             try:
-                claim = bench.claim(owner, lease=TASK_LEASE, now=_now())
+                claim = bench.claim(owner, lease=TASK_LEASE, now=datetime.now(UTC))
             except RegistryAway as error:
                 report("registry_away", reason=str(error))
                 time.sleep(10 * QUEUE_POLL)
@@ -76,7 +76,7 @@ def _one(bench: Bench, claim: WorkClaim, settings: PageSettings, report: Report)
     report("task_begun", task=task.id, kind=task.kind, upload=task.upload)
     try:
         state, said = _made(bench, claim, settings, report)
-        Patience()(bench.finish, claim, state, said, now=_now())
+        Patience()(bench.finish, claim, state, said, now=datetime.now(UTC))
         report("task_over", task=task.id, state=state, said=said)
     except (NotOurs, LostClaim):
         report("task_lost", task=task.id)
@@ -120,7 +120,7 @@ def _beating(
         state.stage = words
 
     def beat() -> None:
-        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=_now())
+        bench.progress(claim, state.stage, state.share, lease=TASK_LEASE, now=datetime.now(UTC))
 
     def stop(over: threading.Event) -> None:
         os.kill(os.getpid(), signal.SIGUSR1)
@@ -133,7 +133,3 @@ def _beating(
 
 def _raise(_number: int, _frame: FrameType | None) -> None:
     raise NotOurs
-
-
-def _now() -> datetime:
-    return datetime.now(UTC)

@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 from workbench.output import dumps
 from workbench.registry.database import Database
 from workbench.registry.errors import BadRegistry, LostClaim
-from workbench.registry.glances import glance_heard, glance_judged
+from workbench.registry.machine_summary import glance_heard, glance_judged
 from workbench.registry.order import Order, newest_of_later
 from workbench.registry.rows import (
     active_version,

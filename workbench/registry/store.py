@@ -4,8 +4,7 @@ import json
 import re
 from collections.abc import Sequence
 from datetime import datetime
-from types import TracebackType
-from typing import Any, Self
+from typing import Any, Self, get_args
 
 from sqlalchemy import ColumnElement, Select, func, select
 from sqlalchemy.orm import InstrumentedAttribute, Session
@@ -53,12 +52,7 @@ class Registry:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.close()
 
     def close(self) -> None:
@@ -162,6 +156,13 @@ class Registry:
             raise BadRegistry(f"{version.machine}, version {version.number}: has no {kind}")
         found: dict[str, Any] = json.loads(text)
         return found
+
+    def documents(self, version: Version) -> dict[str, dict[str, Any] | None]:
+        """A version's documents by kind, None where it has none of that kind."""
+        return {
+            kind: self.document(version, kind) if getattr(version, kind) else None
+            for kind in get_args(Kind)
+        }
 
     def _earlier(self, session: Session, machine: str) -> Sequence[int]:
         """Active versions one after the other, the present one last; a rollback takes one off."""

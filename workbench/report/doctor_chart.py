@@ -5,7 +5,7 @@ import numpy as np
 from identification.signals.differentiate import differentiate
 from workbench.cards.units import si_unit
 from workbench.report.chart import Band, Chart, Line, Panel
-from workbench.report.figures import evenly_spread
+from workbench.report.chart_figure import evenly_spread
 from workbench.steps.doctor import CheckedLog, Examined
 
 Seen = CheckedLog | Examined

@@ -60,6 +60,22 @@ def detectable_sentence(test: DriftTest, limit: float) -> str:
     return said + (f"; inconclusive: {', '.join(coarse)}" if coarse else "")
 
 
+def reason_sentence(test: DriftTest, limit: float) -> str:
+    """Why a test has its verdict and, without an alarm, its minimum detectable changes."""
+    seen = "" if test.found_by else detectable_sentence(test, limit)
+    return "; ".join(filter(None, (test.reason or _all_that_moved(test), seen)))
+
+
+def _all_that_moved(test: DriftTest) -> str:
+    if not test.found_by:
+        return "no parameter has moved"
+    by = "" if test.found_by != "mean" else " (by the mean of the last logs)"
+    moved = [f"{m.name} {m.before:.4g} -> {m.after:.4g} {m.unit}" for m in test.moved]
+    if test.unsure:
+        moved.append(f"one of several that are not separable: {', '.join(test.unsure)}")
+    return f"moved{by}: {', '.join(moved)}"
+
+
 def _percent(value: float) -> str:
     return f"{100 * value:.2g} %" if value < 1.0 else "more than 100 %"
 

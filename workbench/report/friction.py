@@ -17,7 +17,7 @@ from workbench.cards.readable import Units, units_of
 from workbench.documents.model import Model, used
 from workbench.logs.sources import Source
 from workbench.report.chart import Area, Band, Chart, Line, Panel, chart_html
-from workbench.report.figures import evenly_spread
+from workbench.report.chart_figure import evenly_spread
 from workbench.report.page import Section
 
 CURVES = 200

@@ -46,7 +46,7 @@ def loop(
     return [
         Section(f"Steps on {on}", chart_html(step_chart(found, traces, place, rotary), steps)),
         Section(
-            f"Error on {on}", chart_html(error_chart(found, traces, place, rotary), quiet)
+            f"Error on {on}", chart_html(error_chart(traces, place, rotary), quiet)
         ),
     ]  # fmt: skip
 
@@ -89,9 +89,7 @@ def _near(lines: Sequence[Line], height: float) -> tuple[float, float] | None:
     return None if inside else (low, high)
 
 
-def error_chart(
-    found: Validation, traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool
-) -> Chart:
+def error_chart(traces: Mapping[tuple[str, str], Traces], place: str, rotary: bool) -> Chart:
     """Error along the smooth reference and in the last dwell, loops overlaid."""
     unit, factor = units_of(rotary).position
     panels = []

@@ -6,8 +6,7 @@ from importlib.resources import files
 from typing import Any
 
 from workbench.report.chart import chart_assets
-from workbench.report.symbols import used_symbols
-from workbench.report.templating import render, safe
+from workbench.report.templating import render, safe, used_symbols
 from workbench.screen import Part
 
 

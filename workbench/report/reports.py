@@ -3,12 +3,14 @@
 from collections.abc import Mapping, Sequence
 from functools import cache
 
+from identification.estimation.estimates import AT_ZERO
 from identification.simulation.free_run import FreeRun
 from workbench.documents.design import Design
 from workbench.documents.design_file import design_document
+from workbench.documents.model import Model, used
 from workbench.documents.model_file import model_document
-from workbench.report.bode import bode_section
 from workbench.report.controllers import (
+    bode_section,
     coefficients,
     controllers,
     drive_section,
@@ -26,14 +28,15 @@ from workbench.report.model_tables import (
     logs_of,
     model_parts,
     next_of_model,
+    parameter_rows,
     plant_lines,
     summary,
 )
 from workbench.report.notes import report_notes
 from workbench.report.page import Section, lines_section
-from workbench.report.parameters import parameters_section
 from workbench.report.residual import residual
 from workbench.report.response import over_frequency
+from workbench.report.templating import render
 from workbench.report.validation_tables import (
     then_of_validation,
     validation_parts,
@@ -125,3 +128,17 @@ def validation_view(
         then_of_validation(found),
         then_by_command=not found.passed,
     )
+
+
+def parameters_section(model: Model) -> Section:
+    """The parameters with units and intervals, or why there is none."""
+    held = {**model.friction, **(model.actuator or {})}
+    assumed = ", ".join(
+        f"{name} = {_shown(used(e))} {e.unit}" for name, e in held.items() if e.value is None
+    )
+    return Section("Parameters", render("parameters", rows=parameter_rows(model), assumed=assumed))
+
+
+def _shown(value: float) -> str:
+    """A value that simulations use; what a plant keeps of 0 is 0."""
+    return "0" if abs(value) <= AT_ZERO else f"{value:.3g}"

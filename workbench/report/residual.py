@@ -13,9 +13,9 @@ from workbench.cards.readable import times, units_of
 from workbench.documents.model import Model
 from workbench.logs.sources import Source
 from workbench.report.chart import Band, Chart, Line, Panel, chart_html
-from workbench.report.figures import SHOWN_SHARE, evenly_spread
+from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
+from workbench.report.fit import InARow, in_a_row
 from workbench.report.friction import friction_data
-from workbench.report.in_a_row import InARow, in_a_row
 from workbench.report.model_tables import left_of
 from workbench.report.page import Section
 

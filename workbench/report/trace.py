@@ -2,7 +2,6 @@
 
 from workbench.documents.model_file import model_document
 from workbench.report.chart import Chart
-from workbench.report.free_curves import free_curves
 from workbench.report.notes import report_notes
 from workbench.report.page import Section, lines_section, table_section
 from workbench.report.response import over_frequency
@@ -10,6 +9,7 @@ from workbench.report.trace_friction import friction_before_after, friction_char
 from workbench.report.trace_pictures import (
     Picture,
     against_signal,
+    free_curves,
     in_equation,
     over_time,
     pictures,

@@ -10,10 +10,10 @@ from identification.arrays import Array, BoolArray
 from identification.effects._base import Acting, Effect
 from identification.model.karnopp import Karnopp
 from identification.simulation.effect_along_motion import contribution
-from identification.tracing.result import Residual, Trace
+from identification.tracing.result import FreeCurve, Residual, Trace
 from workbench.cards.readable import units_of
-from workbench.report.chart import Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
-from workbench.report.figures import SHOWN_SHARE, evenly_spread
+from workbench.report.chart import Area, Band, Chart, Colour, Line, Mark, Panel, Part, chart_html
+from workbench.report.chart_figure import SHOWN_SHARE, evenly_spread
 from workbench.report.page import Section
 from workbench.report.trace_words import words
 
@@ -351,3 +351,30 @@ def _limits(residual: Residual, factor: float, values: Array | None = None) -> t
     top = float(np.quantile(np.abs(residual.before if values is None else values), SHOWN_SHARE))
     top = 1.25 * factor * max(top, 2 * float(np.median(residual.noise)), 1e-300)
     return -top, top
+
+
+def free_curves(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -> Section:
+    """Each named effect that is a function of a logged signal, by its law and free of it."""
+    caption = (
+        "Band: mean of what the model without the effect leaves there, with its 95 % interval;"
+        " a law that stays inside it says what the logs say."
+    )
+    return Section("Law and logs", chart_html(curves_chart(curves, rotary, command), caption))
+
+
+def curves_chart(curves: Sequence[FreeCurve], rotary: bool, command: str = "V") -> Chart:
+    """The chart of `free_curves`; command: unit of u."""
+    panels = []
+    for one in curves:
+        label, x_factor = axis_of(one.signal, rotary, command)
+        unit, factor = residual_unit(one.equation, rotary)
+        x, free, wide = x_factor * one.at, factor * one.free, 1.96 * factor * one.sd
+        panels.append(
+            Panel(
+                label, f"{words(one.effect)} [{unit}]",
+                [Line("by its law", x, factor * one.law, "model", "bold")],
+                areas=[Area("by the logs alone", x, free - wide, free + wide, "measured")],
+            )
+        )  # fmt: skip
+    what = "what each effect gives against its signal, by its law and by the logs alone"
+    return Chart("trace-curves", what, panels, columns=2, shared_x=False)

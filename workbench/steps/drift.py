@@ -263,14 +263,10 @@ def _number(shift: Shift) -> dict[str, Any]:
     """A parameter before, after, and its relative change, each as results carry a parameter."""
     return {
         "name": shift.name,
-        "before": as_number(_estimate(shift.before, shift.before_sd, shift.unit)),
-        "after": as_number(_estimate(shift.after, shift.after_sd, shift.unit)),
+        "before": as_number(reported_estimate(shift.before, shift.unit, shift.before_sd)),
+        "after": as_number(reported_estimate(shift.after, shift.unit, shift.after_sd)),
         "change": as_number(Estimate(shift.change, "1", shift.sd, shift.low, shift.high)),
     }
-
-
-def _estimate(value: float, sd: float, unit: str) -> Estimate:
-    return reported_estimate(value, unit, sd)
 
 
 def _statistic(found: Statistic | None) -> dict[str, Any] | None:

@@ -1,6 +1,6 @@
 """What a loop comes to in simulation: its runs along steps and a smooth reference, its figures."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -23,9 +23,8 @@ from workbench.documents.design import (
 )
 from workbench.documents.model import Model
 from workbench.steps.closed_loop import DrivenLoop, limit_on, present_loop, run_driven
-from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import plants_of
-from workbench.steps.loop_motion import JUDGED_SHARE, loop_motion
+from workbench.steps.loop_motion import JUDGED_SHARE, LimitCycle, loop_motion
 
 STEP_SHARE = 0.25  # of the travel seen in the logs
 SMOOTH_SHARE = 0.4
@@ -144,8 +143,7 @@ def references(
     Levels from the travel that the logs have shown; the last one is held for long, since a limit
     cycle of an integrator against stiction may take seconds.
     """
-    low, high = machine.travel
-    step, amplitude = STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
+    step, amplitude = _sizes(machine)
     n = round(
         (max(DWELLS * slowest(found), SHORTEST_DWELL) + travel(found, 2 * step) / JUDGED_SHARE) / h
     )
@@ -154,10 +152,32 @@ def references(
     w = SMOOTH_SPEED * min(one.dominant[0] for one in found.controllers.values())
     if machine.speed is not None:  # no faster than the machine has been seen to move
         w = min(w, machine.speed / amplitude)
+    rest = np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
+    return levels, _smooth(amplitude, w, h, periods), rest
+
+
+def common_reference(machine: Model, designs: Sequence[Design], h: float) -> Array:
+    """Steps and then a smooth motion [m] at the period h [s], the same motion for every design."""
+    step, amplitude = _sizes(machine)
+    dwell = max(
+        max(DWELLS * slowest(one), SHORTEST_DWELL) + travel(one, 2 * step) for one in designs
+    )
+    w = SMOOTH_SPEED * min(one.controllers[tested_of(one)].dominant[0] for one in designs)
+    levels = np.repeat(np.array([0.0, step, -step, 0.0]), round(dwell / h))
+    return np.concatenate([levels, _smooth(amplitude, w, h, SMOOTH_PERIODS)])
+
+
+def _sizes(machine: Model) -> tuple[float, float]:
+    """Height of the steps and amplitude of the smooth reference [m]."""
+    low, high = machine.travel
+    return STEP_SHARE * (high - low), SMOOTH_SHARE * (high - low)
+
+
+def _smooth(amplitude: float, w: float, h: float, periods: float) -> Array:
+    """A sine of w [rad/s] that comes to its amplitude [m] in half a period."""
     t = h * np.arange(round(periods * 2 * np.pi / w / h), dtype=np.float64)
     rise = np.clip(t * w / np.pi, 0.0, 1.0)
-    smooth = amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise)
-    return levels, smooth, np.zeros(max(round(STANDSTILL_SECONDS / h), 2))
+    return np.asarray(amplitude * np.sin(w * t) * rise**2 * (3 - 2 * rise))
 
 
 def travel(found: Design, step: float) -> float:

@@ -16,7 +16,6 @@ from identification.model.inverse_model import SURE_SLIDING, Smoothing
 from identification.model.plant import Motor
 from identification.model.size import Size
 from identification.model.surroundings import Surroundings
-from identification.signals.clean import applied_force
 from identification.signals.differentiate import differentiate
 from identification.signals.initial_state import measured_start
 from identification.simulation.free_run import FreeRun, free_run
@@ -27,6 +26,7 @@ from workbench.steps.predicted_force import (
     of_body,
     refuse_missing,
     seen_moving,
+    with_applied_force,
     with_motor_force,
 )
 
@@ -100,7 +100,7 @@ def predict(
         raise BadLog(f"{log.name}: drive by command asked for, but no command u is logged")
     plant = model.simulated
     refuse_missing(log, plant.effects)
-    log = _of_one_instant(with_motor_force(_with_force(log, model), plant), model)
+    log = _of_one_instant(with_motor_force(with_applied_force(log, model.rig), plant), model)
     body = of_body(log, plant)
     restarts = None if window is None else _restarts(body, window)
     how = Smoothing(held=model.rig.kind == "motor")
@@ -265,18 +265,6 @@ def _of_one_instant(log: Log, model: Model) -> Log:
     drive = model.simulated.actuator
     gives = drive.k_a if isinstance(drive, Motor) else None
     return Surroundings(lag=Size(used(model.lag)), gives=gives).of_one_instant(log)
-
-
-def _with_force(log: Log, model: Model) -> Log:
-    """The log with F, from the command where the rig is a motor whose constant the model holds."""
-    if "F" in log:
-        return log
-    force = applied_force(log, model.rig)
-    if force is None:
-        raise BadLog(
-            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
-        )
-    return log.with_signals(F=force)
 
 
 def _commanded(

@@ -9,10 +9,11 @@ from identification.arrays import Array
 from identification.effects._base import Acting
 from identification.effects._places import Place
 from identification.errors import BadLog
-from identification.log import Log
+from identification.log import Log, Rig
 from identification.model.inverse_model import SURE_SLIDING, Smoothing, force_predicted
 from identification.model.karnopp import VISCOUS_NAMES
 from identification.model.plant import Motor, Plant
+from identification.signals.clean import applied_force
 from identification.signals.differentiate import Motion, differentiate
 from identification.simulation.effect_along_motion import contribution, elastic_share
 from identification.simulation.effect_run import effective_commands
@@ -98,6 +99,18 @@ def of_body(log: Log, plant: Plant) -> Log:
             true = shown - (_along(one, plant, signals, log.h) - true)
         log = log.with_signals(y=true)
     return log
+
+
+def with_applied_force(log: Log, rig: Rig) -> Log:
+    """The log with F, by the rig where it is not logged; raises BadLog where that does not tell."""
+    if "F" in log:
+        return log
+    force = applied_force(log, rig)
+    if force is None:
+        raise BadLog(
+            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
+        )
+    return log.with_signals(F=force)
 
 
 def with_motor_force(log: Log, plant: Plant) -> Log:

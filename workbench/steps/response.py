@@ -10,7 +10,7 @@ import numpy as np
 from design.measured_loop import MeasuredMargins, measured_margins
 from design.polynomial import evaluate
 from identification.arrays import Array, BoolArray
-from identification.errors import BadLog, BadModel, NotIdentifiable
+from identification.errors import BadModel, NotIdentifiable
 from identification.estimation.estimates import reported_estimate
 from identification.frequency.body import body_response
 from identification.frequency.estimate import COHERENCE_SURE, Response, in_series
@@ -23,7 +23,6 @@ from identification.model.estimates import Estimate
 from identification.model.plant import Motor
 from identification.model.size import Size
 from identification.progress import KeepGoing, without_end
-from identification.signals.clean import applied_force
 from workbench.cards.parameter_units import shown
 from workbench.documents.model import Model, used
 from workbench.documents.plain import as_number
@@ -39,6 +38,7 @@ from workbench.steps.linear_force import (
     stiffness_of,
 )
 from workbench.steps.linear_loop import dead_time
+from workbench.steps.predicted_force import with_applied_force
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -98,7 +98,7 @@ def respond(
             f"the model is of a {model.rig.motion} machine, but the card {card} says"
             f' motion = "{rig.motion}"; give the model and the card of one machine'
         )
-    logs = [_with_force(one.log, rig) for one in runs]
+    logs = [with_applied_force(one.log, rig) for one in runs]
     taken = model if left_in is None else None
     found, modes = _measured(logs, rig.kind == "motor", taken, lowest)
     if not np.any(found.body.seen):
@@ -193,17 +193,6 @@ def _open_loop(found: MachineResponses, curves: Curves | None) -> Response | Non
     if curves is None or curves.controller is None:
         return None
     return found.position.times(curves.controller)
-
-
-def _with_force(log: Log, rig: Rig) -> Log:
-    if "F" in log:
-        return log
-    F = applied_force(log, rig)
-    if F is None:
-        raise BadLog(
-            f"{log.name}: no applied force; give the card F, both pressures, or force_per_command"
-        )
-    return log.with_signals(F=F)
 
 
 def _nothing(runs: Sequence[Source], found: MachineResponses) -> str:

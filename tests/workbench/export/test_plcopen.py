@@ -13,8 +13,7 @@ from xsdata.formats.dataclass.serializers import XmlSerializer
 from tests.workbench.export.designs import case
 from tests.workbench.export.structured_text_runner import Blocks
 from workbench.export.exported import Exported, Precision, exported
-from workbench.export.plcopen import plcopen_file
-from workbench.export.structured_text import blocks
+from workbench.export.structured_text import blocks, plcopen_file
 
 NOW = datetime(2026, 1, 2, 3, 4, 5)
 TC6 = {"p": "http://www.plcopen.org/xml/tc6_0201", "x": "http://www.w3.org/1999/xhtml"}

@@ -7,8 +7,7 @@ from design.program_run import ProgramRun
 from tests.workbench.export.designs import NAMES, case, simulated
 from tests.workbench.export.structured_text_runner import Blocks
 from workbench.export.exported import Precision, exported
-from workbench.export.st_syntax import st_syntax
-from workbench.export.structured_text import st_file
+from workbench.export.structured_text import st_file, st_syntax
 
 
 def blocks(name: str, precision: Precision = "double", controller: str = "rst") -> Blocks:

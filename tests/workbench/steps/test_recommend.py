@@ -16,9 +16,9 @@ from workbench.documents.model import Model
 from workbench.report.validation_tables import validation_table
 from workbench.steps import recommend
 from workbench.steps.design import with_choice
-from workbench.steps.limit_cycle import LimitCycle
 from workbench.steps.linear_loop import force_period, periods
 from workbench.steps.loop_figures import PRESENT, LoopFigures
+from workbench.steps.loop_motion import LimitCycle
 from workbench.steps.present import present
 from workbench.steps.recommend import recommended
 from workbench.steps.validate import validate

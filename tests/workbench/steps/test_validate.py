@@ -5,7 +5,7 @@ import pytest
 
 from design.loop import LoopRun
 from identification.arrays import Array
-from workbench.steps.limit_cycle import limit_cycle
+from workbench.steps.loop_motion import limit_cycle
 
 H = 1e-3
 T: Array = H * np.arange(10_000, dtype=np.float64)
